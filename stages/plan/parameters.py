@@ -9,6 +9,7 @@ from pydantic import Field
 
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
+from schemas.language_map import LanguageMap
 from schemas.plan import Plan
 from stages.kit.estimates import grows_with
 from stages.kit.stage import External, Optionally, Parameters, Stage
@@ -23,8 +24,8 @@ class PlanParameters(Parameters):
         (),
         description="Goal literals such as on(bottle_7,table_3) closed(fridge_2); predicates on, in, open, closed, "
         "holding, and those of --domain; `not on(...)`, `on(every bottle,any table)`, or a formula in brackets with "
-        "and, or, not, forall, exists. Empty: take an item out of furniture with a door, put it on a table, shut the "
-        "door",
+        'and, or, not, forall, exists; with --language also on("red mug","dining table"). Empty: take an item out of '
+        "furniture with a door, put it on a table, shut the door",
     )
     task: Literal["", "fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"] = Field(
         "", description="A task by name; its goal is derived from what is in the scene. Not together with --goal"
@@ -76,10 +77,12 @@ class PlanParameters(Parameters):
     image_width: int = Field(640, ge=64, le=4096, description="Width of the key frames [px]")
 
 
-def robot_files(parameters: PlanParameters) -> tuple[str, ...]:
-    """Return the files of `data/` that describe the robot: its URDF too where it lies there."""
-    names = (f"robots/{parameters.robot}.toml", f"robots/{parameters.robot}.urdf")
-    return names if (DATA / names[1]).is_file() else names[:1]
+def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
+    """Return the files of `data/` that describe the robot, its URDF too where it lies there, and what words need."""
+    names: tuple[str, ...] = (f"robots/{parameters.robot}.toml", f"robots/{parameters.robot}.urdf")
+    names = names if (DATA / names[1]).is_file() else names[:1]
+    in_words = any('"' in literal for literal in parameters.goal)
+    return (*names, "words/two_towers.safetensors", "words/calibration.toml") if in_words else names
 
 
 STAGE = Stage(
@@ -91,10 +94,11 @@ STAGE = Stage(
         "scene": InteractiveScene,
         "ground_truth": Optionally(GroundTruth),
         "domain": Optionally(External("operators to plan with: PDDL, or what `predicates teach --scene` wrote")),
+        "language": Optionally(LanguageMap),
     },
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
-    data_files=robot_files,
+    data_files=plan_files,
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "
     "--out outputs/demo/plan",
     estimate=grows_with("scene", 2.2, 0.0, 640, 0.0),

@@ -14,6 +14,7 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
+from schemas.language_map import LanguageMap
 from schemas.plan import Failure, Plan, PlanFile, PlannedAction, TriedPlan
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
@@ -25,6 +26,7 @@ from stages.plan.assumptions import believe, parse_priors
 from stages.plan.domain import DOMAIN
 from stages.plan.given_domain import read_given_domain
 from stages.plan.goals import TABLE_CLASSES, default_goals
+from stages.plan.open_goals import has_words, named_goal
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
 from stages.plan.plan_text import plan_text
@@ -75,6 +77,7 @@ def run(
     scene: InteractiveScene,
     ground_truth: GroundTruth | None,
     domain: Path | None,
+    language: LanguageMap | None = None,
     *,
     parameters: PlanParameters,
     context: Context,
@@ -100,6 +103,9 @@ def run(
         graph = believe(model, scene.graph, beliefs)
         objects, initial = symbolic_state(model, graph, parameters.size_uncertainty)
         with context.progress.step("plan"):
+            if has_words(parameters.goal):
+                goal = named_goal(parameters.goal, objects, graph, language)
+                parameters = parameters.model_copy(update={"goal": goal})
             state, planning = _find(Scene(model, graph, objects, initial, reading), budgets, parameters, context)
         problem = planning.problem or task_problem(objects, initial, frozenset())
         written = DOMAIN if reading.given is None else reading.given.domain

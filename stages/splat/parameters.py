@@ -1,14 +1,20 @@
-"""Declarations of the steps `splat build` and `splat render`."""
+"""Declarations of the steps of `splat`."""
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pydantic import Field
 
+from schemas.contact_graph import ContactGraph
+from schemas.language_map import Answers, LanguageMap
+from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence
 from schemas.splat import Splat, SplatViews
 from schemas.trajectory import Trajectory
+from stages.kit.open_words.encoder import checked_text
+from stages.kit.open_words.options import EXTRAS, WEIGHTS, EncoderParameters, encoder_files
 from stages.kit.stage import Optionally, Parameters, Stage
 
 LIBRARIES = ("numpy", "numba", "scipy", "opencv-python-headless", "pillow")
@@ -41,6 +47,43 @@ class RenderParameters(Parameters):
     pictures: int = Field(12, ge=0, le=10_000, description="At most so many are written, evenly spread")
 
 
+class LanguageParameters(EncoderParameters):
+    """Options of `splat language`."""
+
+    steps: int = Field(400, ge=0, le=1_000_000, description="Steps of training the field")
+    most_views: int = Field(
+        60, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all"
+    )
+
+
+class LabelParameters(EncoderParameters):
+    """Options of `splat label`."""
+
+    most_views: int = Field(
+        120, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all"
+    )
+
+
+class QueryParameters(EncoderParameters):
+    """Options of `splat query`."""
+
+    text: str = Field("", description='What is looked for: "red mug"; with --contact-graph also "cup on the desk"')
+    least_probability: float = Field(
+        0.5, ge=0, le=1, description="Answers are at least so likely; else: the room has none"
+    )
+    most: int = Field(10, ge=1, le=20, description="At most so many answers")
+
+
+def check_query(parameters: QueryParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for a text that asks for nothing, or is no query."""
+    checked_text(parameters.text)
+
+
+def query_files(parameters: QueryParameters) -> tuple[str, ...]:
+    """Return the files of data/ that a query reads."""
+    return (*encoder_files(parameters), "words/calibration.toml")
+
+
 BUILD = Stage(
     name="splat build",
     version=2,
@@ -63,4 +106,46 @@ RENDER = Stage(
     module="render_stage",
     example="scenewright splat render --splat outputs/demo/splat --sequence outputs/demo/sequence --out outputs/views",
 )
-STAGES = (BUILD, RENDER)
+LANGUAGE = Stage(
+    name="splat language",
+    version=1,
+    summary="Keep in a splat what its pictures say, so that words find places",
+    parameters=LanguageParameters,
+    reads={"splat": Splat, "sequence": Sequence, "weights": WEIGHTS},
+    writes=LanguageMap,
+    libraries=(*LIBRARIES, "torch"),
+    module="language_stage",
+    extras=EXTRAS,
+    data_files=encoder_files,
+    example="scenewright splat language --splat outputs/demo/splat --sequence outputs/demo/sequence "
+    "--out outputs/words",
+)
+LABEL = Stage(
+    name="splat label",
+    version=1,
+    summary="Keep what pictures show of every entity of a panoptic map, so that words find it",
+    parameters=LabelParameters,
+    reads={"panoptic_map": PanopticMap, "sequence": Sequence, "trajectory": Optionally(Trajectory), "weights": WEIGHTS},
+    writes=LanguageMap,
+    libraries=("numpy", "opencv-python-headless", "trimesh", "torch"),
+    module="label_stage",
+    extras=EXTRAS,
+    data_files=encoder_files,
+    example="scenewright splat label --panoptic-map outputs/demo/panoptic_map --sequence outputs/demo/sequence "
+    "--out outputs/labels",
+)
+QUERY = Stage(
+    name="splat query",
+    version=1,
+    summary="Find what words ask for, with probabilities, or say that the room has none",
+    parameters=QueryParameters,
+    reads={"language": LanguageMap, "contact_graph": Optionally(ContactGraph), "weights": WEIGHTS},
+    writes=Answers,
+    libraries=("numpy", "torch"),
+    module="query_stage",
+    extras=EXTRAS,
+    data_files=query_files,
+    check=check_query,
+    example='scenewright splat query --language outputs/words --text "red mug" --out outputs/answer',
+)
+STAGES = (BUILD, RENDER, LANGUAGE, LABEL, QUERY)

@@ -33,7 +33,7 @@ def write_gaussians(path: Path, gaussians: Gaussians) -> None:
         gaussians.means,
         np.zeros((count, 3)),
         gaussians.harmonics[:, 0],
-        higher.reshape(count, -1),
+        higher.reshape(count, 3 * HIGHER),
         gaussians.logit_opacities[:, None],
         gaussians.log_scales,
         gaussians.quaternions / np.linalg.norm(gaussians.quaternions, axis=1, keepdims=True),

@@ -16,10 +16,10 @@ from schemas.vocabulary import load_vocabulary
 from stages.engine.hub_cache import is_hub_id
 from stages.engine.model_cache import resolve_weights
 from stages.kit.formats.frames import Frame
+from stages.kit.formats.transformers_folder import short_name
 from stages.kit.labels import LabelSet, parse_words
 from stages.segment.backends.huggingface import panoptic
 from stages.segment.backends.huggingface.backend import HuggingFaceSettings, make_backend
-from stages.segment.backends.huggingface.loading import short_name
 from stages.segment.backends.huggingface.open_vocabulary import make_prompts, word_scores
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.parameters import SegmentParameters

@@ -11,9 +11,9 @@ import numpy as np
 from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.kit.formats.transformers_folder import read_config, short_name
 from stages.kit.labels import LabelSet, parse_words, read_label_file
 from stages.segment.backends.huggingface import HuggingFaceParameters
-from stages.segment.backends.huggingface.loading import read_config, short_name
 from stages.segment.backends.huggingface.open_vocabulary import OpenVocabularySegmenter
 from stages.segment.backends.huggingface.panoptic import FAMILIES, PanopticSegmenter
 from stages.segment.choice import BackendRequest

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.kit.labels import Label
-from stages.segment.backends.huggingface.loading import (
+from stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
     load_tokenizer,
     processor_class,
     short_name,
 )
+from stages.kit.labels import Label
 from stages.segment.naming import InstanceMask
 from stages.segment.suppression import suppress
 

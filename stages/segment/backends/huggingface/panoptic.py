@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.kit.labels import LabelSet, match_labels
-from stages.segment.backends.huggingface.loading import (
+from stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
     load_tokenizer,
@@ -20,6 +19,7 @@ from stages.segment.backends.huggingface.loading import (
     short_name,
     transformers_library,
 )
+from stages.kit.labels import LabelSet, match_labels
 from stages.segment.naming import NamedSegment
 
 OVERLAP_SHARE = 0.8

@@ -1,0 +1,222 @@
+"""Rooms that are asked: language in a splat (`ours`), the thesis's way to an answer, entities of our map.
+
+The same pictures and poses; `ours` and `thesis` ask the same field. `thesis` takes the size that fits best in the
+view in which a right thing is seen best (the user's choice there), then the Gaussian that fits best at that size, and
+always answers. `entities` asks what pictures show of every entity of a perfect map: more than our map would be.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.generated_rooms import STEPS
+from benchmarks.words.asked import AskedRoom, Query
+from stages.kit.geometry.boxes import box_iou
+from stages.kit.geometry.cameras import scaled
+from stages.kit.open_words.finding import Finder
+from stages.kit.open_words.opening import open_encoder
+from stages.kit.open_words.options import EncoderParameters
+from stages.kit.open_words.relevancy import margins, query_rows, relevancy
+from stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from stages.kit.rendering.splatting.rasterizer import View
+from stages.kit.stage import Parameters
+from stages.splat.ply import read_gaussians
+
+ROOMS = ("kitchen", "office", "bedroom", "room")
+REPORTING = tuple(f"{ROOMS[k % 4]}-{1500 + k}" for k in range(20))
+TUNING = ("kitchen-40",)
+LEAST = 0.5
+"""Probability from which on something is an answer: one for all rooms."""
+BOX_OVERLAP = 0.25
+SMALLER = 0.5
+BINS = 10
+
+
+class WordsParameters(Parameters):
+    """Options of the experiment."""
+
+    frames: int = Field(24, ge=8, description="Frames of a room")
+    steps: int = Field(200, ge=1, description="Steps of training the field")
+    rooms: int = Field(20, ge=1, le=20, description="So many of the reporting rooms")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What came of a room's queries."""
+
+    present: int
+    in_box: int
+    """Queries whose first answer lies in the 3-D box of a right thing."""
+    overlapping: int
+    """... and has a box that overlaps with it."""
+    shown: int
+    in_picture: int
+    """Of those whose thing a held-out view shows (`shown`), first answers within its box there."""
+    answers: int
+    right_answers: int
+    """Of all answers to queries for things that are there."""
+    absent: int
+    rejected: int
+    chances: tuple[float, ...]
+    """Probabilities of the first place, answer or not, of every query ..."""
+    hits: tuple[bool, ...]
+    """... and whether it was right."""
+    query_ms: float
+    """Median [ms], processor time."""
+    gaussians: int
+
+
+@dataclass(frozen=True)
+class Place:
+    """One answer."""
+
+    point: np.ndarray
+    probability: float
+    overlaps: bool
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Asked]]:
+    """Ask a room in every arm."""
+    trial = trials[0]
+    given = bench.parameters
+    room = AskedRoom(bench.out / "rooms", trial.seed, given.frames, given.steps)
+    for trial in trials:
+        yield trial, asked(room, trial.arm)
+
+
+def asked(room: AskedRoom, arm: str) -> Asked:
+    """Return what an arm makes of a room's queries."""
+    encoder = open_encoder(EncoderParameters(), None)
+    finder = Finder(room.entities if arm == "entities" else room.language, encoder)
+    thesis = ThesisWay(room, finder) if arm == "thesis" else None
+    present, absent = room.queries
+    found: dict[str, list[Place]] = {}
+    times = []
+    for query in (*present, *absent):
+        began = time.process_time()
+        found[query.text] = thesis.find(query) if thesis is not None else places(room, finder, query)
+        times.append(1e3 * (time.process_time() - began))
+    least = 0.0 if arm == "thesis" else LEAST
+    first = [next(iter(found[query.text]), None) for query in present]
+    answered = [place if place is not None and place.probability >= least else None for place in first]
+    hits = [place is not None and room.at(place.point, query) for place, query in zip(answered, present, strict=True)]
+    pictured = [
+        place is not None and room.within_picture(place.point, query)
+        for place, query in zip(answered, present, strict=True)
+    ]
+    kept = [(place, query) for query in present for place in found[query.text] if place.probability >= least]
+    firsts = [(next(iter(found[query.text]), None), query) for query in (*present, *absent)]
+    return Asked(
+        present=len(present),
+        in_box=sum(hits),
+        overlapping=sum(
+            hit and place is not None and place.overlaps for hit, place in zip(hits, answered, strict=True)
+        ),
+        shown=sum(room.best_view(query) is not None for query in present),
+        in_picture=sum(bool(each) for each in pictured),
+        answers=len(kept),
+        right_answers=sum(room.at(place.point, query) for place, query in kept),
+        absent=len(absent),
+        rejected=sum(all(place.probability < least for place in found[query.text]) for query in absent),
+        chances=tuple(round(place.probability, 4) for place, _ in firsts if place is not None),
+        hits=tuple(room.at(place.point, query) for place, query in firsts if place is not None),
+        query_ms=float(np.median(times)),
+        gaussians=finder.info.gaussians,
+    )
+
+
+def places(room: AskedRoom, finder: Finder, query: Query) -> list[Place]:
+    """Return what a finder answers."""
+    result = []
+    for found in finder.find(query.text):
+        box = finder.info.regions[found.region].box
+        overlaps = any(box_iou(box, room.objects[k].box) >= BOX_OVERLAP for k in query.right)
+        result.append(Place(np.array(box.center), found.probability, overlaps))
+    return result
+
+
+class ThesisWay:
+    """One size for all Gaussians, the best in a rendered view; the Gaussian that fits best at it."""
+
+    def __init__(self, room: AskedRoom, finder: Finder) -> None:
+        self.room, self.finder = room, finder
+        self.gaussians = read_gaussians(room.splat.path("splat.ply"))
+        self.camera = scaled(room.truth.info.camera, SMALLER)
+
+    def find(self, query: Query) -> list[Place]:
+        """Return its one answer."""
+        apart = margins(self.finder.vectors.vectors, query_rows(self.finder.encoder, query.text))
+        fits = relevancy(apart).astype(np.float32)
+        frame = self.room.best_view(query)
+        frame = next(iter(self.room.sights)) if frame is None else frame
+        arrays = {**self.gaussians.arrays(), "features": fits}
+        view = View(self.camera, self.room.sights[frame][1])
+        shown = CompiledRasterizer().draw(type(self.gaussians)(**arrays), view).picture.features
+        size = int(shown.max(axis=(0, 1)).argmax())
+        best = int(fits[:, size].argmax())
+        return [Place(self.finder.vectors.means[best].astype(float), float(fits[best, size]), False)]
+
+
+def share(top: str, bottom: str) -> Measure:
+    """Pooled share of two counts."""
+
+    def of(records: Sequence[Asked]) -> float | None:
+        count = sum(getattr(record, bottom) for record in records)
+        return sum(getattr(record, top) for record in records) / count if count else None
+
+    return Measure(of)
+
+
+def calibration_error(records: Sequence[Asked]) -> float | None:
+    """Return the expected calibration error over BINS bins of the first places' probabilities."""
+    chances = np.array([chance for record in records for chance in record.chances])
+    hits = np.array([hit for record in records for hit in record.hits], float)
+    if not len(chances):
+        return None
+    bins = np.minimum((BINS * chances).astype(int), BINS - 1)
+    gaps = [abs(chances[bins == b].mean() - hits[bins == b].mean()) * (bins == b).mean() for b in np.unique(bins)]
+    return float(sum(gaps))
+
+
+def seeds_of(bench: Bench, case: str) -> Sequence[str]:
+    """The first rooms."""
+    return TUNING if bench.tuning else REPORTING[: bench.parameters.rooms]
+
+
+EXPERIMENT = Experiment(
+    name="legs_words",
+    title="Rooms that are asked",
+    simulated="The rooms, their pictures and noisy depth; the map of `entities`: the true surface that was seen.",
+    knows="Colour, depth and exact poses. `thesis` is given the view in which the thing is seen best.",
+    does_not_show="CLIP, SigLIP: the encoder is ours, small, trained on other generated rooms of the same makers. Real "
+    "logs. LERF and LangSplat. Words that people choose: queries are drawn from the encoder's own vocabulary.",
+    arms={"ours": "ours", "thesis": "thesis's method", "entities": "entities of a perfect map"},
+    cases=("rooms",),
+    measure=measure,
+    record=Asked,
+    measures={
+        "recall_3d": share("in_box", "present"),
+        "recall_box": share("overlapping", "present"),
+        "recall_2d": share("in_picture", "shown"),
+        "precision": share("right_answers", "answers"),
+        "absent_rejected": share("rejected", "absent"),
+        "calibration_error": Measure(calibration_error),
+        "query_ms": Measure(lambda records: float(np.median([record.query_ms for record in records])), "ms", False),
+        "gaussians": Measure(lambda records: float(np.mean([record.gaussians for record in records])), "", False),
+    },
+    tuning=TUNING,
+    reporting=REPORTING,
+    seeds_of=seeds_of,
+    together=lambda trial: trial.seed,
+    pairs=(("ours", "thesis"), ("ours", "entities")),
+    compared=("recall_3d", "recall_2d", "precision", "absent_rejected"),
+    parameters=WordsParameters,
+    quick={"rooms": 2, "steps": 100},
+    steps=(*STEPS, "splat build", "splat language", "splat label"),
+)

@@ -1,0 +1,65 @@
+"""Places that words find: what a language map holds, and the answers to a query as boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cli.viewing.canvas import Canvas
+from schemas.language_map import Answer, Answers, LanguageMap
+from stages.kit.drawing.palette import instance_color
+from stages.kit.open_words.vectors import read_vectors
+
+FEWEST_LOOKS = 1
+MOST_BOXES = 300
+"""Of a splat's pieces, the largest."""
+
+
+def draw_language_map(language: LanguageMap, canvas: Canvas) -> None:
+    """Draw every Gaussian in the colour of its coarsest piece, and the boxes of what was looked at."""
+    info = language.info
+    canvas.document(
+        "language", f"{len(info.regions)} places of a {info.source.replace('_', ' ')}, encoder: {info.encoder}"
+    )
+    vectors = read_vectors(language)
+    if len(vectors.means):
+        coarse = vectors.pieces[-1] if len(vectors.pieces) else np.zeros(len(vectors.means), int)
+        canvas.points("pieces", vectors.means, _painted(coarse), 0.012)
+    seen = [(k, region) for k, region in enumerate(info.regions) if region.looks >= FEWEST_LOOKS]
+    seen = sorted(seen, key=lambda each: -max(each[1].box.size))[:MOST_BOXES]
+    canvas.boxes(
+        "places",
+        [region.box for _, region in seen],
+        [f"{region.class_name or 'piece'} {region.instance or k}" for k, region in seen],
+        [instance_color(k + 1) for k, _ in seen],
+        show_labels=False,
+    )
+
+
+def draw_answers(answers: Answers, canvas: Canvas) -> None:
+    """Draw the answers as boxes, greener the likelier, and list them."""
+    info = answers.info
+    lines = [f"# {info.text}", "", "| probability | where | node |", "|---|---|---|"]
+    lines += [_line(answer) for answer in info.answers] or ["| | the room has none | |"]
+    if info.unread:
+        lines += ["", f"The encoder has never read: {', '.join(info.unread)}"]
+    if info.next_best is not None:
+        lines += ["", f"Next best, below {info.least_probability:g}:", "", *lines[2:4], _line(info.next_best)]
+    canvas.document("answers", "\n".join(lines))
+    shares = [answer.probability for answer in info.answers]
+    canvas.boxes(
+        "answers",
+        [answer.box for answer in info.answers],
+        [f"{answer.probability:.2f} {answer.node}" for answer in info.answers],
+        [(1.0 - share, 0.8 * share, 0.15) for share in shares],
+    )
+
+
+def _painted(numbers: np.ndarray) -> np.ndarray:
+    palette = np.array([instance_color(k) for k in range(int(numbers.max(initial=0)) + 2)])
+    return np.round(255 * palette[numbers + 1]).astype(np.uint8)
+
+
+def _line(answer: Answer) -> str:
+    at = ", ".join(f"{v:.2f}" for v in answer.box.center)
+    beside = f" ({answer.other})" if answer.other else ""
+    return f"| {answer.probability:.2f} | {at} | {answer.node}{beside} |"

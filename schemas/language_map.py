@@ -1,0 +1,99 @@
+"""Kinds `language_map` and `answers`: places of a room that words find, and what was found."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from schemas.artifact import Artifact, Document
+from schemas.base import Count, Model
+from schemas.scene_parts import Box
+
+
+class LanguageRegion(Model):
+    """A piece of a splat, or an entity of a panoptic map."""
+
+    instance: int = 0
+    """Instance label of an entity; 0 for a piece of a splat."""
+    class_name: str = ""
+    """Class of an entity."""
+    box: Box
+    looks: Count
+    """Pieces of pictures that its vector is the mean of; 0: no picture shows it, and no word finds it by them."""
+
+
+class LanguageMapFile(Model):
+    """language.json."""
+
+    source: Literal["splat", "panoptic_map"]
+    encoder: str
+    """Label of the encoder whose vectors these are."""
+    width: int = Field(ge=1, le=65536)
+    sizes: tuple[float, ...]
+    """At which the field was asked for every Gaussian, ascending [m]; none for a map."""
+    gaussians: Count
+    steps: Count
+    """Of training the field."""
+    loss: float
+    """Mean over its last fifty steps."""
+    regions: tuple[LanguageRegion, ...]
+
+
+class LanguageMap(Artifact):
+    """`language.json` and `vectors.npz`: `regions` (R, width) float16, unit vectors of what pictures show of each
+    region; of a splat also `means` (N, 3) float32 [m], `opacities` (N,) float32, `vectors` (N, sizes, width) float16,
+    the field at every Gaussian, and `pieces` (granularities, N) int32, the region of every Gaussian, fine to coarse, -1
+    none (a map has N = 0)."""
+
+    kind: ClassVar[str] = "language_map"
+    description: ClassVar[str] = "places of a room with vectors that open words find"
+    info = Document(LanguageMapFile, "language.json")
+
+
+class Answer(Model):
+    """One place that fits a text, the likeliest first."""
+
+    region: int
+    """Number of the region in the language map."""
+    probability: float = Field(ge=0, le=1)
+    """That it is what was asked for."""
+    relevancy: float = Field(ge=0, le=1)
+    """Of what pictures show of it (LERF)."""
+    field_relevancy: float | None = Field(default=None, ge=0, le=1)
+    """Mean over its Gaussians, each at its best size; None of a map."""
+    size: float | None = None
+    """Size at which the field fits best [m]; None of a map."""
+    instance: int = 0
+    node: str = ""
+    """Node of the contact graph, where one was given."""
+    other: str = ""
+    """Node that it stands on, in or beside, where the words say so."""
+    box: Box
+    gaussians: Count
+
+
+class AnswersFile(Model):
+    """answers.json."""
+
+    text: str
+    encoder: str
+    calibrated: bool
+    """Whether probabilities were fitted to right and wrong answers of this encoder; else they are relevancies."""
+    least_probability: float
+    unread: tuple[str, ...]
+    """Words that the encoder is known never to have read."""
+    relation: str = ""
+    """What the words say of two things, where a contact graph was asked."""
+    answers: tuple[Answer, ...]
+    next_best: Answer | None = None
+    """The likeliest place below the least probability."""
+
+
+class Answers(Artifact):
+    """`answers.json`, and `masks.npz`: `gaussians` (K,) int32, those of all answers one after another, `starts`
+    (answers + 1,) int64. Outcome `absent`: nothing is as likely as was asked for."""
+
+    kind: ClassVar[str] = "answers"
+    description: ClassVar[str] = "places of a room that fit a text, with probabilities"
+    info = Document(AnswersFile, "answers.json")

@@ -1,0 +1,126 @@
+"""From a text to places: relevancy of every Gaussian at its own best size, of every region, and a probability.
+
+No view is asked (the thesis takes one scale for all, the best in the view that is shown). Of regions that share most of
+their Gaussians the likeliest alone is an answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.language_map import LanguageMapFile
+from stages.kit.open_words.calibration import Calibration
+from stages.kit.open_words.relevancy import margins, relevancy
+from stages.kit.open_words.vectors import Vectors
+
+MOST_ANSWERS = 20
+SHARED = 0.3
+"""Regions that share more than this of the smaller one's box or Gaussians are one place."""
+
+
+@dataclass(frozen=True)
+class Fits:
+    """How well a text fits every region."""
+
+    looks: np.ndarray
+    """(R,) relevancy of what pictures show."""
+    field: np.ndarray | None
+    """(R,) mean relevancy of the Gaussians; None without any."""
+    sizes: np.ndarray | None
+    """(R,) index of the size that fits best."""
+    probabilities: np.ndarray
+
+
+@dataclass(frozen=True)
+class RegionIndex:
+    """Which Gaussians are in which region, made once for many queries."""
+
+    gaussians: np.ndarray
+    """(K,) Gaussians by region."""
+    starts: np.ndarray
+    """(R + 1,)"""
+
+    owners: np.ndarray
+    """(K,) region of each of `gaussians`."""
+    extents: np.ndarray
+    """(R,) greatest edge of each region's box [m]."""
+    lows: np.ndarray
+    highs: np.ndarray
+    """(R, 3) least and greatest corners of the boxes as if they stood along the axes [m]."""
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """Return (R,) sums of values (N,) of Gaussians over the regions."""
+        return np.bincount(self.owners, values[self.gaussians], minlength=len(self.extents))
+
+    def members(self, region: int) -> np.ndarray:
+        """Return the Gaussians of a region."""
+        return self.gaussians[self.starts[region] : self.starts[region + 1]]
+
+
+def region_index(pieces: np.ndarray, info: LanguageMapFile) -> RegionIndex:
+    """Return the index of pieces (granularities, N) of a language map."""
+    count = len(info.regions)
+    gaussians, starts = members_of(pieces, count)
+    owners = np.repeat(np.arange(count), np.diff(starts))
+    centers = np.array([region.box.center for region in info.regions], float).reshape(-1, 3)
+    sizes = np.array([region.box.size for region in info.regions], float).reshape(-1, 3)
+    extents = sizes.max(axis=1, initial=0.0)
+    return RegionIndex(gaussians, starts, owners, extents, centers - sizes / 2, centers + sizes / 2)
+
+
+def members_of(pieces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the Gaussians (K,) by region and where each of `count` regions starts (count + 1,)."""
+    flat = pieces.reshape(-1)
+    gaussian = np.tile(np.arange(pieces.shape[1]), len(pieces))
+    order = np.argsort(flat, kind="stable")
+    order = order[flat[order] >= 0]
+    return gaussian[order], np.concatenate([[0], np.cumsum(np.bincount(flat[order], minlength=count))])
+
+
+def fits(
+    vectors: Vectors, info: LanguageMapFile, index: RegionIndex, rows: np.ndarray, calibration: Calibration
+) -> Fits:
+    """Return how well the text rows[0] fits, against the canonical phrases rows[1:]."""
+    seen = np.array([region.looks > 0 for region in info.regions], bool)
+    of_looks = np.where(seen, relevancy(margins(vectors.regions, rows)), 0.0)
+    field = sizes = None
+    if len(vectors.means):
+        apart = margins(vectors.vectors, rows)
+        best = apart.argmax(axis=1)
+        at_best = relevancy(apart[np.arange(len(apart)), best])
+        weights = vectors.opacities
+        field = index.sums(weights * at_best) / np.maximum(index.sums(weights), 1e-9)
+        sizes = np.rint(index.sums(best.astype(float)) / np.maximum(np.diff(index.starts), 1)).astype(int)
+    return Fits(of_looks, field, sizes, calibration.probabilities(of_looks, field, index.extents))
+
+
+def ranked(info: LanguageMapFile, index: RegionIndex, probabilities: np.ndarray, most: int = MOST_ANSWERS) -> list[int]:
+    """Return regions, the likeliest first, of which no two are one place."""
+    kept: list[int] = []
+    for region in np.argsort(-probabilities, kind="stable"):
+        if len(kept) == most:
+            break
+        if not _known_place(info, index, int(region), kept):
+            kept.append(int(region))
+    return kept
+
+
+def _known_place(info: LanguageMapFile, index: RegionIndex, region: int, kept: list[int]) -> bool:
+    """Whether a region shares its box or its Gaussians with one of those kept; entities of a map are things of their
+    own."""
+    if not kept or info.regions[region].instance:
+        return False
+    edges = np.minimum(index.highs[region], index.highs[kept]) - np.maximum(index.lows[region], index.lows[kept])
+    shared = np.prod(np.maximum(edges, 0), axis=1)
+    volumes = np.prod(np.maximum(index.highs - index.lows, 1e-3)[[region, *kept]], axis=1)
+    if (shared > SHARED * np.minimum(volumes[0], volumes[1:])).any():
+        return True
+    own = index.members(region)
+    for other in (kept[k] for k in np.flatnonzero((edges > 0).all(axis=1))):
+        theirs = index.members(other)
+        common = len(np.intersect1d(own, theirs, assume_unique=True))
+        if common > SHARED * min(len(own), len(theirs)):
+            return True
+    return False

@@ -1,0 +1,70 @@
+"""Ask a language map: opened once, asked many times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from schemas.contact_graph import ContactGraphFile
+from schemas.language_map import LanguageMap
+from stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
+from stages.kit.open_words.calibration import Calibration, calibration_of
+from stages.kit.open_words.encoder import Encoder
+from stages.kit.open_words.relations import related
+from stages.kit.open_words.relevancy import query_rows
+from stages.kit.open_words.vectors import read_vectors
+
+
+@dataclass(frozen=True)
+class Found:
+    """One place."""
+
+    region: int
+    probability: float
+    relevancy: float
+    field_relevancy: float | None
+    size: float | None
+    other: int = 0
+    """Instance of what it stands on, in or beside."""
+
+
+class Finder:
+    """A language map with its encoder. Raises BadInput for damaged vectors."""
+
+    def __init__(self, language: LanguageMap, encoder: Encoder, calibration: Calibration | None = None) -> None:
+        self.info, self.encoder = language.info, encoder
+        self.vectors = read_vectors(language)
+        self.index = region_index(self.vectors.pieces, self.info)
+        self.calibration = calibration or calibration_of(self.info.source, self.info.encoder)
+
+    def fits(self, text: str) -> Fits:
+        """Return how well a text fits every region."""
+        return fits(self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration)
+
+    def find(self, text: str) -> list[Found]:
+        """Return places, the likeliest first, of which no two are one."""
+        found = self.fits(text)
+        return [self._found(found, region) for region in ranked(self.info, self.index, found.probabilities)]
+
+    def find_related(self, relation: tuple[str, str, str], graph: ContactGraphFile) -> list[Found]:
+        """Return places of the first thing of a relation; the probability of both is the product, and of several others
+        the likeliest counts."""
+        what, word, of_what = relation
+        first, second = self.fits(what), self.fits(of_what)
+        number = {region.instance: k for k, region in enumerate(self.info.regions)}
+        best: dict[int, tuple[float, int]] = {}
+        for a, b in sorted(related(graph, word)):
+            if a in number and b in number:
+                chance = float(first.probabilities[number[a]] * second.probabilities[number[b]])
+                if chance > best.get(number[a], (0.0, 0))[0]:
+                    best[number[a]] = (chance, b)
+        order = sorted(best, key=lambda region: (-best[region][0], region))[:MOST_ANSWERS]
+        return [replace(self._found(first, k), probability=best[k][0], other=best[k][1]) for k in order]
+
+    def _found(self, found: Fits, region: int) -> Found:
+        field, size = None, None
+        if found.field is not None and found.sizes is not None:
+            field = float(np.clip(found.field[region], 0, 1))
+            size = self.info.sizes[int(np.clip(found.sizes[region], 0, len(self.info.sizes) - 1))]
+        return Found(region, float(found.probabilities[region]), float(found.looks[region]), field, size)

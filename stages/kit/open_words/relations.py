@@ -1,0 +1,60 @@
+"""Words that say where a thing is by another one: "the cup on the desk", answered by the contact graph."""
+
+from __future__ import annotations
+
+import re
+
+from schemas.contact_graph import ContactGraphFile
+from schemas.scene_parts import TREE_RELATIONS
+
+RELATIONS = {
+    "on": r"on top of|standing on|lying on|upon|on",
+    "in": r"inside of|inside|within|in",
+    "under": r"underneath|beneath|below|under",
+    "beside": r"next to|near|beside|close to",
+}
+_PATTERN = re.compile(
+    r"^(?P<first>.+?)\s+(?P<word>" + "|".join(RELATIONS.values()) + r")\s+(?P<second>.+)$", re.IGNORECASE
+)
+
+
+def split_relation(text: str) -> tuple[str, str, str] | None:
+    """Return (what, relation, of what) of a text that says one, else None."""
+    found = _PATTERN.match(text)
+    if found is None:
+        return None
+    word = found["word"].lower()
+    relation = next(name for name, words in RELATIONS.items() if re.fullmatch(words, word))
+    return found["first"], relation, found["second"]
+
+
+def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:
+    """Return (instance of the thing, instance of the other) of all pairs that stand in a relation.
+
+    `on` and `in` hold through all that carries: a cup on a tray on a table is on the table. `beside` is any proximal
+    pair and whatever stands on the same thing.
+    """
+    instances = {node.id: node.instance for node in graph.nodes}
+    parents = {link.target: link for link in graph.links if link.relation in TREE_RELATIONS}
+    pairs: set[tuple[int, int]] = set()
+    for node in instances:
+        at, inside = node, False
+        while at in parents and len(pairs) < 10**6:
+            link = parents[at]
+            inside = inside or link.relation == "contains"
+            if (relation == "in" and inside) or relation in ("on", "under"):
+                pairs.add((instances[node], instances[link.source]))
+            at = link.source
+        if relation == "beside" and node in parents:
+            siblings = (link.target for link in parents.values() if link.source == parents[node].source)
+            pairs.update((instances[node], instances[other]) for other in siblings if other != node)
+    if relation == "beside":
+        near = [link for link in graph.links if link.relation == "proximal"]
+        pairs.update(
+            (instances[a], instances[b])
+            for link in near
+            for a, b in ((link.source, link.target), (link.target, link.source))
+        )
+    if relation == "under":
+        pairs = {(b, a) for a, b in pairs}
+    return {(a, b) for a, b in pairs if a and b}

@@ -1,0 +1,77 @@
+"""Goals in open words: `on("red mug", "dining table")` names nodes by what a language map knows of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from schemas.contact_graph import ContactGraphFile
+from schemas.errors import BadInput, UsageError
+from schemas.language_map import LanguageMap
+from stages.kit.open_words.embedded import EmbeddedEncoder
+from stages.kit.open_words.encoder import check_width, checked_text
+from stages.kit.open_words.finding import Finder
+from stages.plan.domain import DOMAIN
+
+LEAST_PROBABILITY = 0.5
+"""A node is not taken for what a goal names when it is less likely."""
+_QUOTED = re.compile(r'"([^"]*)"')
+
+
+def has_words(literals: tuple[str, ...]) -> bool:
+    """Whether a goal names anything in quotes."""
+    return any('"' in literal for literal in literals)
+
+
+def named_goal(
+    literals: tuple[str, ...], objects: Mapping[str, str], graph: ContactGraphFile, language: LanguageMap | None
+) -> tuple[str, ...]:
+    """Return the literals with the likeliest fitting node in place of every quoted text.
+
+    Of the nodes those count that may stand there: only an item can be on something. Raises UsageError without a
+    language map, for a text that is none, and where no node is likely enough; BadInput for a map of other things.
+    """
+    if not has_words(literals):
+        return literals
+    if language is None:
+        raise UsageError(
+            f"goal {next(each for each in literals if chr(34) in each)!r:.120} is in open words",
+            hint="give --language, made by scenewright splat label, or name the nodes",
+        )
+    encoder = EmbeddedEncoder()
+    check_width(encoder, language.info.width, language.info.encoder, str(language.root))
+    finder = Finder(language, encoder)
+    nodes = {node.instance: node.id for node in graph.nodes if node.instance and node.id in objects}
+    if not any(region.instance in nodes for region in language.info.regions):
+        raise BadInput(f"{language.root}: none of its places is in the scene", hint="label the map of this scene")
+    return tuple(_named(literal, objects, nodes, finder) for literal in literals)
+
+
+def _named(literal: str, objects: Mapping[str, str], nodes: Mapping[int, str], finder: Finder) -> str:
+    predicate = literal.split("(")[0].strip()
+    kinds = DOMAIN.predicates.get(predicate, ())
+
+    def node_of(match: re.Match[str]) -> str:
+        place = re.sub(_QUOTED, "", literal[: match.start()]).count(",")
+        kind = kinds[place] if place < len(kinds) else None
+        return _likeliest(checked_text(match[1]), kind, objects, nodes, finder)
+
+    return _QUOTED.sub(node_of, literal)
+
+
+def _likeliest(
+    text: str, kind: str | None, objects: Mapping[str, str], nodes: Mapping[int, str], finder: Finder
+) -> str:
+    fits = finder.fits(text)
+    chances = [
+        (float(fits.probabilities[k]), nodes[region.instance])
+        for k, region in enumerate(finder.info.regions)
+        if region.instance in nodes and (kind is None or DOMAIN.is_a(objects[nodes[region.instance]], kind))
+    ]
+    best = max(chances, default=(0.0, "nothing"))
+    if best[0] < LEAST_PROBABILITY:
+        raise UsageError(
+            f"goal: the scene has no {text!r}: {best[1]} is the likeliest, with probability {best[0]:.2f}",
+            hint="name the node, or say it in other words",
+        )
+    return best[1]

@@ -1,0 +1,77 @@
+"""The step `splat label`: what pictures show of every entity of a panoptic map, so that open words find it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
+from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.kit.formats.entity_meshes import load_entity_mesh
+from stages.kit.formats.frames import FrameReader
+from stages.kit.geometry.boxes import minimum_box
+from stages.kit.geometry.transforms import inverse
+from stages.kit.open_words.opening import open_encoder
+from stages.kit.open_words.vectors import of_regions, write_vectors
+from stages.kit.stage import Context
+from stages.splat.language.looks import Sight, looks
+from stages.splat.parameters import LabelParameters
+from stages.splat.views import evenly, posed_frames
+
+
+def run(
+    panoptic_map: PanopticMap,
+    sequence: Sequence,
+    trajectory: Trajectory | None,
+    weights: Path | None,
+    *,
+    parameters: LabelParameters,
+    context: Context,
+) -> LanguageMap:
+    """Look at every entity where pictures show it best. The outcome is `empty` for a map without entities.
+
+    Raises BadInput for a sequence without colour, depth or poses.
+    """
+    encoder = open_encoder(parameters, weights, context.device)
+    entities = [entity for entity in panoptic_map.info.entities if entity.vertices]
+    meshes = [load_entity_mesh(panoptic_map.path(entity.mesh)).vertices for entity in entities]
+    sights = []
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        if "depth" not in reader.streams:
+            raise BadInput(f"{sequence.root}: its frames have no depth, which says what is hidden", hint="record depth")
+        posed = posed_frames(reader, sequence, trajectory)
+        frames = evenly([frame for frame, _ in posed], parameters.most_views) if entities else []
+        poses = dict(posed)
+        for frame in context.progress.track(frames, total=len(frames), description="pictures"):
+            found = reader.read(frame, ("color", "depth"))
+            if found.color is not None and found.depth is not None:
+                camera = reader.cameras[found.camera_name]
+                sights.append(Sight(found.color, found.depth, camera, inverse(poses[frame])))
+    with context.progress.step("look"):
+        vectors, counts = looks(meshes, sights, encoder)
+    write_vectors(context.output, of_regions(vectors))
+    info = LanguageMapFile(
+        source="panoptic_map",
+        encoder=encoder.label,
+        width=encoder.width,
+        sizes=(),
+        gaussians=0,
+        steps=0,
+        loss=0.0,
+        regions=tuple(
+            LanguageRegion(
+                instance=entity.instance,
+                class_name=entity.class_name,
+                box=minimum_box(np.asarray(points)),
+                looks=int(count),
+            )
+            for entity, points, count in zip(entities, meshes, counts, strict=True)
+        ),
+    )
+    info.write(context.output / "language.json")
+    summary = {"entities": len(entities), "seen": int(np.count_nonzero(counts)), "pictures": len(sights)}
+    return LanguageMap(context.output, outcome="ok" if entities else "empty", summary=summary)

@@ -1,0 +1,90 @@
+"""Pieces of a splat without a word: Gaussians that are neighbours, of like colour and on one surface.
+
+Efficient graph-based segmentation (Felzenszwalb & Huttenlocher 2004) on the graph of nearest Gaussians; an edge weighs
+how far colours and normals are apart. Coarser pieces are made of finer ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.spatial import cKDTree
+
+from stages.kit.rendering.splatting.gaussians import Gaussians
+
+SEEN = 0.15
+"""Opacity from which on a Gaussian belongs to a surface."""
+NEIGHBOURS = 10
+SMOOTH = 16
+"""Neighbours whose plane is a Gaussian's normal."""
+REACH = 3.0
+"""Neighbours farther apart than this many usual distances are none."""
+GRANULARITIES = (0.15, 0.6, 2.0)
+"""How readily pieces join: the constant k of the method."""
+SMALLEST = 6
+COLOR, BEND = 1.0, 0.7
+"""Weights of a difference of colour (sRGB, length) and of 1 - |cosine| of normals."""
+FIRST_HARMONIC = 0.28209479177387814
+
+
+def pieces(gaussians: Gaussians) -> np.ndarray:
+    """Return (granularities, N) int32: number of the piece of every Gaussian, from 0; -1: it is hardly there."""
+    result = np.full((len(GRANULARITIES), len(gaussians)), -1, np.int32)
+    opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
+    solid = np.flatnonzero(opacities > SEEN)
+    if len(solid) < 2:
+        result[:, solid] = 0
+        return result
+    means = gaussians.means[solid].astype(float)
+    colors = np.clip(gaussians.harmonics[solid, 0] * FIRST_HARMONIC + 0.5, 0, 1)
+    tree = cKDTree(means)
+    count = min(SMOOTH, len(solid) - 1)
+    distances, near = tree.query(means, count + 1)
+    around = means[near] - means[near].mean(axis=1, keepdims=True)
+    normals = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))[1][:, :, 0]
+    colors = np.median(colors[near[:, :6]], axis=1)
+    few = min(NEIGHBOURS, count)
+    first = np.repeat(np.arange(len(solid)), few)
+    second, apart = near[:, 1 : few + 1].reshape(-1), distances[:, 1 : few + 1].reshape(-1)
+    usual = np.maximum(np.median(distances[:, 1 : few + 1], axis=1), 1e-4)
+    kept = apart < REACH * np.minimum(usual[first], usual[second])
+    first, second = first[kept], second[kept]
+    bend = 1.0 - np.abs(np.einsum("ni,ni->n", normals[first], normals[second]))
+    weights = COLOR * np.linalg.norm(colors[first] - colors[second], axis=1) + BEND * bend
+    order = np.argsort(weights, kind="stable")
+    first, second, weights = first[order], second[order], weights[order]
+    for row, granularity in enumerate(GRANULARITIES):
+        roots = _joined(first, second, weights, len(solid), granularity, SMALLEST)
+        result[row, solid] = np.unique(roots, return_inverse=True)[1]
+    return result
+
+
+@njit(cache=True)
+def _root(parents: np.ndarray, k: int) -> int:
+    while parents[k] != k:
+        parents[k] = parents[parents[k]]
+        k = parents[k]
+    return k
+
+
+@njit(cache=True)
+def _joined(
+    first: np.ndarray, second: np.ndarray, weights: np.ndarray, count: int, granularity: float, smallest: int
+) -> np.ndarray:
+    """Return the root of every one of `count` nodes; edges ascend in weight."""
+    parents, sizes, inner = np.arange(count), np.ones(count, np.int64), np.zeros(count)
+    for e in range(len(first)):
+        a, b = _root(parents, first[e]), _root(parents, second[e])
+        if a != b and weights[e] <= min(inner[a] + granularity / sizes[a], inner[b] + granularity / sizes[b]):
+            parents[b] = a
+            sizes[a] += sizes[b]
+            inner[a] = weights[e]
+    for e in range(len(first)):
+        a, b = _root(parents, first[e]), _root(parents, second[e])
+        if a != b and (sizes[a] < smallest or sizes[b] < smallest):
+            parents[b] = a
+            sizes[a] += sizes[b]
+    roots = np.empty(count, np.int64)
+    for k in range(count):
+        roots[k] = _root(parents, k)
+    return roots

@@ -1,0 +1,130 @@
+"""The step `splat language`: what pictures say, kept in a splat."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from schemas.errors import BadInput
+from schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
+from schemas.sequence import Sequence
+from schemas.splat import Splat
+from stages.kit.formats.frames import FrameReader
+from stages.kit.geometry.boxes import minimum_box
+from stages.kit.geometry.transforms import inverse
+from stages.kit.open_words.answering import members_of
+from stages.kit.open_words.opening import open_encoder
+from stages.kit.open_words.vectors import Vectors, write_vectors
+from stages.kit.rendering.splatting.rasterizer import View
+from stages.kit.stage import Context
+from stages.splat.build_stage import rasterizer_of
+from stages.splat.language.field import LanguageField
+from stages.splat.language.learning import learn, lesson_of
+from stages.splat.language.looks import Sight, looks
+from stages.splat.language.pieces import pieces
+from stages.splat.language.pyramid import pyramid
+from stages.splat.parameters import LanguageParameters
+from stages.splat.ply import read_gaussians
+from stages.splat.views import evenly, posed_frames
+
+SIZES = tuple(round(float(size), 4) for size in np.geomspace(0.08, 1.5, 8))
+"""At which every Gaussian is asked for, up to the thesis's largest [m]."""
+LAST = 50
+MIDDLE = (2.0, 98.0)
+"""A region's box holds its Gaussians between these percentiles: splats have strays ..."""
+FEW = 50
+"""... but of so few Gaussians all count."""
+COVERED = 0.5
+
+
+def run(
+    splat: Splat, sequence: Sequence, weights: Path | None, *, parameters: LanguageParameters, context: Context
+) -> LanguageMap:
+    """Learn a language field over a splat, and keep what pictures show of each of its pieces.
+
+    The outcome is `empty` for a splat without Gaussians. Raises BadInput for another sequence.
+    """
+    encoder = open_encoder(parameters, weights, context.device)
+    gaussians, rasterizer = read_gaussians(splat.path("splat.ply")), rasterizer_of(context.device)
+    frames = [view.frame for view in splat.built.views if view.use == "learned"]
+    lessons, sights = [], []
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        poses = dict(posed_frames(reader, sequence, splat))
+        chosen = evenly(frames, parameters.most_views) if len(gaussians) else []
+        for frame in context.progress.track(chosen, total=len(chosen), description="pictures"):
+            if frame not in poses:
+                raise BadInput(
+                    f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence"
+                )
+            found = reader.read(frame, ("color", "depth"))
+            if found.color is None:
+                continue
+            camera, pose = reader.cameras[found.camera_name], inverse(poses[frame])
+            lessons.append(lesson_of(pyramid(found.color, encoder), gaussians, rasterizer, camera, pose))
+            depth = found.depth
+            if depth is None:
+                shown = rasterizer.draw(gaussians, View(camera, pose)).picture
+                depth = np.where(shown.alpha > COVERED, shown.depth / np.maximum(shown.alpha, 1e-6), 0).astype(
+                    np.float32
+                )
+            sights.append(Sight(found.color, depth, camera, pose))
+    field, losses = _field(gaussians.means, encoder.width, context.seed), deque[float](maxlen=LAST)
+    if any(len(lesson.places) for lesson in lessons):
+        taught = learn(field, lessons, parameters.steps, context.random(1))
+        losses.extend(context.progress.track(taught, total=parameters.steps, description="steps"))
+    with context.progress.step("pieces"):
+        numbered = _numbered(pieces(gaussians))
+        order, starts = members_of(numbered, int(numbered.max(initial=-1)) + 1)
+        members = [gaussians.means[part].astype(float) for part in np.split(order, starts[1:-1])] if len(order) else []
+        vectors, counts = looks(members, sights, encoder)
+    at_sizes = [field.vectors(gaussians.means, size) for size in SIZES]
+    opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
+    every = np.stack(at_sizes, axis=1) if len(gaussians) else np.zeros((0, len(SIZES), encoder.width), np.float32)
+    write_vectors(context.output, Vectors(vectors, gaussians.means, opacities, numbered, every))
+    info = LanguageMapFile(
+        source="splat",
+        encoder=encoder.label,
+        width=encoder.width,
+        sizes=SIZES,
+        gaussians=len(gaussians),
+        steps=parameters.steps if losses else 0,
+        loss=float(np.mean(losses)) if losses else 0.0,
+        regions=tuple(
+            LanguageRegion(box=minimum_box(_middle(points)), looks=int(count))
+            for points, count in zip(members, counts, strict=True)
+        ),
+    )
+    info.write(context.output / "language.json")
+    summary = {
+        "gaussians": len(gaussians),
+        "regions": len(members),
+        "pictures": len(lessons),
+        "loss": round(info.loss, 4),
+    }
+    return LanguageMap(context.output, outcome="ok" if members else "empty", summary=summary)
+
+
+def _field(means: np.ndarray, width: int, seed: int) -> LanguageField:
+    torch.manual_seed(seed)
+    return LanguageField(means if len(means) else np.zeros((1, 3)), width)
+
+
+def _numbered(found: np.ndarray) -> np.ndarray:
+    """Return pieces (granularities, N) with numbers of their own in every row."""
+    result, first = found.copy(), 0
+    for row in result:
+        row[row >= 0] += first
+        first = max(first, int(row.max(initial=-1)) + 1)
+    return result
+
+
+def _middle(points: np.ndarray) -> np.ndarray:
+    """Return the points without those outside the percentiles MIDDLE of any axis; all of a few."""
+    if len(points) <= FEW:
+        return points
+    low, high = np.percentile(points, MIDDLE[0], axis=0), np.percentile(points, MIDDLE[1], axis=0)
+    kept = ((points >= low) & (points <= high)).all(axis=1)
+    return points[kept] if kept.any() else points

@@ -1,0 +1,95 @@
+"""The step `splat query`: where in a room a text fits, or that it has none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from schemas.contact_graph import ContactGraph, ContactGraphFile
+from schemas.errors import BadInput
+from schemas.language_map import Answer, Answers, AnswersFile, LanguageMap
+from stages.kit.formats.map_files import write_arrays
+from stages.kit.open_words.encoder import check_width, checked_text
+from stages.kit.open_words.finding import Finder, Found
+from stages.kit.open_words.opening import open_encoder
+from stages.kit.open_words.relations import split_relation
+from stages.kit.stage import Context
+from stages.splat.parameters import QueryParameters
+
+
+def run(
+    language: LanguageMap,
+    contact_graph: ContactGraph | None,
+    weights: Path | None,
+    *,
+    parameters: QueryParameters,
+    context: Context,
+) -> Answers:
+    """Rank the places that fit a text. The outcome is `absent` where none is likely enough.
+
+    Raises BadInput for an encoder other than that of the map, or for a contact graph of another map.
+    """
+    text, info = checked_text(parameters.text), language.info
+    encoder = open_encoder(parameters, weights, context.device)
+    check_width(encoder, info.width, info.encoder, str(language.root))
+    finder = Finder(language, encoder)
+    graph = contact_graph.info if contact_graph is not None else None
+    relation = split_relation(text) if graph is not None else None
+    if graph is not None and relation is not None:
+        _check_same_map(language, graph)
+        ranking = finder.find_related(relation, graph)
+    else:
+        ranking = finder.find(text)
+    nodes = {node.instance: node.id for node in graph.nodes if node.instance} if graph is not None else {}
+    least = parameters.least_probability
+    kept = [found for found in ranking if found.probability >= least][: parameters.most]
+    below = next((found for found in ranking if found.probability < least), None)
+    masks = [finder.index.members(found.region) for found in kept]
+    unread = encoder.unread(text)
+    AnswersFile(
+        text=text,
+        encoder=encoder.label,
+        calibrated=finder.calibration.fitted,
+        least_probability=least,
+        unread=unread,
+        relation=" ".join(relation) if relation is not None else "",
+        answers=tuple(_answer(finder, found, nodes) for found in kept),
+        next_best=None if below is None else _answer(finder, below, nodes),
+    ).write(context.output / "answers.json")
+    starts = np.concatenate([[0], np.cumsum([len(mask) for mask in masks])]).astype(np.int64)
+    gaussians = np.concatenate([*masks, np.zeros(0, int)]).astype(np.int32)
+    write_arrays(context.output / "masks.npz", {"gaussians": gaussians, "starts": starts})
+    summary: dict[str, object] = {"answers": len(kept)}
+    if kept:
+        summary["best"] = round(kept[0].probability, 3)
+        summary["center"] = [round(v, 3) for v in info.regions[kept[0].region].box.center]
+    if unread:
+        summary["unread"] = " ".join(unread)
+    return Answers(context.output, outcome="ok" if kept else "absent", summary=summary)
+
+
+def _check_same_map(language: LanguageMap, graph: ContactGraphFile) -> None:
+    known = {node.instance for node in graph.nodes}
+    there = {region.instance for region in language.info.regions}
+    if language.info.source != "panoptic_map" or not known & there - {0}:
+        raise BadInput(
+            f"{language.root}: its places are no nodes of the contact graph",
+            hint="label the map that the graph was made of: scenewright splat label",
+        )
+
+
+def _answer(finder: Finder, found: Found, nodes: dict[int, str]) -> Answer:
+    region = finder.info.regions[found.region]
+    return Answer(
+        region=found.region,
+        probability=round(found.probability, 6),
+        relevancy=round(found.relevancy, 6),
+        field_relevancy=None if found.field_relevancy is None else round(found.field_relevancy, 6),
+        size=found.size,
+        instance=region.instance,
+        node=nodes.get(region.instance, ""),
+        other=nodes.get(found.other, ""),
+        box=region.box,
+        gaussians=len(finder.index.members(found.region)),
+    )
