@@ -92,7 +92,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
 
 def asked(room: AskedRoom, arm: str) -> Asked:
     """Return what an arm makes of a room's queries."""
-    encoder = open_encoder(EncoderParameters(), None)
+    encoder = open_encoder(EncoderParameters.model_validate({}), None)
     finder = Finder(room.entities if arm == "entities" else room.language, encoder)
     thesis = ThesisWay(room, finder) if arm == "thesis" else None
     present, absent = room.queries

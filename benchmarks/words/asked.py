@@ -73,8 +73,8 @@ class AskedRoom:
     def language(self) -> LanguageMap:
         """Language in the splat."""
         given = ("--splat", self.splat.root, "--sequence", self.room.sequence, "--steps", self.steps)
-        given = (*given, "--most-views", VIEWS)
-        return opened(LanguageMap, made("splat language", self.room.folder / "language", *given))
+        few = ("--most-views", VIEWS)
+        return opened(LanguageMap, made("splat language", self.room.folder / "language", *given, *few))
 
     @cached_property
     def entities(self) -> LanguageMap:

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 from benchmarks.options import Recipe, asked
 from benchmarks.words.asked import AskedRoom
-from stages.kit.open_words.calibration import BUNDLED, SHORTEST, Calibration, log_odds
+from stages.kit.open_words.calibration import BUNDLED, SHORTEST, Calibration, fitted, log_odds
 from stages.kit.open_words.embedded import EmbeddedEncoder
 from stages.kit.open_words.finding import Finder
 
@@ -62,7 +62,7 @@ def fit(rooms: list[AskedRoom], source: str) -> Calibration:
     ranking = logistic(np.concatenate(inputs), np.concatenate(right))
     scores, truths = [], []
     for room, finder in zip(rooms, finders, strict=True):
-        finder.calibration = Calibration(*(float(w) for w in ranking))
+        finder.calibration = fitted([float(w) for w in ranking])
         for query in (*room.queries[0], *room.queries[1]):
             rows, _ = inputs_of(finder, query.text)
             for found in finder.find(query.text)[:FIRST]:
@@ -71,7 +71,7 @@ def fit(rooms: list[AskedRoom], source: str) -> Calibration:
     shift, slope = logistic(np.stack([np.ones(len(scores)), scores], axis=1), np.array(truths, float))
     weights = slope * ranking
     weights[0] += shift
-    return Calibration(*(round(float(w), 4) for w in weights))
+    return fitted([round(float(w), 4) for w in weights])
 
 
 class Options(Recipe):

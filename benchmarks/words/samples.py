@@ -105,9 +105,9 @@ class RoomCrops:
                 labels = table[frame.labels]
                 counts = np.bincount(labels.reshape(-1), minlength=len(self.things))
                 for which in np.flatnonzero(counts >= LEAST_PIXELS):
-                    thing = self.things[which]
-                    if thing is not None and (keep_held_out or not self.held[which]):
-                        self.places.setdefault(thing.class_name, []).append((len(self.frames), int(which)))
+                    seen = self.things[which]
+                    if seen is not None and (keep_held_out or not self.held[which]):
+                        self.places.setdefault(seen.class_name, []).append((len(self.frames), int(which)))
                 self.frames.append(Seen(frame.color, labels))
 
     def sample(self, random: np.random.Generator) -> Crop:

@@ -5,6 +5,7 @@ data/words/calibration.toml holds one for each source and encoder; benchmarks/ex
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,13 +54,19 @@ def log_odds(shares: np.ndarray) -> np.ndarray:
     return np.log(kept / (1 - kept))
 
 
+def fitted(weights: Sequence[float]) -> Calibration:
+    """Return the calibration with weights in the order of WEIGHTS. Raises ValueError for another number of them."""
+    bias, looks, field, extent, extent_squared = weights
+    return Calibration(bias, looks, field, extent, extent_squared)
+
+
 def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibration:
     """Return what was fitted for a source (`splat`, `panoptic_map`) and the label of an encoder; UNFITTED where nothing
     was. Raises BadInput for a damaged file."""
     for entry in file_toml(path).get("fit", ()):
         try:
             if (entry["source"], entry["encoder"]) == (source, encoder):
-                return Calibration(**{name: float(entry[name]) for name in WEIGHTS})
+                return fitted([float(entry[name]) for name in WEIGHTS])
         except (KeyError, TypeError, ValueError):
             raise BadInput(f"{path}: an entry lacks source, encoder or {', '.join(WEIGHTS)}") from None
     return UNFITTED

@@ -40,7 +40,7 @@ def of_regions(regions: np.ndarray) -> Vectors:
 
 def write_vectors(folder: Path, vectors: Vectors) -> None:
     """Write `vectors.npz` into a folder."""
-    arrays = {
+    arrays: dict[str, np.ndarray] = {
         "means": vectors.means.astype(np.float32),
         "opacities": vectors.opacities.astype(np.float32),
         "pieces": vectors.pieces.astype(np.int32),

@@ -26,6 +26,9 @@ CHUNK = 32768
 class HashGrid(nn.Module):
     """Places (N, 3) in 0..1 -> (N, 2 x 12 x 4)."""
 
+    resolutions: torch.Tensor
+    corners: torch.Tensor
+
     def __init__(self, entries: int) -> None:
         super().__init__()
         self.entries = entries
@@ -63,6 +66,7 @@ class LanguageField(nn.Module):
         layers: list[nn.Module] = []
         for before, after in zip(inputs[:-1], inputs[1:], strict=True):
             layers += [nn.Linear(before, after), nn.ReLU()]
+        self.width = width
         self.network = nn.Sequential(*layers, nn.Linear(HIDDEN, width))
 
     def forward(self, places: torch.Tensor, sizes: torch.Tensor) -> torch.Tensor:
@@ -83,4 +87,4 @@ class LanguageField(nn.Module):
             for start in range(0, len(places), CHUNK):
                 part = torch.from_numpy(np.ascontiguousarray(places[start : start + CHUNK], np.float32))
                 found.append(self(part, torch.full((len(part),), float(size))).numpy())
-        return np.concatenate(found) if found else np.zeros((0, self.network[-1].out_features), np.float32)
+        return np.concatenate(found) if found else np.zeros((0, self.width), np.float32)
