@@ -1,7 +1,7 @@
 """Tables in the fast simulator, planned with wrong times and chances: what our plans are worth when the fit is off.
 
 The world is `fast` of `tidy_fast`: times fitted to the thesis, pulls that miss, second piles that slip. What ours
-believes of it is off by 30 %: `trips_dear` takes a trip for 1.3 times as long and pulls and stackings for 0.7 times,
+believes of it is off by three tenths: `trips_dear` takes a trip for 1.3 times as long and pulls and stackings for 0.7 times,
 `trips_cheap` the other way round; `slips_more` and `slips_fewer` take second piles to slip 1.3 and 0.7 times as often.
 Pull and Stack plan by neither.
 """
@@ -111,7 +111,7 @@ EXPERIMENT = Experiment(
     title="Clearing tables with wrong times and chances",
     simulated="Times and slips of actions, fitted to the thesis; no sight, no physics.",
     knows="The whole table; times or chances that are off by 30 %, but for `ours`, which knows those it is judged by.",
-    does_not_show="What an arm does; errors of more than 30 %, or of what a plan does not reckon with at all.",
+    does_not_show="What an arm does; errors of more than that, or of what a plan does not reckon with at all.",
     arms={arm: arm for arm in (*BELIEFS, "pull", "stack")},
     cases=tuple(f"{tier}/delay{delay}" for tier in ("tier1", "tier2") for delay in DELAYS),
     tuning=tuple(map(str, TUNING)),

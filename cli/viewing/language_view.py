@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cli.viewing.canvas import Canvas
 from schemas.language_map import Answer, Answers, LanguageMap
 from stages.kit.drawing.palette import instance_color
 from stages.kit.open_words.vectors import read_vectors
+from stages.kit.viewing.canvas import Canvas
 
 FEWEST_LOOKS = 1
 MOST_BOXES = 300

@@ -81,8 +81,7 @@ def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
     """Return the files of `data/` that describe the robot, its URDF too where it lies there, and what words need."""
     names: tuple[str, ...] = (f"robots/{parameters.robot}.toml", f"robots/{parameters.robot}.urdf")
     names = names if (DATA / names[1]).is_file() else names[:1]
-    in_words = any('"' in literal for literal in parameters.goal)
-    return (*names, "words/two_towers.safetensors", "words/calibration.toml") if in_words else names
+    return (*names, "words/two_towers.safetensors", "words/calibration.toml")
 
 
 STAGE = Stage(

@@ -79,8 +79,8 @@ def check_query(parameters: QueryParameters, inputs: Mapping[str, Any]) -> None:
     checked_text(parameters.text)
 
 
-def query_files(parameters: QueryParameters) -> tuple[str, ...]:
-    """Return the files of data/ that a query reads."""
+def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
+    """Return the files of data/ that pictures and words are held against each other with."""
     return (*encoder_files(parameters), "words/calibration.toml")
 
 
@@ -116,7 +116,7 @@ LANGUAGE = Stage(
     libraries=(*LIBRARIES, "torch"),
     module="language_stage",
     extras=EXTRAS,
-    data_files=encoder_files,
+    data_files=word_files,
     example="scenewright splat language --splat outputs/demo/splat --sequence outputs/demo/sequence "
     "--out outputs/words",
 )
@@ -130,7 +130,7 @@ LABEL = Stage(
     libraries=("numpy", "opencv-python-headless", "trimesh", "torch"),
     module="label_stage",
     extras=EXTRAS,
-    data_files=encoder_files,
+    data_files=word_files,
     example="scenewright splat label --panoptic-map outputs/demo/panoptic_map --sequence outputs/demo/sequence "
     "--out outputs/labels",
 )
@@ -144,7 +144,7 @@ QUERY = Stage(
     libraries=("numpy", "torch"),
     module="query_stage",
     extras=EXTRAS,
-    data_files=query_files,
+    data_files=word_files,
     check=check_query,
     example='scenewright splat query --language outputs/words --text "red mug" --out outputs/answer',
 )

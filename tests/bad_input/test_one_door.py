@@ -62,6 +62,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "schemas/base.py": {"model_validate_json": PARSED},
     "schemas/vocabulary.py": {"open": OURS, "tomllib.load": OURS},
     "stages/cutting/recording/server.py": {"model_validate_json": PARSED, "read_bytes": OURS},
+    "stages/predicates/teacher/terminal.py": {"model_validate_json": PARSED},
     "stages/edit/edits_file.py": {"os.open": WRITES, "tomllib.loads": PARSED},
     "stages/engine/batch/folder_lock.py": {"os.open": WRITES},
     "stages/engine/batch/processes.py": {"open": KERNEL},

@@ -241,7 +241,7 @@ checker = SimpleNamespace(allow=lambda touch: None, put_down=lambda: None)
 model = SimpleNamespace(snapshot=lambda: None, restore=lambda before: None, checker=checker, room=None)
 state, random = RobotState(np.zeros(3), np.zeros(7)), np.random.default_rng(0)
 world, match = SimpleNamespace(bodies={"desk": SimpleNamespace(joints=())}), BodyMatch(body="table", matched="desk")
-print(check_goal(world, ("wiped(table)",), {"table": match}, {}, None)[0].detail)
+print(check_goal(world, ("wiped(table)",), {"table": match}, {}, None, lambda literal: None)[0].detail)
 for step in refinement.refine_plan(model, state, actions, Budgets(1, 1, 1, 1), random):
     print(step.text, step.segments[0].label)
     try:

@@ -29,7 +29,7 @@ class RoomTask(Task):
 
     room: RoomState = RoomState({})
 
-    def open(self) -> RoomWorld:
+    def begun(self) -> RoomWorld:
         """Return the room as it begins."""
         return RoomWorld(self.room, self.seed)
 
@@ -54,7 +54,7 @@ def read_rooms(path: Path) -> list[RoomState]:
 def open_room(task: Task) -> RoomWorld:
     """Return the room of a task."""
     assert isinstance(task, RoomTask)
-    return task.open()
+    return task.begun()
 
 
 def _kinds(state: RoomState) -> tuple[list[str], list[str], list[str]]:

@@ -158,11 +158,13 @@ def test_a_splat_answers(room: tuple[Sequence, Splat], language: LanguageMap, co
     assert language.outcome == "ok" and info.gaussians == room[1].built.gaussians == len(vectors.means)
     assert info.steps == 5 and info.source == "splat" and len(info.regions) == len(vectors.regions) > 3
     answers = ask(language, "red", tmp_path / "answers", least_probability=0.0)
-    found, starts = answers.info, np.load(answers.path("masks.npz"))["starts"]
+    found, starts = answers.info, np.load(answers.path("masks.npz"), allow_pickle=False)["starts"]
     chances = [answer.probability for answer in found.answers]
     assert chances == sorted(chances, reverse=True) and not found.calibrated and len(starts) == len(chances) + 1
     inside = points_in_box(
-        found.answers[0].box, vectors.means[np.load(answers.path("masks.npz"))["gaussians"][: starts[1]]], 1e-3
+        found.answers[0].box,
+        vectors.means[np.load(answers.path("masks.npz"), allow_pickle=False)["gaussians"][: starts[1]]],
+        1e-3,
     )
     assert inside.mean() > 0.85
     none = ask(language, "red", tmp_path / "none", least_probability=1.0)

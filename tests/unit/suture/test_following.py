@@ -54,7 +54,7 @@ def test_a_needle_of_half_the_radius_is_half_as_far_between_eyes_half_as_far_apa
     assert usual.pose is not None and small.pose is not None and not small.abstained
     assert small.pose.centre == pytest.approx(usual.pose.centre / 2, abs=1e-6)
     lengths = np.array([0.25] * 3 + [1.0] * 3)
-    assert np.diag(small.covariance) == pytest.approx(np.diag(usual.covariance) * lengths, rel=0.03)
+    assert np.diag(small.covariance) == pytest.approx(np.diag(usual.covariance) * lengths, rel=0.1)
     assert as_if_usual(near, NEEDLE_RADIUS) is near and in_metres(usual, NEEDLE_RADIUS) is usual
 
 
