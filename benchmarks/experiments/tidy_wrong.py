@@ -1,9 +1,9 @@
 """Tables in the fast simulator, planned with wrong times and chances: what our plans are worth when the fit is off.
 
 The world is `fast` of `tidy_fast`: times fitted to the thesis, pulls that miss, second piles that slip. What ours
-believes of it is off by three tenths: `trips_dear` takes a trip for 1.3 times as long and pulls and stackings for 0.7 times,
-`trips_cheap` the other way round; `slips_more` and `slips_fewer` take second piles to slip 1.3 and 0.7 times as often.
-Pull and Stack plan by neither.
+believes of it is off by three tenths: `trips_dear` takes a trip for 1.3 times as long and pulls and stackings for 0.7
+times, `trips_cheap` the other way round; `slips_more` and `slips_fewer` take second piles to slip 1.3 and 0.7 times as
+often. Pull and Stack plan by neither.
 """
 
 from __future__ import annotations
