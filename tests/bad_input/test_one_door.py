@@ -111,7 +111,6 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/report/graph_drawing.py": {"csv.DictReader": PARSED},
     "stages/report/images.py": {"Image.open": PICTURE},
     "stages/report/page.py": {"read_text": OURS},
-    "stages/report/sections/tableware/view.py": {"Image.open": PICTURE},
     "stages/segment/backends/masks/backend.py": {"open": WORLD},
     "stages/segment/backends/masks/formats/npz_stacks.py": {"zipfile.ZipFile": BOUNDED},
     "stages/segment/backends/masks/listing.py": {"json.loads": PARSED},

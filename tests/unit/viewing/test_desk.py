@@ -367,6 +367,7 @@ def look_at(window: Browser, point: tuple[float, float, float], far: float = 1.0
 THINGS = "return [...document.querySelectorAll('#desk li')].map((row) => row.querySelector('span').textContent)"
 
 
+@pytest.mark.slow  # Most of a minute where nothing draws for the processor; more than its deadline on a busy machine.
 @needs_browser
 def test_clicks_become_lines_and_the_map_as_it_is_then(tmp_path: Path) -> None:
     seen, file = room_map(tmp_path / "map"), tmp_path / "edits.toml"
