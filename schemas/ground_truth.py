@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from pydantic import Field
+
 from schemas.artifact import Artifact, Document
 from schemas.base import Count, Model, Name, Seed, Transform, Vector3
 from schemas.contact_graph import ContactGraphFile
@@ -23,7 +25,9 @@ class TrueObject(Model):
     scale: float = 1.0
     world_from_model: Transform
     joints: dict[str, float] = {}
-    """Joint name -> value while the room was scanned."""
+    """Joint name -> value while the room was scanned, at the end of the log where somebody moved it."""
+    joints_before: dict[str, float] | None = Field(default=None, exclude_if=lambda joints: joints is None)
+    """The values at the beginning of the log, for a thing that somebody opened or shut; else absent."""
     box: Box
     """Gravity-aligned box of the whole object as it stands (open doors included): along its model's own axes; in a
     scan, and where a model lies across its axes, the one of least footprint."""

@@ -13,7 +13,7 @@ from schemas.trajectory import Trajectory
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.fuse.closing import MaskSource, close_map, is_strange
 from stages.fuse.from_mesh import run_from_mesh
-from stages.fuse.inputs import check_origin, check_segments, poses_at
+from stages.fuse.inputs import check_origin, check_segments
 from stages.fuse.listings import Listings
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.merging import Merging
@@ -24,7 +24,7 @@ from stages.fuse.separate import Separate
 from stages.fuse.thesis import Thesis
 from stages.kit.formats.frames import FrameReader, require_depth
 from stages.kit.formats.masks import PanopticReader
-from stages.kit.formats.trajectories import read_tum
+from stages.kit.formats.trajectories import poses_at, read_tum
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 

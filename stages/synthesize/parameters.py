@@ -30,6 +30,12 @@ class SynthesizeParameters(Parameters):
         0.0, ge=0, le=0.5, description="Record a right eye at this distance along the camera's x too [m]; 0: none"
     )
     depth: bool = Field(True, description="The log holds depth; off: a stereo camera's log, for the step disparity")
+    opened: int = Field(
+        0,
+        ge=0,
+        le=50,
+        description="So many doors and drawers, one a thing, are opened or shut half-way: the walk is gone there and back",
+    )
     picture_noise: float = Field(
         0.0, ge=0, le=30, description="Standard deviation of the noise of every pixel of the pictures [of 255]"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ from stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layou
 from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
 from stages.synthesize.free_space import find_free_space
 from stages.synthesize.furniture import Catalogue
+from stages.synthesize.opening import TwoStates, open_some
 from stages.synthesize.parameters import SynthesizeParameters
 from stages.synthesize.recipes import Recipe, load_recipe
 from stages.synthesize.seen_surface import SeenSurface
@@ -29,7 +31,7 @@ from stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true
 from stages.synthesize.viewpoints import blocked_floor, choose_views
 from stages.synthesize.walk import Walk, frame_times, plan_walk
 
-VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM, PICTURE_STREAM = 1, 2, 3, 4
+VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM, PICTURE_STREAM, OPENED_STREAM = 1, 2, 3, 4, 5
 
 
 @dataclass(frozen=True)
@@ -50,25 +52,33 @@ def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Conte
     recipe = load_recipe(parameters.recipe)
     camera = make_camera(parameters)
     with context.progress.step("furnish"):
-        arrangement = arrange(recipe, Catalogue(library), parameters.clutter, context.seed, blocked_floor)
+        catalogue = Catalogue(library)
+        arranged = arrange(recipe, catalogue, parameters.clutter, context.seed, blocked_floor)
+        states = TwoStates(arranged, arranged, arranged)
+        if parameters.opened:
+            states = open_some(arranged, catalogue, parameters.opened, context.random(OPENED_STREAM))
+        arrangement = states.after
     with context.progress.step("light"):
-        renderer = make_renderer(arrangement, recipe, texel=float(np.clip(32.0 / parameters.width, 0.05, 0.2)))
+        texel = float(np.clip(32.0 / parameters.width, 0.05, 0.2))
+        halves = (states.before, states.after) if parameters.opened else (arrangement,)
+        renderers = [make_renderer(half, recipe, texel=texel) for half in halves]
+        renderer = SceneRenderer(world_meshes(states.opened)) if parameters.opened else renderers[0]
     with context.progress.step("walk"):
         space = find_free_space(renderer, arrangement.room.size)
-        views = choose_views(renderer, arrangement, space, camera, context.random(VIEW_STREAM))
+        views = choose_views(renderer, states.opened, space, camera, context.random(VIEW_STREAM))
         walk = plan_walk(views, space, renderer, parameters.walking_speed, context.random(TREMOR_STREAM))
     seen = SeenSurface(DepthCamera().minimum_range, DepthCamera().maximum_range)
     with context.progress.step("render"):
-        recording = _record(arrangement, renderer, walk, camera, seen, parameters, context)
+        recording = _record(arrangement, renderers, walk, camera, seen, parameters, context)
     with context.progress.step("write truth"):
-        _write_truth(arrangement, recording, camera, seen, parameters, context)
+        _write_truth(states, recording, camera, seen, parameters, context)
     return GroundTruth(
         context.output,
         summary={
             "recipe": parameters.recipe,
             "objects": len(arrangement.objects),
             "frames": parameters.frames,
-            "seconds_walked": round(walk.duration, 1),
+            "seconds_walked": round(len(renderers) * walk.duration, 1),
             "depth_share": round(recording.depth_share, 3),
             "seen_points": seen.count,
         },
@@ -103,16 +113,18 @@ def make_renderer(arrangement: Arrangement, recipe: Recipe, texel: float = 0.05)
 
 def _record(
     arrangement: Arrangement,
-    renderer: SceneRenderer,
+    renderers: Sequence[SceneRenderer],
     walk: Walk,
     camera: Camera,
     seen: SeenSurface,
     parameters: SynthesizeParameters,
     context: Context,
 ) -> Recording:
-    """Render and write all frames; collects what was seen."""
-    times = frame_times(walk.duration, parameters.frames, parameters.rate)
-    pace = walk.duration / times[-1]
+    """Render and write all frames; collects what was seen. With two states of the room (`renderers`) the walk goes
+    there and back, and what was seen is that of the second."""
+    duration = len(renderers) * walk.duration
+    times = frame_times(duration, parameters.frames, parameters.rate)
+    pace = duration / times[-1]
     gloss = gloss_table(arrangement)
     noise, pictures = context.random(NOISE_STREAM), context.random(PICTURE_STREAM)
     baseline = parameters.stereo_baseline
@@ -129,13 +141,15 @@ def _record(
         baselines={CAMERA_FRAME: baseline} if baseline > 0 else None,
     ) as writer:
         for time in context.progress.track(times, total=len(times), description="rendering"):
-            pose = walk.pose(time * pace)
-            view = renderer.render(camera, pose)
+            again = len(renderers) > 1 and time * pace > walk.duration
+            pose = walk.pose(2 * walk.duration - time * pace if again else time * pace)
+            view = renderers[-1 if again else 0].render(camera, pose)
             depth = view.depth
             if parameters.depth_noise:
                 reflectance = view.albedo.mean(axis=2)
                 depth = disturb_depth(depth, view.incidence, reflectance, gloss[view.instance], camera, noise)
-            seen.add(view.depth, view.instance, pose, camera)
+            if again or len(renderers) == 1:
+                seen.add(view.depth, view.instance, pose, camera)
             visible += np.bincount(view.instance.reshape(-1), minlength=len(visible))
             valid += int(np.count_nonzero(depth))
             color, right = disturbed_picture(view.color, parameters.picture_noise, pictures), None
@@ -156,7 +170,7 @@ def disturbed_picture(color: np.ndarray, deviation: float, random: np.random.Gen
 
 
 def _write_truth(
-    arrangement: Arrangement,
+    states: TwoStates,
     recording: Recording,
     camera: Camera,
     seen: SeenSurface,
@@ -164,7 +178,7 @@ def _write_truth(
     context: Context,
 ) -> None:
     """Write everything of kind ground_truth beside the log."""
-    out = context.output
+    out, arrangement = context.output, states.after
     write_tum(out / "trajectory.tum", recording.times, recording.world_from_camera)
     boxes = object_boxes(arrangement)
     graph = true_graph(arrangement, boxes)
@@ -177,7 +191,7 @@ def _write_truth(
         camera=camera,
         frame_count=parameters.frames,
         depth_noise=parameters.depth_noise,
-        objects=tuple(true_objects(arrangement, boxes, recording.visible_pixels)),
+        objects=tuple(true_objects(arrangement, boxes, recording.visible_pixels, states.before)),
     ).write(out / "ground_truth.json")
     points, instance = seen.result()
     np.savez(out / "visible.npz", points=points, instance=instance)

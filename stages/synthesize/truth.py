@@ -67,8 +67,16 @@ def object_box(vertices: np.ndarray, world_from_model: np.ndarray) -> Box:
     return own if own.size[0] * own.size[1] <= (1.0 + AXES_TOLERANCE) * least.size[0] * least.size[1] else least
 
 
-def true_objects(arrangement: Arrangement, boxes: dict[str, Box], visible_pixels: np.ndarray) -> list[TrueObject]:
-    """Return the records of layout and objects by instance. `visible_pixels` (I,) counts pixels by instance."""
+def true_objects(
+    arrangement: Arrangement, boxes: dict[str, Box], visible_pixels: np.ndarray, before: Arrangement
+) -> list[TrueObject]:
+    """Return the records of layout and objects by instance. `visible_pixels` (I,) counts pixels by instance; `before`:
+    the room as it was at the beginning, the same where nothing was moved."""
+    joints_before = {
+        thing.name: _all_joints(old)
+        for thing, old in zip(arrangement.objects, before.objects, strict=True)
+        if _all_joints(old) != _all_joints(thing)
+    }
 
     def pixels(instance: int) -> int:
         return int(visible_pixels[instance]) if instance < len(visible_pixels) else 0
@@ -93,6 +101,7 @@ def true_objects(arrangement: Arrangement, boxes: dict[str, Box], visible_pixels
             scale=thing.furnishing.scale,
             world_from_model=as_transform(thing.world_from_model),
             joints=_all_joints(thing),
+            joints_before=joints_before.get(thing.name),
             box=boxes[thing.name],
             round=is_round(np.asarray(thing.world_mesh().vertices)[:, :2]),
             visible_pixels=pixels(thing.instance),

@@ -172,3 +172,18 @@ def _is_number(field: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def poses_at(times: np.ndarray, pose_times: np.ndarray, poses: np.ndarray, tolerance: float) -> list[np.ndarray | None]:
+    """Return for each time (N,) [s] the nearest of poses (M, 4, 4) at pose_times (M,) ascending, or None.
+
+    Poses farther than `tolerance` [s] from a frame do not belong to it; the earlier of two equally near ones is taken.
+    """
+    result: list[np.ndarray | None] = []
+    for time in times:
+        place = int(np.searchsorted(pose_times, time))
+        around = [k for k in (place - 1, place) if 0 <= k < len(pose_times)]
+        nearest = min(around, key=lambda k: abs(pose_times[k] - time), default=None)
+        near_enough = nearest is not None and abs(pose_times[nearest] - time) <= tolerance + 1e-9
+        result.append(poses[nearest] if near_enough and nearest is not None else None)
+    return result

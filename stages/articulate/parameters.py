@@ -1,0 +1,39 @@
+"""Declaration of `scenewright articulate`."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from schemas.articulations import Articulations
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.kit.stage import Optionally, Parameters, Stage
+
+
+class ArticulateParameters(Parameters):
+    """Options of `articulate`."""
+
+    voxel_size: float = Field(0.03, ge=0.01, le=0.2, description="Edge of the voxels that are watched [m]")
+    every: int = Field(1, ge=1, description="Use every how many-th frame")
+    maximum_depth: float = Field(4.0, gt=0.5, description="Farther depth is not used [m]")
+    frames_seen: int = Field(
+        3, ge=1, le=100, description="A voxel is full, or empty, when so many more frames say so than the opposite"
+    )
+    pose_tolerance: float = Field(
+        0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
+    )
+    minimum_overlap: float = Field(
+        0.5, gt=0, le=1, description="A joint is believed when this share of the face it moves is found where it goes"
+    )
+
+
+STAGE = Stage(
+    name="articulate",
+    version=1,
+    summary="Find doors and drawers that a log shows in two states, and the joint of each from its motion",
+    parameters=ArticulateParameters,
+    reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},
+    writes=Articulations,
+    libraries=("numpy", "numba", "scipy"),
+    example="scenewright articulate --sequence outputs/demo/sequence --out outputs/demo/articulations",
+)

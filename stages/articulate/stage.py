@@ -1,0 +1,220 @@
+"""Wiring of `articulate`: a posed sequence in, the parts that it shows in two states and their joints out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from schemas.articulations import Articulation, Articulations, ArticulationsFile
+from schemas.base import as_vector
+from schemas.scene_parts import Camera
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.articulate.joints import Cloud, FoundJoint, find_joints
+from stages.articulate.parameters import ArticulateParameters
+from stages.articulate.watching import NEAREST, Watched
+from stages.kit.formats.frames import FrameReader, require_depth
+from stages.kit.formats.trajectories import poses_at, read_tum
+from stages.kit.geometry.cameras import back_project
+from stages.kit.geometry.surface_samples import surface_samples
+from stages.kit.geometry.transforms import apply
+from stages.kit.stage import Context
+
+MOST_VOXELS = 20_000_000
+"""Above this the voxels are made larger."""
+OUTLIERS = 0.5
+"""Percentile of the seen points, at either end, that the grid leaves out."""
+SMALLEST_REGION = 20
+"""Connected regions of fewer changed voxels are noise."""
+NEVER = 1_000_000_000
+FITTING = 1
+"""Random stream."""
+
+
+@dataclass(frozen=True)
+class PosedDepth:
+    """What is used of a frame."""
+
+    index: int
+    camera: Camera
+    depth: np.ndarray
+    """(H, W) float32 [m], 0 invalid."""
+    world_from_camera: np.ndarray
+
+
+def run(
+    sequence: Sequence,
+    trajectory: Trajectory | None = None,
+    *,
+    parameters: ArticulateParameters,
+    context: Context,
+) -> Articulations:
+    """Watch the voxels of a log, gather what left and what came, and fit joints to it.
+
+    With nothing that changed, or no frame with depth and pose, the outcome is `empty`. Raises BadInput for a sequence
+    without depth.
+    """
+    require_depth(sequence)
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        poses = None
+        if trajectory is not None:
+            poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
+        used = Used(reader, poses, parameters)
+        with context.progress.step("watch"):
+            grid = grid_of(used, parameters)
+            for frame in context.progress.track(used, total=used.count, description="watch"):
+                grid.look(
+                    frame.depth,
+                    frame.camera,
+                    frame.world_from_camera,
+                    frame.index,
+                    parameters.maximum_depth,
+                    parameters.frames_seen,
+                )
+        with context.progress.step("gather"):
+            regions = [regions_of(grid.moved_away, grid.left), regions_of(grid.moved_in, grid.came)]
+            clouds = gather(used, grid, regions, parameters)
+    articulations = []
+    explained = [np.zeros(region.count + 1, dtype=bool) for region in regions]
+    with context.progress.step("fit"):
+
+        def at_once(left: int, came: int) -> bool:
+            times = np.stack([regions[0].times[left], regions[1].times[came]])
+            return bool(times[:, 0].max() < times[:, 1].min())
+
+        random = context.random(FITTING)
+        for joint in find_joints(clouds[0], clouds[1], parameters.minimum_overlap, at_once, random):
+            articulations.append(record_of(joint, regions))
+            for mask, numbers in zip(explained, (joint.left, joint.came), strict=True):
+                mask[np.array(numbers) + 1] = True
+    count = regions[0].count + regions[1].count
+    ArticulationsFile(
+        voxel_size=grid.edge, frames=used.count, changed_places=count, articulations=tuple(articulations)
+    ).write(context.output / "articulations.json")
+    write_changes(context.output, grid, [mask[region.number] for mask, region in zip(explained, regions, strict=True)])
+    summary = {
+        "frames": used.count,
+        "changed_places": count,
+        "revolute": sum(entry.type == "revolute" for entry in articulations),
+        "prismatic": sum(entry.type == "prismatic" for entry in articulations),
+    }
+    return Articulations(context.output, outcome="ok" if articulations else "empty", summary=summary)
+
+
+class Used:
+    """The frames that have depth and a pose; each time it is gone through they are read anew."""
+
+    def __init__(
+        self, reader: FrameReader, poses: list[np.ndarray | None] | None, parameters: ArticulateParameters
+    ) -> None:
+        self.reader, self.poses, self.every = reader, poses, parameters.every
+        self.count = 0
+
+    def __iter__(self) -> Iterator[PosedDepth]:
+        self.count = 0
+        for frame in self.reader.frames(streams=("depth",), every=self.every):
+            pose = frame.world_from_camera if self.poses is None else self.poses[frame.index]
+            if frame.depth is not None and pose is not None and (frame.depth > 0).any():
+                self.count += 1
+                yield PosedDepth(frame.index, self.reader.cameras[frame.camera_name], frame.depth, pose)
+
+
+def grid_of(used: Used, parameters: ArticulateParameters) -> Watched:
+    """Return an empty grid around what the frames saw; of no frame at all, one voxel."""
+    seen = [np.zeros((0, 3))]
+    for frame in used:
+        near = np.where(frame.depth < parameters.maximum_depth, frame.depth, 0.0)
+        points = back_project(near, frame.camera)[::16, ::16].reshape(-1, 3)
+        seen.append(apply(frame.world_from_camera, points[points[:, 2] > NEAREST]))
+    points = np.concatenate(seen)
+    if not len(points):
+        return Watched(np.zeros(3), parameters.voxel_size, (1, 1, 1))
+    low, high = np.percentile(points, [OUTLIERS, 100 - OUTLIERS], axis=0)
+    edge = max(parameters.voxel_size, float((np.prod(high - low) / MOST_VOXELS) ** (1 / 3)))
+    low -= 3 * edge
+    x, y, z = (int(n) for n in np.ceil((high - low) / edge) + 3)
+    return Watched(low, edge, (x, y, z))
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Connected regions of voxels that changed one way."""
+
+    number: np.ndarray
+    """(X, Y, Z) int32: region of a voxel from 1, 0 for none."""
+    count: int
+    times: np.ndarray
+    """(count, 2): last frame of the old, first of the new, median over the voxels."""
+    changes: np.ndarray
+    """(X, Y, Z, 2) int32: these of every voxel."""
+
+
+def regions_of(mask: np.ndarray, changes: np.ndarray) -> Regions:
+    """Return the regions of voxels (X, Y, Z) bool that are large enough to be something."""
+    label, count = ndimage.label(mask, np.ones((3, 3, 3), dtype=bool))
+    large = np.bincount(label.reshape(-1), minlength=count + 1) >= SMALLEST_REGION
+    large[0] = False
+    number = np.where(large, np.cumsum(large), 0).astype(np.int32)[label]
+    times = [np.median(changes[number == k], axis=0) for k in range(1, int(large.sum()) + 1)]
+    return Regions(number, len(times), np.array(times).reshape(-1, 2), changes)
+
+
+def gather(used: Used, grid: Watched, regions: list[Regions], parameters: ArticulateParameters) -> list[list[Cloud]]:
+    """Return the surface that left each region, and that came to each, from the frames that saw the one or the other;
+    one voxel around the changed ones is included."""
+    around = np.ones((3, 3, 3), dtype=bool)
+    number = [np.asarray(ndimage.grey_dilation(region.number, footprint=around)) for region in regions]
+    left, came = regions
+    until = ndimage.grey_dilation(np.where(left.number > 0, left.changes[..., 0], -1), footprint=around)
+    since = ndimage.grey_erosion(np.where(came.number > 0, came.changes[..., 1], NEVER), footprint=around)
+    parts: list[list[list[np.ndarray]]] = [[[] for _ in range(region.count)] for region in regions]
+    for frame in used:
+        near = np.where(frame.depth < parameters.maximum_depth, frame.depth, 0.0).astype(np.float32)
+        points, normals = surface_samples(near, frame.camera, frame.world_from_camera)
+        cells = np.floor((points - grid.origin) / grid.edge).astype(int)
+        inside = np.all((cells >= 0) & (cells < grid.shape), axis=1)
+        rows = np.column_stack([points, normals])[inside]
+        x, y, z = cells[inside].T
+        shows = (frame.index <= until[x, y, z], frame.index >= since[x, y, z])
+        for which, mask in enumerate(shows):
+            place = np.where(mask, number[which][x, y, z], 0)
+            for k in np.unique(place[place > 0]):
+                parts[which][int(k) - 1].append(rows[place == k])
+    return [[_cloud(rows) for rows in state] for state in parts]
+
+
+def _cloud(parts: list[np.ndarray]) -> Cloud:
+    rows = np.concatenate([np.zeros((0, 6)), *parts])
+    return Cloud(rows[:, :3], rows[:, 3:])
+
+
+def record_of(joint: FoundJoint, regions: list[Regions]) -> Articulation:
+    """Return a joint as it is written."""
+    times = np.stack([regions[0].times[joint.left[0]], regions[1].times[joint.came[0]]])
+    motion = joint.motion
+    return Articulation(
+        type=motion.type,
+        axis=as_vector(motion.axis),
+        origin=as_vector(motion.origin),
+        travel=motion.travel,
+        leaf=tuple(as_vector(corner) for corner in joint.leaf.corners),
+        leaf_after=tuple(as_vector(corner) for corner in joint.leaf_after.corners),
+        last_before=int(times[:, 0].max()),
+        first_after=int(times[:, 1].min()),
+        overlap=joint.overlap,
+    )
+
+
+def write_changes(folder: Path, grid: Watched, explained: list[np.ndarray]) -> None:
+    """Write changes.npz: the voxels that something left and those it came to (masks (X, Y, Z)), and until when frames
+    show what is gone."""
+    until = np.full(grid.shape, -1, dtype=np.int32)
+    for mask, changes in zip(explained, (grid.left, grid.came), strict=True):
+        until = np.where(mask, np.maximum(until, changes[..., 1] - 1), until)
+    cells = np.argwhere(until >= 0)
+    points = (grid.origin + (cells + 0.5) * grid.edge).astype(np.float32)
+    np.savez(folder / "changes.npz", points=points, until=until[tuple(cells.T)].astype(np.int32))

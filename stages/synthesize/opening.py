@@ -1,0 +1,87 @@
+"""What somebody opened or shut while the room was recorded: doors and drawers that stand in two states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from schemas.cad_library import Affordances
+from stages.kit.geometry.transforms import transform_from
+from stages.synthesize.arrangement import TOUCH, Arrangement
+from stages.synthesize.collision import CollisionWorld
+from stages.synthesize.furniture import Catalogue
+from stages.synthesize.placement import PlacedObject
+
+OPENED = (0.35, 1.0)
+"""Share of its range by which a joint is opened."""
+KINDS = ("door", "drawer")
+"""What is opened: on lids things may stand."""
+CLEAR = 0.01
+"""Between what was opened and everything else [m]."""
+
+
+@dataclass(frozen=True)
+class TwoStates:
+    """One room before and after somebody went through it, and with everything open that ever was."""
+
+    before: Arrangement
+    after: Arrangement
+    opened: Arrangement
+
+
+def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random: np.random.Generator) -> TwoStates:
+    """Return a room in which up to `count` things that stand shut are open in one of two states, one joint each.
+
+    Half of them stand open first and are shut afterwards. A joint is passed over where its open part would touch
+    something.
+    """
+    affordances = {entry.model: entry for entry in catalogue.library.info.affordances}
+    solid = CollisionWorld()
+    for thing in arrangement.objects:
+        solid.add(thing.name, thing.furnishing.shape.placed(_lifted(thing)))
+    shut: dict[str, PlacedObject] = {}
+    opened: dict[str, PlacedObject] = {}
+    for k in random.permutation(len(arrangement.objects)):
+        thing = arrangement.objects[int(k)]
+        names = _openable(thing, affordances.get(thing.furnishing.model.id))
+        if len(opened) == count or not names:
+            continue
+        model, scale = thing.furnishing.model, thing.furnishing.scale
+        name = names[int(random.integers(len(names)))]
+        joint = next(entry for entry in model.joints if entry.name == name)
+        value = round(joint.lower + float(random.uniform(*OPENED)) * (joint.upper - joint.lower), 4)
+        trial = replace(thing, furnishing=catalogue.furnishing(model, {name: value}, scale))
+        shape = trial.furnishing.shape.placed(_lifted(thing))
+        own = {thing.name, thing.parent, *(other.name for other in arrangement.objects if other.parent == thing.name)}
+        inside = arrangement.room.holds(shape.minimum, shape.maximum)
+        if not inside or solid.conflict(shape, CLEAR, without=own) is not None:
+            continue
+        solid.add(thing.name, shape)
+        opened[thing.name] = trial
+        shut[thing.name] = replace(thing, furnishing=catalogue.furnishing(model, {name: 0.0}, scale))
+    first = {name: bool(random.random() < 0.5) for name in opened}
+
+    def state(is_open: Sequence[str]) -> Arrangement:
+        chosen = {**shut, **{name: opened[name] for name in is_open}}
+        return replace(arrangement, objects=tuple(chosen.get(thing.name, thing) for thing in arrangement.objects))
+
+    return TwoStates(
+        before=state([name for name in opened if first[name]]),
+        after=state([name for name in opened if not first[name]]),
+        opened=state(list(opened)),
+    )
+
+
+def _openable(thing: PlacedObject, affordances: Affordances | None) -> list[str]:
+    """Return the doors and drawers of a thing that stands shut and stays where it is."""
+    furnishing = thing.furnishing
+    if affordances is None or furnishing.model.movable or any(furnishing.joints.values()):
+        return []
+    return [use.joint for use in affordances.joints if use.kind in KINDS and not use.behind]
+
+
+def _lifted(thing: PlacedObject) -> np.ndarray:
+    """Return its pose a little over what it stands on, so that standing is no touch."""
+    return transform_from(np.eye(3), np.array([0.0, 0.0, 2 * TOUCH])) @ thing.world_from_model
