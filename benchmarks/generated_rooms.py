@@ -57,12 +57,13 @@ def room_at(root: Path, name: str, frames: int) -> RoomFolder:
 
 
 def make_room(
-    root: Path, name: str, frames: int, *, size: tuple[int, int] = (640, 480), clutter: str = CLUTTER
+    root: Path, name: str, frames: int, *, size: tuple[int, int] = (640, 480), clutter: str = CLUTTER, opened: int = 0
 ) -> RoomFolder:
-    """Make a room of this name under `root` unless it is up to date; size (width, height) [px]. Raises StepFailed."""
+    """Make a room of this name under `root` unless it is up to date; size (width, height) [px]; up to so many doors and
+    drawers are `opened` or shut half-way. Raises StepFailed."""
     library, room = make_library(root), room_at(root, name, frames)
     recipe, seed = name.rsplit("-", 1)
-    options = ("--recipe", recipe, "--seed", seed, "--clutter", clutter, "--frames", frames)
+    options = ("--recipe", recipe, "--seed", seed, "--clutter", clutter, "--frames", frames, "--opened", opened)
     made("synthesize", room.ground_truth, "--library", library, *options, "--width", size[0], "--height", size[1])
     made("ingest", room.sequence, "--log", room.ground_truth / "log.mcap")
     return room

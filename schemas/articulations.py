@@ -44,8 +44,8 @@ class ArticulationsFile(Model):
 
 
 class Articulations(Artifact):
-    """`articulations.json`, and `changes.npz`: `points` (N, 3) float32, centres of the voxels that the parts left or came
-    to, and `until` (N,) int32, the last frame that shows what is there no more (`fuse` leaves it out)."""
+    """`articulations.json`, and `changes.npz`: `points` (N, 3) float32, centres of the voxels that the parts left or
+    came to, and `until` (N,) int32, the last frame that shows what is there no more (`fuse` leaves it out)."""
 
     kind: ClassVar[str] = "articulations"
     description: ClassVar[str] = "doors and drawers seen in two states: axis, kind and range of their joints"

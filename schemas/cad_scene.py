@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, Name, Transform
+from schemas.base import Model, Name, Transform, Vector3
 from schemas.contact_graph import ContactGraphFile
 from schemas.edits import AppliedEditsFile
 
@@ -26,9 +26,23 @@ class CadCandidate(Model):
     """Root mean square distance from object vertices to the CAD surface [m]."""
 
 
-Ground = Literal["user", "open", "handle", "seam", "thing"]
-"""Why a joint is believed: somebody vouched for it; its part was seen open; a handle stands out of its leaf; a seam
-runs where its leaf ends; or another joint of the same thing has one of these, and this one was not seen."""
+Ground = Literal["user", "moved", "open", "handle", "seam", "thing"]
+"""Why a joint is believed: somebody vouched for it; the log shows its part move; its part was seen open; a handle
+stands out of its leaf; a seam runs where its leaf ends; or another joint of the same thing has one of these, and this
+one was not seen."""
+
+
+class SeenMotion(Model):
+    """How the log shows a joint of a chosen model move. Model frame, scale 1."""
+
+    axis: Vector3
+    """Unit vector, in the direction in which the model's own joint opens."""
+    angle: float
+    """Between it and the axis of the model's joint [rad]."""
+    travel: float
+    """From the one state seen to the other [rad] or [m], positive."""
+    upper: float
+    """The farthest that it was seen open, counted from the model's shut state [rad] or [m]."""
 
 
 class JointEvidence(Model):
@@ -40,6 +54,8 @@ class JointEvidence(Model):
     """How far the handle that was found stands out of the leaf [m]."""
     seam_contrast: float | None = None
     """Share of the leaf's clearest inner edge along which a seam was found."""
+    motion: SeenMotion | None = Field(default=None, exclude_if=lambda motion: motion is None)
+    """How it was seen to move; the joint of the scene has this axis, and reaches at least as far."""
 
 
 class Replacement(Model):
@@ -62,6 +78,11 @@ class Replacement(Model):
     joint_evidence: dict[str, JointEvidence] | None = Field(default=None, exclude_if=lambda evidence: evidence is None)
     """Joint of the chosen model -> why it is believed. Absent where nobody asked (older scenes, `--method thesis`):
     then all joints are."""
+
+    @property
+    def motions(self) -> dict[str, SeenMotion]:
+        """Joints of the chosen model that were seen to move."""
+        return {name: entry.motion for name, entry in (self.joint_evidence or {}).items() if entry.motion is not None}
 
     @property
     def held(self) -> frozenset[str]:

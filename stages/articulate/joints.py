@@ -1,18 +1,18 @@
 """The joint that takes the surface a part left to the surface it came to.
 
-Two priors about furniture, and nothing about classes: what slides moves at right angles to its front, and what turns has
-its hinge in the plane of its leaf. So every pair of planes, one of what was left and one of what came, says one joint:
-parallel planes a slide along their normal, others a turn about the line in which they meet (Jain & Ditto 2022 and
-others fit the same two kinds to parts that a network found; here the planes are those of the change itself). The pair
-is chosen by how much of each face lies on the other state's surface when it is moved.
+Two priors about furniture, and nothing about classes: what slides moves at right angles to its front, and what turns
+has its hinge in the plane of its leaf. So every pair of planes, one of what was left and one of what came, says one
+joint: parallel planes a slide along their normal, others a turn about the line in which they meet. The pair is chosen
+by how much of each face lies on the other state's surface when it is moved. (Ditto, Jiang et al. 2022, takes two
+states as well, and learns parts and joints; here nothing is learned.)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -35,8 +35,8 @@ PARALLEL, SQUARE = np.radians(10.0), np.radians(12.0)
 """Planes that slide into each other are parallel up to the first; those that turn differ by the second or more."""
 LEAST_SLIDE = 0.04
 """[m]"""
-HINGE = 0.12
-"""The hinge is at most so far from the leaf's edge, seen in either state [m]."""
+HINGE = 0.25
+"""The hinge is at most so far from the leaf's edge, in that state in which more of it was seen [m]."""
 FARTHEST = 1.5
 """The middle of a leaf moves at most so far [m]."""
 LEAST_ARM = 0.02
@@ -108,28 +108,43 @@ class FoundJoint:
     """Which of those that something came to."""
 
 
+class Room(Protocol):
+    """What is known of the room beside the surface that changed. Regions are numbered as the clouds are."""
+
+    def at_once(self, left: int, came: int) -> bool:
+        """Whether a region that something left and one that something came to changed at one time."""
+        ...
+
+    def was_full(self, points: np.ndarray, left: int, came: int) -> np.ndarray:
+        """Whether (N,) bool something was near points (N, 3) before these regions changed."""
+        ...
+
+    def came_full(self, points: np.ndarray) -> np.ndarray:
+        """Whether (N,) bool something came to, or near to, points (N, 3)."""
+        ...
+
+    def stays_full(self, points: np.ndarray, left: int, came: int) -> np.ndarray:
+        """Whether (N,) bool something is at points (N, 3) that was there before and is seen there afterwards."""
+        ...
+
+
 def find_joints(
-    before: Sequence[Cloud],
-    after: Sequence[Cloud],
-    minimum_overlap: float,
-    at_once: Callable[[int, int], bool],
-    random: np.random.Generator,
+    before: Sequence[Cloud], after: Sequence[Cloud], room: Room, minimum_overlap: float, random: np.random.Generator
 ) -> Iterator[FoundJoint]:
     """Yield the joints that explain what changed, best first: what one explains is taken away, and the rest is looked
     at again.
 
-    `before`, `after`: the surface of each region that something left, or came to; `at_once`: whether a region of the
-    first and one of the second changed at one time; `minimum_overlap`: less is no joint.
+    `before`, `after`: the surface of each region that something left, or came to; `minimum_overlap`: less is no joint.
     """
     clouds = [list(before), list(after)]
     flat = [[faces(cloud, random) for cloud in state] for state in clouds]
     while True:
-        best = best_joint(clouds, flat, at_once)
+        best = best_joint(flat, room)
         if best is None or best[2] < minimum_overlap:
             return
         motion, (row, leaf, column, face), overlap = best
         gone = [
-            [explained(motion, leaf, face, cloud.points, later) for cloud in state]
+            [explained(motion, leaf, face, cloud.points, later=later == 1) for cloud in state]
             for later, state in enumerate(clouds)
         ]
         left, came = (
@@ -149,25 +164,26 @@ def first_of(number: int, numbers: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def best_joint(
-    clouds: Sequence[Sequence[Cloud]], flat: Sequence[Sequence[Sequence[Face]]], at_once: Callable[[int, int], bool]
+    flat: Sequence[Sequence[Sequence[Face]]], room: Room
 ) -> tuple[Motion, tuple[int, Face, int, Face], float] | None:
-    """Return the motion with the largest overlap, which faces say it, and the overlap; None where no two faces do."""
-    whole = [np.concatenate([np.zeros((0, 3)), *(cloud.points for cloud in state)]) for state in clouds]
-    if not len(whole[0]) or not len(whole[1]):
-        return None
-    trees = [cKDTree(points) for points in whole]
+    """Return the motion with the largest overlap, which faces say it, and the overlap; None where no two faces do.
+
+    The face of the later state has to lie on surface of the earlier one when it is moved back, which is gone or hidden
+    by now, and what is seen to be gone has to lie where something came.
+    """
     best: tuple[Motion, tuple[int, Face, int, Face], float] | None = None
     for (row, leaves), (column, others) in product(enumerate(flat[0]), enumerate(flat[1])):
-        if not at_once(row, column):
+        if not room.at_once(row, column):
             continue
         for leaf, face in product(leaves, others):
             motion = motion_between(leaf, face)
             if motion is None:
                 continue
-            matrix = motion.after_from_before
-            there = float(np.mean(trees[1].query(apply(matrix, leaf.points))[0] < NEAR))
-            back = float(np.mean(trees[0].query(apply(inverse(matrix), face.points))[0] < NEAR))
-            overlap = 2 * there * back / max(there + back, 1e-9)
+            moved_back = apply(inverse(motion.after_from_before), face.points)
+            there = float(np.mean(room.came_full(apply(motion.after_from_before, leaf.points))))
+            back = float(np.mean(room.was_full(moved_back, row, column)))
+            stays = float(np.mean(room.stays_full(moved_back, row, column)))
+            overlap = (1.0 - stays) * 2 * there * back / max(there + back, 1e-9)
             if best is None or overlap > best[2]:
                 best = (motion, (row, leaf, column, face), overlap)
     return best
@@ -180,12 +196,7 @@ def faces(cloud: Cloud, random: np.random.Generator) -> list[Face]:
         return []
     found = []
     for plane in ransac_planes(
-        points,
-        normals,
-        distance_threshold=PLANE,
-        random=random,
-        minimum_share=LEAST_SHARE,
-        maximum_planes=MOST_PLANES,
+        points, normals, distance_threshold=PLANE, random=random, minimum_share=LEAST_SHARE, maximum_planes=MOST_PLANES
     ):
         piece = points[plane.inliers]
         label = clusters(piece, PIECE)
@@ -233,20 +244,23 @@ def motion_between(leaf: Face, face: Face) -> Motion | None:
         np.stack([leaf.normal, face.normal, axis]),
         np.array([leaf.normal @ leaf.middle, face.normal @ face.middle, axis @ middle]),
     )
-    arms = []
+    arms, nearest = [], []
     for piece in (leaf, face):
         arm = piece.middle - origin
         arm -= (arm @ axis) * axis
         length = float(np.linalg.norm(arm))
         reach = (piece.points - origin) @ (arm / max(length, 1e-9))
-        if length < LEAST_ARM or not -HINGE < float(np.percentile(reach, 2)) < HINGE:
+        nearest.append(float(np.percentile(reach, 2)))
+        if length < LEAST_ARM or nearest[-1] < -HINGE:
             return None
         arms.append(arm / length)
+    if min(nearest) > HINGE:
+        return None
     turn = float(np.arctan2(axis @ np.cross(arms[0], arms[1]), arms[0] @ arms[1]))
     return Motion("revolute", np.sign(turn) * axis, origin, abs(turn))
 
 
-def explained(motion: Motion, leaf: Face, face: Face, points: np.ndarray, later: bool) -> np.ndarray:
+def explained(motion: Motion, leaf: Face, face: Face, points: np.ndarray, *, later: bool) -> np.ndarray:
     """Return (N,) bool: which points (N, 3) of the first or (`later`) the second state a joint explains. What a drawer
     brought along, its box, is explained too."""
     if not len(points):

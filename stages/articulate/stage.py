@@ -22,7 +22,7 @@ from stages.kit.formats.trajectories import poses_at, read_tum
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.surface_samples import surface_samples
 from stages.kit.geometry.transforms import apply
-from stages.kit.stage import Context
+from stages.kit.stage import Context, Progress
 
 MOST_VOXELS = 20_000_000
 """Above this the voxels are made larger."""
@@ -30,6 +30,8 @@ OUTLIERS = 0.5
 """Percentile of the seen points, at either end, that the grid leaves out."""
 SMALLEST_REGION = 20
 """Connected regions of fewer changed voxels are noise."""
+AGREED = 90
+"""Percentile of the last frames that show what a region was: some voxels are noisy."""
 NEVER = 1_000_000_000
 FITTING = 1
 """Random stream."""
@@ -47,11 +49,7 @@ class PosedDepth:
 
 
 def run(
-    sequence: Sequence,
-    trajectory: Trajectory | None = None,
-    *,
-    parameters: ArticulateParameters,
-    context: Context,
+    sequence: Sequence, trajectory: Trajectory | None = None, *, parameters: ArticulateParameters, context: Context
 ) -> Articulations:
     """Watch the voxels of a log, gather what left and what came, and fit joints to it.
 
@@ -66,28 +64,15 @@ def run(
         used = Used(reader, poses, parameters)
         with context.progress.step("watch"):
             grid = grid_of(used, parameters)
-            for frame in context.progress.track(used, total=used.count, description="watch"):
-                grid.look(
-                    frame.depth,
-                    frame.camera,
-                    frame.world_from_camera,
-                    frame.index,
-                    parameters.maximum_depth,
-                    parameters.frames_seen,
-                )
+            watch(used, grid, parameters, context.progress)
         with context.progress.step("gather"):
             regions = [regions_of(grid.moved_away, grid.left), regions_of(grid.moved_in, grid.came)]
             clouds = gather(used, grid, regions, parameters)
     articulations = []
     explained = [np.zeros(region.count + 1, dtype=bool) for region in regions]
     with context.progress.step("fit"):
-
-        def at_once(left: int, came: int) -> bool:
-            times = np.stack([regions[0].times[left], regions[1].times[came]])
-            return bool(times[:, 0].max() < times[:, 1].min())
-
-        random = context.random(FITTING)
-        for joint in find_joints(clouds[0], clouds[1], parameters.minimum_overlap, at_once, random):
+        room = SeenRoom(grid, regions)
+        for joint in find_joints(clouds[0], clouds[1], room, parameters.minimum_overlap, context.random(FITTING)):
             articulations.append(record_of(joint, regions))
             for mask, numbers in zip(explained, (joint.left, joint.came), strict=True):
                 mask[np.array(numbers) + 1] = True
@@ -95,7 +80,7 @@ def run(
     ArticulationsFile(
         voxel_size=grid.edge, frames=used.count, changed_places=count, articulations=tuple(articulations)
     ).write(context.output / "articulations.json")
-    write_changes(context.output, grid, [mask[region.number] for mask, region in zip(explained, regions, strict=True)])
+    write_changes(context.output, grid, regions, explained)
     summary = {
         "frames": used.count,
         "changed_places": count,
@@ -121,6 +106,13 @@ class Used:
             if frame.depth is not None and pose is not None and (frame.depth > 0).any():
                 self.count += 1
                 yield PosedDepth(frame.index, self.reader.cameras[frame.camera_name], frame.depth, pose)
+
+
+def watch(used: Used, grid: Watched, parameters: ArticulateParameters, progress: Progress) -> None:
+    """Let every frame vote on the voxels that it sees."""
+    for frame in progress.track(used, total=used.count, description="watch"):
+        pose, far = frame.world_from_camera, parameters.maximum_depth
+        grid.look(frame.depth, frame.camera, pose, frame.index, far, parameters.frames_seen)
 
 
 def grid_of(used: Used, parameters: ArticulateParameters) -> Watched:
@@ -161,6 +153,42 @@ def regions_of(mask: np.ndarray, changes: np.ndarray) -> Regions:
     number = np.where(large, np.cumsum(large), 0).astype(np.int32)[label]
     times = [np.median(changes[number == k], axis=0) for k in range(1, int(large.sum()) + 1)]
     return Regions(number, len(times), np.array(times).reshape(-1, 2), changes)
+
+
+class SeenRoom:
+    """What the voxels say of places (stages/articulate/joints.py: Room)."""
+
+    def __init__(self, grid: Watched, regions: list[Regions]) -> None:
+        self.grid, self.regions = grid, regions
+        around = np.ones((3, 3, 3), dtype=bool)
+        self.came = ndimage.binary_dilation(grid.moved_in, around)
+        steady = np.where(grid.moved_in, NEVER, np.where(grid.first_full < 0, NEVER, grid.first_full))
+        self.full_since = ndimage.grey_erosion(steady, footprint=around)
+
+    def at_once(self, left: int, came: int) -> bool:
+        """See Room."""
+        last, first = self._times(left, came)
+        return last < first
+
+    def came_full(self, points: np.ndarray) -> np.ndarray:
+        """See Room."""
+        return np.asarray(self.came[tuple(self.grid.cells(points).T)])
+
+    def was_full(self, points: np.ndarray, left: int, came: int) -> np.ndarray:
+        """See Room."""
+        last, _ = self._times(left, came)
+        return np.asarray(self.full_since[tuple(self.grid.cells(points).T)] <= last)
+
+    def stays_full(self, points: np.ndarray, left: int, came: int) -> np.ndarray:
+        """See Room."""
+        last, first = self._times(left, came)
+        cells = tuple(self.grid.cells(points).T)
+        seen = (self.grid.first_full[cells] >= 0) & (self.grid.first_full[cells] <= last)
+        return np.asarray(seen & (self.grid.last_full[cells] >= first) & (self.grid.flips[cells] == 0))
+
+    def _times(self, left: int, came: int) -> tuple[float, float]:
+        times = np.stack([self.regions[0].times[left], self.regions[1].times[came]])
+        return float(times[:, 0].max()), float(times[:, 1].min())
 
 
 def gather(used: Used, grid: Watched, regions: list[Regions], parameters: ArticulateParameters) -> list[list[Cloud]]:
@@ -209,12 +237,16 @@ def record_of(joint: FoundJoint, regions: list[Regions]) -> Articulation:
     )
 
 
-def write_changes(folder: Path, grid: Watched, explained: list[np.ndarray]) -> None:
-    """Write changes.npz: the voxels that something left and those it came to (masks (X, Y, Z)), and until when frames
-    show what is gone."""
+def write_changes(folder: Path, grid: Watched, regions: list[Regions], explained: list[np.ndarray]) -> None:
+    """Write changes.npz: the voxels of the regions that joints explain (masks (count + 1,)), and until when frames show
+    what is gone: a region changes at one time, which no single voxel knows well."""
     until = np.full(grid.shape, -1, dtype=np.int32)
-    for mask, changes in zip(explained, (grid.left, grid.came), strict=True):
-        until = np.where(mask, np.maximum(until, changes[..., 1] - 1), until)
+    for mask, region in zip(explained, regions, strict=True):
+        for number in np.flatnonzero(mask):
+            place = region.number == number
+            last, first = region.changes[place].T
+            agreed = np.percentile(last, AGREED)
+            until[place] = np.maximum(until[place], np.minimum(int(agreed), first - 1))
     cells = np.argwhere(until >= 0)
     points = (grid.origin + (cells + 0.5) * grid.edge).astype(np.float32)
-    np.savez(folder / "changes.npz", points=points, until=until[tuple(cells.T)].astype(np.int32))
+    np.savez(folder / "changes.npz", points=points, until=until[tuple(cells.T)])

@@ -1,7 +1,7 @@
 """Which voxels of a log were full and later empty, or the other way round, and when.
 
-Every frame votes on every voxel that it sees: full near the measured depth, empty well before it. A voxel is believed to
-be full or empty when `frames_seen` more frames said so than the opposite, and changes when the opposite is believed
+Every frame votes on every voxel that it sees: full near the measured depth, empty well before it. A voxel is believed
+to be full or empty when `frames_seen` more frames said so than the opposite, and changes when the opposite is believed
 later. What lies behind the measured depth is not seen, so that what was hidden and comes into sight is no change.
 """
 
@@ -38,11 +38,13 @@ class Watched:
     belief: np.ndarray = field(init=False)
     """int8: 1 full, -1 empty, 0 not known."""
     flips: np.ndarray = field(init=False)
+    first_full: np.ndarray = field(init=False)
+    """int32: first frame that saw it full; -1: none."""
     last_full: np.ndarray = field(init=False)
-    """int32: last frame that saw it full; -1: none."""
     last_empty: np.ndarray = field(init=False)
     left: np.ndarray = field(init=False)
-    """int32 (X, Y, Z, 2): last frame that saw it full before it was empty, and the first that saw it empty; -1."""
+    """int32 (X, Y, Z, 2): last frame that saw it full before it was empty, and that in which it is believed to be
+    empty; -1."""
     came: np.ndarray = field(init=False)
     """int32 (X, Y, Z, 2): the same of a voxel that was empty and became full."""
 
@@ -50,6 +52,7 @@ class Watched:
         self.votes = np.zeros(self.shape, dtype=np.int8)
         self.belief = np.zeros(self.shape, dtype=np.int8)
         self.flips = np.zeros(self.shape, dtype=np.int8)
+        self.first_full = np.full(self.shape, -1, dtype=np.int32)
         self.last_full = np.full(self.shape, -1, dtype=np.int32)
         self.last_empty = np.full(self.shape, -1, dtype=np.int32)
         self.left = np.full((*self.shape, 2), -1, dtype=np.int32)
@@ -58,7 +61,7 @@ class Watched:
     def look(
         self, depth: np.ndarray, camera: Camera, world_from_camera: np.ndarray, frame: int, far: float, least: int
     ) -> None:
-        """Let a frame vote. `depth` (H, W) [m], 0 invalid; `far` [m]: deeper is not used; `least`: votes for a belief."""
+        """Let a frame vote. `depth` (H, W) [m], 0 invalid, is used up to `far` [m]; `least`: votes for a belief."""
         usable = np.where((depth > NEAREST) & (depth < far), depth, np.float32(np.inf)).astype(np.float32)
         nearest = cv2.erode(usable, np.ones((EDGE, EDGE), np.uint8))
         rotation = world_from_camera[:3, :3].T
@@ -67,6 +70,7 @@ class Watched:
             self.votes,
             self.belief,
             self.flips,
+            self.first_full,
             self.last_full,
             self.last_empty,
             self.left,
@@ -80,6 +84,11 @@ class Watched:
             frame,
             least,
         )
+
+    def cells(self, points: np.ndarray) -> np.ndarray:
+        """Return the cells (N, 3) of points (N, 3) [m], those outside moved to the nearest inside."""
+        found = np.floor((points - self.origin) / self.edge).astype(int)
+        return np.asarray(np.clip(found, 0, np.array(self.shape) - 1))
 
     @property
     def moved_away(self) -> np.ndarray:
@@ -99,6 +108,7 @@ def _vote(  # noqa: PLR0913
     votes: np.ndarray,
     belief: np.ndarray,
     flips: np.ndarray,
+    first_full: np.ndarray,
     last_full: np.ndarray,
     last_empty: np.ndarray,
     left: np.ndarray,
@@ -129,6 +139,8 @@ def _vote(  # noqa: PLR0913
                 reach = half + NOISE * z * z
                 if abs(depth[v, u] - z) <= reach:
                     last_full[i, j, k] = frame
+                    if first_full[i, j, k] < 0:
+                        first_full[i, j, k] = frame
                     votes[i, j, k] = min(least, votes[i, j, k] + 1)
                     if votes[i, j, k] == least and belief[i, j, k] != 1:
                         if belief[i, j, k] == -1:

@@ -1,24 +1,27 @@
 """Ours: why a joint of a chosen model is believed. A class name says what such things can do, not that this one does.
 
 A wall that a network calls a fridge gets a fridge's model; a door in it would be a promise that no robot can keep. So
-each joint needs a ground in the map: its part stands open, a handle stands out of its leaf, or a seam runs where the
-leaf ends. What the camera cannot see (a rack behind a door, a knob of two centimetres) stands by the rest of its thing.
+each joint needs a ground: the log shows it move, which is the strongest, or in the map its part stands open, a handle
+stands out of its leaf, or a seam runs where the leaf ends. What the camera cannot see (a rack behind a door, a knob of
+two centimetres) stands by the rest of its thing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from schemas.articulations import Articulation
 from schemas.cad_scene import Ground, JointEvidence
 from stages.cad.fitting import AJAR
 from stages.cad.leaf_handles import handle_height
 from stages.cad.leaf_seams import seam_contrast
 from stages.cad.leaves import leaf_of, seen_on
 from stages.cad.model_surfaces import ModelSurface, to_model
+from stages.cad.seen_motions import seen_motions
 from stages.cad.shapes import Placement
 from stages.kit.formats.cad_models import part_transforms
 from stages.kit.geometry.transforms import apply
@@ -42,19 +45,26 @@ class Looked:
 
 
 def joint_evidence(
-    surface: ModelSurface, placement: Placement, looked: Looked, *, vouched: bool
+    surface: ModelSurface,
+    placement: Placement,
+    looked: Looked,
+    *,
+    vouched: bool,
+    articulations: Sequence[Articulation] = (),
 ) -> dict[str, JointEvidence]:
     """Return joint -> why it is believed, for every joint of a placed model; without grounds it is not.
 
-    `vouched`: somebody says that the thing moves as its model does.
+    `vouched`: somebody says that the thing moves as its model does; `articulations`: what the log shows moving.
     """
     local = to_model(placement, looked.vertices) * placement.scale
     facing = looked.normals @ placement.rotation
     nearest = surface.closest(local / placement.scale, placement.shape.joints)
     fits = float(np.mean(placement.scale * nearest.distance < NEAR)) >= EXPLAINED
+    motions = seen_motions(surface, placement, articulations)
     found: dict[str, JointEvidence] = {}
     for joint in surface.model.joints:
         grounds: list[Ground] = ["user"] if vouched else []
+        grounds += ["moved"] if joint.name in motions else []
         value = abs(placement.shape.joints.get(joint.name, 0.0))
         handle, seam = None, None
         if fits and value >= AJAR[joint.type]:
@@ -66,7 +76,9 @@ def joint_evidence(
                 handle, seam = handle_height(leaf, seen), seam_contrast(leaf, seen)
                 grounds += ["handle"] if handle is not None else []
                 grounds += ["seam"] if seam is not None else []
-        found[joint.name] = JointEvidence(grounds=tuple(grounds), handle_height=handle, seam_contrast=seam)
+        found[joint.name] = JointEvidence(
+            grounds=tuple(grounds), handle_height=handle, seam_contrast=seam, motion=motions.get(joint.name)
+        )
     return with_the_rest(found)
 
 

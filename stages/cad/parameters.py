@@ -6,12 +6,13 @@ from typing import Literal
 
 from pydantic import Field
 
+from schemas.articulations import Articulations
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph
 from schemas.panoptic_map import PanopticMap
 from stages.kit.estimates import grows_with
-from stages.kit.stage import Parameters, Stage
+from stages.kit.stage import Optionally, Parameters, Stage
 
 
 class CadParameters(Parameters):
@@ -111,7 +112,7 @@ class CadParameters(Parameters):
     vouched: tuple[str, ...] = Field(
         (),
         description="ours: things (nodes, as fridge_3) and classes that somebody knows to move as their models do; "
-        "joints of others need a ground in the map: open, a handle, a seam",
+        "joints of others need a ground: seen to move, open, a handle, a seam",
     )
     surroundings: bool = Field(
         True, description="ours: what the map shows and nothing has a name for becomes a static body of the scene"
@@ -129,7 +130,12 @@ STAGE = Stage(
     version=6,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
-    reads={"contact_graph": ContactGraph, "panoptic_map": PanopticMap, "library": CadLibrary},
+    reads={
+        "contact_graph": ContactGraph,
+        "panoptic_map": PanopticMap,
+        "library": CadLibrary,
+        "articulations": Optionally(Articulations),
+    },
     writes=CadScene,
     libraries=("numpy", "scipy", "trimesh", "open3d", "python-fcl"),
     example="scenewright cad --contact-graph outputs/demo/contact_graph --panoptic-map outputs/demo/panoptic_map "

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
+from schemas.articulations import Articulation, Articulations
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import SURROUNDINGS, CadScene, JointEvidence
 from schemas.contact_graph import ContactGraph, ContactGraphFile
@@ -45,18 +46,22 @@ def run(
     contact_graph: ContactGraph,
     panoptic_map: PanopticMap,
     library: CadLibrary,
+    articulations: Articulations | None = None,
     *,
     parameters: CadParameters,
     context: Context,
 ) -> CadScene:
-    """Replace every object by the CAD model that fits it best, such that the scene as a whole can exist."""
+    """Replace every object by the CAD model that fits it best, such that the scene as a whole can exist.
+
+    `articulations`: what the log shows in two states, the strongest ground of a joint."""
     if parameters.minimum_scale > parameters.maximum_scale:
         raise UsageError("minimum_scale is larger than maximum_scale")
     method = METHODS[parameters.method](parameters)
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):
         shortlists = find_candidates(contact_graph.info, panoptic_map, library, surfaces, method, context)
-    return choose_and_write(contact_graph.info, panoptic_map, library, shortlists, surfaces, method, context)
+    moved = () if articulations is None else articulations.info.articulations
+    return choose_and_write(contact_graph.info, panoptic_map, library, shortlists, surfaces, method, context, moved)
 
 
 def choose_and_write(
@@ -67,8 +72,10 @@ def choose_and_write(
     surfaces: dict[str, ModelSurface],
     method: CadMethod,
     context: Context,
+    moved: Sequence[Articulation] = (),
 ) -> CadScene:
-    """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4)."""
+    """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4). `moved`: what the log
+    shows in two states."""
     with context.progress.step("global check"):
         chosen, selection = select(graph, shortlists, surfaces, method, context.random(CONFLICTS))
         copy_meshes(graph, chosen, panoptic_map, context)
@@ -90,7 +97,7 @@ def choose_and_write(
         if nameless is not None:
             write_surroundings(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
-        evidence = grounds_of_joints(graph, arranged, surfaces, panoptic_map, method)
+        evidence = grounds_of_joints(graph, arranged, surfaces, panoptic_map, moved, method)
         scene = scene_file(graph, shortlists, arranged, colors, evidence, selection, conflicts_after)
         scene.write(context.output / "scene.json")
         cad_graph(graph, arranged, surfaces).write(context.output / "graph.json")
@@ -106,6 +113,7 @@ def choose_and_write(
         "conflicts_after": scene.conflicts_after,
         "surroundings_m2": 0.0 if nameless is None else round(area_of(nameless), 2),
         "joints": sum(len(found) for found in evidence.values()),
+        "joints_moved": sum("moved" in entry.grounds for found in evidence.values() for entry in found.values()),
         "joints_held": sum(not entry.grounds for found in evidence.values() for entry in found.values()),
         "alignment_error_median": round(float(np.median(errors)), 4) if errors else None,
     }
@@ -192,6 +200,7 @@ def grounds_of_joints(
     arranged: Arrangement,
     surfaces: dict[str, ModelSurface],
     panoptic_map: PanopticMap,
+    moved: Sequence[Articulation],
     method: CadMethod,
 ) -> dict[str, dict[str, JointEvidence]]:
     """Return node -> joint -> why it is believed, for every placed model with joints; nothing where the method does
@@ -209,5 +218,5 @@ def grounds_of_joints(
         looked = Looked(mesh.vertices, vertex_normals(mesh.vertices, mesh.faces), mesh.colors)
         known_to_move = bool(vouched & {name, node.class_name})
         surface = surfaces[placement.shape.model.id]
-        evidence[name] = joint_evidence(surface, placement, looked, vouched=known_to_move)
+        evidence[name] = joint_evidence(surface, placement, looked, vouched=known_to_move, articulations=moved)
     return evidence

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from schemas.articulations import Articulations
 from schemas.errors import UsageError
 from schemas.panoptic_map import PanopticMap
 from schemas.segments import Segments
@@ -124,7 +125,7 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError(
             f"--minimum-depth {parameters.minimum_depth} is not below --maximum-depth {parameters.maximum_depth}"
         )
-    frames = [role for role in ("sequence", "segments", "trajectory") if role in inputs]
+    frames = [role for role in ("sequence", "segments", "trajectory", "articulations") if role in inputs]
     if "from_mesh" in inputs and frames:
         raise UsageError(f"--from-mesh is a whole scan and takes no --{frames[0]}", hint="leave out one of the two")
     missing = [role for role in ("sequence", "segments") if role not in inputs and "from_mesh" not in inputs]
@@ -153,6 +154,7 @@ STAGE = Stage(
         "sequence": Optionally(Sequence),
         "segments": Optionally(Segments),
         "trajectory": Optionally(Trajectory),
+        "articulations": Optionally(Articulations),
         "from_mesh": Optionally(
             External("Mesh or points that others annotated, instead of a sequence and its segments (docs/MASKS.md)")
         ),

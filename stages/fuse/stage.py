@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from schemas.articulations import Articulations
 from schemas.panoptic_map import SNAPSHOTS, PanopticMap
 from schemas.segments import Segments
 from schemas.sequence import Sequence
@@ -18,6 +19,7 @@ from stages.fuse.listings import Listings
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.merging import Merging
 from stages.fuse.ours import Ours
+from stages.fuse.outdated import Outdated
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.payload import write_meshes, write_payload
 from stages.fuse.separate import Separate
@@ -39,6 +41,7 @@ def run(
     sequence: Sequence | None = None,
     segments: Segments | None = None,
     trajectory: Trajectory | None = None,
+    articulations: Articulations | None = None,
     from_mesh: Path | None = None,
     labels: Path | None = None,
     *,
@@ -49,7 +52,8 @@ def run(
 
     Frames without depth or pose are skipped and counted; frames without segments add geometry only. With nothing to
     integrate the outcome is `empty`. Raises BadInput when the segments do not belong to the sequence.
-    With `from_mesh` the map is that of a scan which others annotated, and there are no frames.
+    With `articulations` the map shows the last state of what was seen to move. With `from_mesh` it is that of a scan
+    which others annotated, and there are no frames.
     """
     if from_mesh is not None:
         return run_from_mesh(from_mesh, labels, parameters=parameters, context=context)
@@ -57,7 +61,9 @@ def run(
     check_origin(sequence, segments)
     vocabulary = load_vocabulary()
     with context.progress.step("integrate frames"):
-        mapper, skipped, source = _integrate_frames(sequence, segments, trajectory, vocabulary, parameters, context)
+        mapper, skipped, source = _integrate_frames(
+            sequence, segments, trajectory, articulations, vocabulary, parameters, context
+        )
     return write_map(mapper, vocabulary, source, skipped, context)
 
 
@@ -104,6 +110,7 @@ def _integrate_frames(
     sequence: Sequence,
     segments: Segments,
     trajectory: Trajectory | None,
+    articulations: Articulations | None,
     vocabulary: Vocabulary,
     parameters: FuseParameters,
     context: Context,
@@ -111,6 +118,7 @@ def _integrate_frames(
     """Return the map of all frames, how many frames were skipped by reason, and whose masks these are."""
     skipped: Counter[str] = Counter()
     require_depth(sequence)
+    outdated = None if articulations is None else Outdated(articulations)
     with FrameReader(sequence.path("frames.mcap")) as reader, PanopticReader(segments.path("panoptic.zip")) as masks:
         info = segments.info
         check_segments(info, reader.camera, len(reader), vocabulary)
@@ -137,5 +145,6 @@ def _integrate_frames(
                 listing = listed.get(frame.index)
                 ids = None if listing is None else masks.read(frame.index)
                 camera = reader.cameras[frame.camera_name]
-                mapper.add_frame(camera, frame.depth, frame.color, pose, ids, listing or ())
+                depth = frame.depth if outdated is None else outdated.without(frame.depth, camera, pose, frame.index)
+                mapper.add_frame(camera, depth, frame.color, pose, ids, listing or ())
     return mapper, skipped, source

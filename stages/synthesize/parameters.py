@@ -34,7 +34,8 @@ class SynthesizeParameters(Parameters):
         0,
         ge=0,
         le=50,
-        description="So many doors and drawers, one a thing, are opened or shut half-way: the walk is gone there and back",
+        description="So many doors and drawers, one a thing, are opened or shut half-way, "
+        "and the walk is gone there and back",
     )
     picture_noise: float = Field(
         0.0, ge=0, le=30, description="Standard deviation of the noise of every pixel of the pictures [of 255]"

@@ -143,7 +143,8 @@ def _record(
         for time in context.progress.track(times, total=len(times), description="rendering"):
             again = len(renderers) > 1 and time * pace > walk.duration
             pose = walk.pose(2 * walk.duration - time * pace if again else time * pace)
-            view = renderers[-1 if again else 0].render(camera, pose)
+            renderer = renderers[-1 if again else 0]
+            view = renderer.render(camera, pose)
             depth = view.depth
             if parameters.depth_noise:
                 reflectance = view.albedo.mean(axis=2)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
-from schemas.cad_scene import SURROUNDINGS, CadScene, Replacement
+from schemas.cad_library import CadModel
+from schemas.cad_scene import SURROUNDINGS, CadScene, Replacement, SeenMotion
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.errors import BadInput
 from schemas.scene_parts import Box
@@ -52,7 +53,7 @@ def _body(
         folder = cad_scene.path("models") / node.model_id
         if not folder.is_dir():
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
-        model = read_model(folder)
+        model = as_it_moved(read_model(folder), {} if replacement is None else replacement.motions)
         return BundleBody(
             name=node.id,
             class_name=node.class_name,
@@ -85,6 +86,18 @@ def _body(
         box=bounds,
         mesh=mesh,
     )
+
+
+def as_it_moved(model: CadModel, motions: Mapping[str, SeenMotion]) -> CadModel:
+    """Return a model whose joints turn about, or slide along, the axes that the log shows them move by, at least as far
+    as it shows. `motions`: joint -> how it was seen to move. Joints keep the model's origin: its leaves fit there."""
+    joints = tuple(
+        joint
+        if (motion := motions.get(joint.name)) is None
+        else joint.model_copy(update={"axis": motion.axis, "upper": max(joint.upper, motion.upper)})
+        for joint in model.joints
+    )
+    return model.model_copy(update={"joints": joints}) if motions else model
 
 
 def held_under_fixed(bodies: list[BundleBody]) -> list[BundleBody]:

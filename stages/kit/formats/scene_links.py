@@ -78,7 +78,7 @@ def model_links(
 
     Lengths and prismatic limits grow with the scale, angles stay, mass grows with its cube, inertia with its fifth
     power. `part_colors`: part -> mean colour (sRGB, 0..255) that it is to have; `held`: joints that do not
-    move, whose parts are fixed at their values.
+    move, whose parts are fixed at their values. Axes and limits are `model`'s, which may know more than its file.
     Raises BadInput for a model folder without a sound URDF, or whose meshes lie outside.
     """
     urdf = parse_urdf(folder / URDF_FILE)
@@ -121,6 +121,7 @@ def model_links(
                 parent=names[record.parent or model.parts[0]],
                 child=names[record.part],
                 parent_from_child=frame,
+                axis=source.axis if np.allclose(source.axis, record.axis, atol=1e-5) else record.axis,
                 lower=record.lower * length,
                 upper=record.upper * length,
             )
