@@ -27,8 +27,8 @@ class Articulation(Model):
     first_after: int
     """First frame that shows the second."""
     overlap: float
-    """Share of the face that lies on surface of the other state when it is moved, in both directions (their harmonic
-    mean), 0 to 1."""
+    """Share of the face of either state that lies on surface of the other when it is moved, the smaller of the two,
+    0 to 1."""
 
 
 class ArticulationsFile(Model):

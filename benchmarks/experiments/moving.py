@@ -1,7 +1,7 @@
 """Doors and drawers that a log shows in two states: their joints from the motion alone (`articulate`).
 
-Cases are recipes of generated rooms, recorded twice: there, and back after somebody opened or shut one door or drawer of
-every thing that has any (`synthesize --opened`). Arms: `ours`; `registration`, which aligns what left with the nearest
+Generated rooms are recorded twice: there, and back after somebody opened or shut one door or drawer of every thing that
+has any (`synthesize --opened`). Arms: `ours`; `registration`, which aligns what left with the nearest
 of what came by point-to-plane ICP and takes the screw of that motion apart, knowing nothing of leaves and hinges.
 """
 
@@ -32,7 +32,8 @@ from stages.kit.formats.cad_models import load_collision_parts, model_folder, pa
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.transforms import apply
 
-RECIPES = ("kitchen", "office", "bedroom")
+TUNING = ("kitchen-40", "office-41", "bedroom-40")
+REPORTING = (*(f"kitchen-{seed}" for seed in range(1700, 1704)), "office-1700", "bedroom-1700")
 FRAMES, SIZE, OPENED = 120, (480, 360), 8
 PLACE = 0.35
 """A joint that was found is that of the part whose middle lies nearest to its leaf's, this far at most [m]."""
@@ -183,7 +184,7 @@ def _middle(cloud: Cloud) -> np.ndarray:
 
 
 def screw_of(before: Cloud, after: Cloud) -> Articulation:
-    """Return the joint of the rigid motion by which ICP, begun with the two middles on each other, aligns two clouds."""
+    """Return the joint of the rigid motion by which ICP aligns two clouds, begun with their middles on each other."""
     clouds = []
     for cloud in (before, after):
         made = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points))
@@ -220,16 +221,6 @@ def screw_of(before: Cloud, after: Cloud) -> Articulation:
 ARMS = {"ours": ours, "registration": registration}
 
 
-def seeds_of(bench: Bench, case: str) -> Sequence[str]:
-    """Rooms of a recipe."""
-    if bench.tuning:
-        return {"kitchen": ("kitchen-40",), "office": ("office-41",), "bedroom": ("bedroom-40",)}[case]
-    return tuple(f"{case}-{seed}" for seed in REPORTING[: 1 if bench.quick else None])
-
-
-REPORTING = (1700, 1701, 1702)
-
-
 def share(part: str, of: str) -> Measure:
     """Return a share of counts, pooled over rooms [%]."""
 
@@ -258,14 +249,16 @@ def pooled(name: str, unit: str, percentile: float, factor: float = 1.0) -> Meas
 EXPERIMENT = Experiment(
     name="moving",
     title="Doors and drawers seen to move",
-    simulated="Generated rooms, a structured-light camera's noise, quantisation and dropouts; things are opened or shut "
-    "between two halves of the walk, while nobody looks.",
+    simulated="Generated rooms, a structured-light camera's noise, quantisation and dropouts; things are opened or "
+    "shut between two halves of the walk, while nobody looks.",
     knows="Exact poses and intrinsics; no masks, no classes, no models.",
     does_not_show="Real logs: none that we have shows a thing in two states. Nor poses with errors, a hand or a person "
     "in the picture, things opened while the camera looks, sliding doors, lids and flaps.",
     arms={"ours": "ours", "registration": "registration (ICP) and screw"},
     cases=("all",),
-    seeds_of=lambda bench, case: tuple(name for recipe in RECIPES for name in seeds_of(bench, recipe)),
+    tuning=TUNING,
+    reporting=REPORTING,
+    quick_seeds=1,
     together=lambda trial: (trial.case, trial.seed),
     measure=measure,
     record=Moved,

@@ -37,6 +37,8 @@ LEAST_SLIDE = 0.04
 """[m]"""
 HINGE = 0.25
 """The hinge is at most so far from the leaf's edge, in that state in which more of it was seen [m]."""
+MOST_STAYS = 0.4
+"""A place of which more is still as it was before was not left [share]."""
 FARTHEST = 1.5
 """The middle of a leaf moves at most so far [m]."""
 LEAST_ARM = 0.02
@@ -183,7 +185,7 @@ def best_joint(
             there = float(np.mean(room.came_full(apply(motion.after_from_before, leaf.points))))
             back = float(np.mean(room.was_full(moved_back, row, column)))
             stays = float(np.mean(room.stays_full(moved_back, row, column)))
-            overlap = (1.0 - stays) * 2 * there * back / max(there + back, 1e-9)
+            overlap = 0.0 if stays > MOST_STAYS else min(there, back)
             if best is None or overlap > best[2]:
                 best = (motion, (row, leaf, column, face), overlap)
     return best

@@ -23,7 +23,11 @@ class ArticulateParameters(Parameters):
         0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
     )
     minimum_overlap: float = Field(
-        0.5, gt=0, le=1, description="A joint is believed when this share of the face it moves is found where it goes"
+        0.7,
+        gt=0,
+        le=1,
+        description="A joint is believed when this share of what was left lies where something came, when it is moved, "
+        "and this share of what came lay where something was",
     )
 
 

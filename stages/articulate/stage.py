@@ -53,8 +53,8 @@ def run(
 ) -> Articulations:
     """Watch the voxels of a log, gather what left and what came, and fit joints to it.
 
-    With nothing that changed, or no frame with depth and pose, the outcome is `empty`. Raises BadInput for a sequence
-    without depth.
+    Most logs show nothing that moves: that is a result, too. With no frame that has depth and a pose the outcome is
+    `empty`. Raises BadInput for a sequence without depth.
     """
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader:
@@ -87,7 +87,7 @@ def run(
         "revolute": sum(entry.type == "revolute" for entry in articulations),
         "prismatic": sum(entry.type == "prismatic" for entry in articulations),
     }
-    return Articulations(context.output, outcome="ok" if articulations else "empty", summary=summary)
+    return Articulations(context.output, outcome="ok" if used.count else "empty", summary=summary)
 
 
 class Used:

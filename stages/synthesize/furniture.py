@@ -88,7 +88,7 @@ class Furnishing:
         kept = list(self.model.states[0].planes)
         if any(abs(value) > 1e-9 for value in self.joints.values()):
             for state in self.model.states[1:]:
-                kept = [plane for plane in kept if any(_same_plane(plane, other) for other in state.planes)]
+                kept = [plane for plane in kept if any(same_plane(plane, other) for other in state.planes)]
         return tuple(_scaled(plane, self.scale) for plane in kept)
 
     @cached_property
@@ -105,8 +105,8 @@ class Furnishing:
             travel = state.joints.get(joint.name, 0.0) * axis
             for plane in self.model.states[0].planes:
                 moved = _shifted(plane, travel)
-                went_along = any(_same_plane(moved, other) for other in state.planes)
-                if plane.horizontal and went_along and not any(_same_plane(plane, other) for other in state.planes):
+                went_along = any(same_plane(moved, other) for other in state.planes)
+                if plane.horizontal and went_along and not any(same_plane(plane, other) for other in state.planes):
                     floors.append(_scaled(_shifted(plane, value * axis), self.scale))
         return tuple(floors)
 
@@ -126,7 +126,8 @@ def _shifted(plane: SurfacePlane, shift: np.ndarray) -> SurfacePlane:
     )
 
 
-def _same_plane(a: SurfacePlane, b: SurfacePlane) -> bool:
+def same_plane(a: SurfacePlane, b: SurfacePlane) -> bool:
+    """Return whether two surfaces (one model frame) are the same rectangle."""
     return bool(
         np.allclose(a.normal, b.normal, atol=1e-3)
         and abs(a.offset - b.offset) < 1e-3

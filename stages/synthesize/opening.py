@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from schemas.cad_library import Affordances
 from stages.kit.geometry.transforms import transform_from
 from stages.synthesize.arrangement import TOUCH, Arrangement
 from stages.synthesize.collision import CollisionWorld
-from stages.synthesize.furniture import Catalogue
+from stages.synthesize.furniture import Catalogue, same_plane
 from stages.synthesize.placement import PlacedObject
 
 OPENED = (0.35, 1.0)
@@ -43,6 +43,7 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
         solid.add(thing.name, thing.furnishing.shape.placed(_lifted(thing)))
     shut: dict[str, PlacedObject] = {}
     opened: dict[str, PlacedObject] = {}
+    renumbered: dict[str, dict[int, int]] = {}
     for k in random.permutation(len(arrangement.objects)):
         thing = arrangement.objects[int(k)]
         names = _openable(thing, affordances.get(thing.furnishing.model.id))
@@ -56,8 +57,11 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
         shape = trial.furnishing.shape.placed(_lifted(thing))
         own = {thing.name, thing.parent, *(other.name for other in arrangement.objects if other.parent == thing.name)}
         inside = arrangement.room.holds(shape.minimum, shape.maximum)
-        if not inside or solid.conflict(shape, CLEAR, without=own) is not None:
+        planes = planes_kept(thing, trial)
+        carrying = {number for other in arrangement.objects for number in planes_under(other, thing.name)}
+        if not inside or not carrying <= set(planes) or solid.conflict(shape, CLEAR, without=own) is not None:
             continue
+        renumbered[thing.name] = planes
         solid.add(thing.name, shape)
         opened[thing.name] = trial
         shut[thing.name] = replace(thing, furnishing=catalogue.furnishing(model, {name: 0.0}, scale))
@@ -65,13 +69,43 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
 
     def state(is_open: Sequence[str]) -> Arrangement:
         chosen = {**shut, **{name: opened[name] for name in is_open}}
-        return replace(arrangement, objects=tuple(chosen.get(thing.name, thing) for thing in arrangement.objects))
+        objects = [chosen.get(thing.name, thing) for thing in arrangement.objects]
+        numbers = {name: renumbered[name] for name in is_open}
+        return replace(arrangement, objects=tuple(carried_as_numbered(thing, numbers) for thing in objects))
 
     return TwoStates(
         before=state([name for name in opened if first[name]]),
         after=state([name for name in opened if not first[name]]),
         opened=state(list(opened)),
     )
+
+
+def planes_kept(shut: PlacedObject, opened: PlacedObject) -> dict[int, int]:
+    """Return index -> index: the surfaces of a thing that stands shut, among those that it has opened."""
+    after = opened.furnishing.surfaces
+    return {
+        k: other
+        for k, plane in enumerate(shut.furnishing.surfaces)
+        for other, candidate in enumerate(after)
+        if same_plane(plane, candidate)
+    }
+
+
+def planes_under(thing: PlacedObject, carrier: str) -> list[int]:
+    """Return the indices of the carrier's surfaces that a thing stands on or touches."""
+    own = [thing.plane] if thing.parent == carrier else []
+    more = [entry.plane for entry in thing.further if entry.source == carrier]
+    return [plane for plane in (*own, *more) if plane is not None]
+
+
+def carried_as_numbered(thing: PlacedObject, numbers: Mapping[str, Mapping[int, int]]) -> PlacedObject:
+    """Return a thing whose carriers' surfaces are numbered anew. `numbers`: carrier -> index -> index."""
+
+    def anew(carrier: str, plane: int | None) -> int | None:
+        return plane if plane is None or carrier not in numbers else numbers[carrier][plane]
+
+    further = tuple(replace(entry, plane=anew(entry.source, entry.plane)) for entry in thing.further)
+    return replace(thing, plane=anew(thing.parent, thing.plane), further=further)
 
 
 def _openable(thing: PlacedObject, affordances: Affordances | None) -> list[str]:

@@ -91,7 +91,7 @@ BOX = block((0.1, FRONT - 0.4, 0.0), (0.5, FRONT - 0.1, 0.35))
 )
 def test_what_no_joint_explains_is_none(tmp_path, states):
     found = articulated(tmp_path, states)
-    assert found.outcome == "empty" and not found.info.articulations
+    assert found.outcome == "ok" and not found.info.articulations
     assert not len(Outdated(found).points)
 
 
@@ -117,7 +117,8 @@ def test_without_depth_or_frames_nothing_breaks(tmp_path):
     with pytest.raises(BadInput, match="no depth"):
         articulated(tmp_path / "blind", [with_door(0.0)], depth=False)
     found = articulated(tmp_path / "one", [with_door(0.0)], frames=1)
-    assert found.outcome == "empty"
+    assert found.outcome == "ok" and not found.info.articulations
+    assert articulated(tmp_path / "none", [[block((9, 9, 9), (9.1, 9.1, 9.1))]]).outcome == "empty"
 
 
 def test_a_drawer_is_no_flap_and_its_size_is_its_front(tmp_path):

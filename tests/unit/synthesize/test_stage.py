@@ -197,3 +197,19 @@ def test_true_room_stands_still_in_a_physics_engine(truth: GroundTruth) -> None:
         moved = world.settle(1.0)
     assert len(moved) >= 5
     assert max(moved.values()) < 0.01, {name: value for name, value in moved.items() if value >= 0.01}
+
+
+def test_doors_and_drawers_stand_in_two_states(library: CadLibrary, tmp_path: Path) -> None:
+    truth = make(library, tmp_path, opened=3, depth_noise=False, frames=16)
+    moved = [thing for thing in truth.info.objects if thing.joints_before is not None]
+    assert 1 <= len(moved) <= 3
+    for thing in moved:
+        assert thing.joints_before is not None
+        changed = [name for name, value in thing.joints.items() if value != thing.joints_before[name]]
+        assert len(changed) == 1
+        assert 0.0 in (thing.joints[changed[0]], thing.joints_before[changed[0]])
+    with FrameReader(truth.path("log.mcap")) as reader:
+        poses = reader.poses()[1]
+        assert all(np.allclose(poses[k], poses[-1 - k], atol=0.05) for k in range(8))  # there and back
+        depths = [reader.read(index, ("depth",)).depth for index in range(16)]
+    assert any(np.mean(np.abs(depths[k] - depths[-1 - k]) > 0.1) > 0.02 for k in range(8))
