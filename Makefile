@@ -140,6 +140,10 @@ legs: setup ## Rooms as Gaussians, learned while pictures arrive, beside the the
 bench-surface: setup ## Seen surface that is in the map, at any angle, beside Open3D (QUICK=1: one board and room a case)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) surface --out $(OUTPUTS)/experiments/bench-surface$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: bench-moving
+bench-moving: setup ## Joints of doors and drawers that a log shows in two states, beside registration (QUICK=1: one room)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) moving --out $(OUTPUTS)/experiments/bench-moving$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: bench-edits
 bench-edits: setup ## Edits by hand, applied again to maps fused with other parameters (QUICK=1: four rooms)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) edits --out $(OUTPUTS)/experiments/bench-edits$(if $(QUICK),-quick) $(ASKED)

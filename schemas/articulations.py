@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from pydantic import Field
+
 from schemas.artifact import Artifact, Document
 from schemas.base import Model, Vector3
 
@@ -16,17 +18,17 @@ class Articulation(Model):
     """Unit vector: the part moves along it, or turns about it by the right hand, from the first state to the second."""
     origin: Vector3
     """A point of the axis; of a slide, the middle of the leaf in the first state [m]."""
-    travel: float
+    travel: float = Field(gt=0)
     """How far it moved [rad] or [m], positive."""
-    leaf: tuple[Vector3, ...]
+    leaf: tuple[Vector3, ...] = Field(min_length=4, max_length=4)
     """Corners of the rectangle around its largest flat face in the first state [m]."""
-    leaf_after: tuple[Vector3, ...]
+    leaf_after: tuple[Vector3, ...] = Field(min_length=4, max_length=4)
     """The same in the second state."""
     last_before: int
     """Last frame (index in the sequence) that shows the first state."""
     first_after: int
     """First frame that shows the second."""
-    overlap: float
+    overlap: float = Field(ge=0, le=1)
     """Share of the face of either state that lies on surface of the other when it is moved, the smaller of the two,
     0 to 1."""
 
@@ -34,7 +36,7 @@ class Articulation(Model):
 class ArticulationsFile(Model):
     """articulations.json."""
 
-    voxel_size: float
+    voxel_size: float = Field(gt=0)
     """Edge of the voxels in which change was looked for [m]."""
     frames: int
     """Frames that were looked at."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from schemas.articulations import Articulations
 from schemas.errors import BadInput
 from stages.articulate.parameters import ArticulateParameters
 from stages.articulate.stage import run
@@ -127,3 +130,26 @@ def test_a_drawer_is_no_flap_and_its_size_is_its_front(tmp_path):
     sides = sorted(np.linalg.norm(np.diff(corners, axis=0)[:2], axis=1))
     assert sides == pytest.approx([0.22, WIDTH - 0.02], abs=0.05)
     assert corners[:, 2].max() < HIGH
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"), [("leaf", []), ("travel", 0.0), ("type", "ball"), ("overlap", 2.0), ("axis", [0, 1])], ids=str
+)
+def test_a_document_that_says_no_joint_is_refused(tmp_path, entry, value):
+    found = articulated(tmp_path, [with_door(0.0), with_door(1.5)])
+    file = found.path("articulations.json")
+    document = json.loads(file.read_text())
+    document["articulations"][0][entry] = value
+    file.write_text(json.dumps(document))
+    with pytest.raises(BadInput, match=r"articulations\.json"):
+        Articulations(found.root).info  # noqa: B018
+
+
+def test_damaged_changes_are_refused(tmp_path):
+    found = articulated(tmp_path, [with_door(0.0), with_door(1.5)])
+    np.savez(found.path("changes.npz"), points=np.zeros((3, 2)), until=np.zeros(3))
+    with pytest.raises(BadInput, match=r"changes\.npz"):
+        Outdated(found)
+    found.path("changes.npz").write_bytes(b"PK not a file")
+    with pytest.raises(BadInput, match=r"changes\.npz"):
+        Outdated(found)
