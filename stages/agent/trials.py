@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from schemas.apartment import Apartment
@@ -53,18 +53,18 @@ def goals_of(words: str) -> tuple[Goal, ...]:
 def open_world(setting: Setting, arm: str) -> World:
     """Return the world of a trial: its eyes are prompted with the classes that the goals name. Close it.
 
-    In physics what hides a thing is in the way of the camera, so that hiding is not drawn. Raises UsageError for goals
-    with doors there.
+    Raises UsageError for goals with doors in physics.
     """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
     if setting.world == "physics":
-        from stages.agent.world.physics.body import DOORS, PhysicsBody  # heavy: pybullet and Open3D
+        from stages.agent.world.physics.body import PhysicsBody  # heavy: pybullet and Open3D
+        from stages.agent.world.physics.seen import DOORS
 
         if any(set(each.labels) & set(DOORS) for goal in setting.goals for each in descriptions(goal)) or any(
             isinstance(goal, Move) and goal.start in DOORS for goal in setting.goals
         ):
             raise UsageError("doors of the physics world do not move", hint="give --simulation fast")
-        return PhysicsBody(setting.apartment, sought(setting.goals), replace(rates, hidden=0.0), setting.seed)
+        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 
 
