@@ -116,7 +116,8 @@ class EpisodeMaps(Model):
 
 
 class AgentEpisode(Artifact):
-    """`episode.json`, `episode.txt`, `apartment.json` (the true one), `maps.json`, `map.png` and `map.gif` (what
+    """`episode.json`, `episode.txt`, `apartment.json` (the true one), `known.json` (what was mapped
+    of it before, where that was given), `maps.json`, `map.png` and `map.gif` (what
     the robot knew, as it grew), `episode.mcap` (the same by time, with base, words and views), in physics `views.png`
     (what the wrist camera saw last); `transcript.jsonl` when a language model was asked."""
 

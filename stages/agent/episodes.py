@@ -126,6 +126,8 @@ def write_episode(
     )
     file.write(output / "episode.json")
     setting.apartment.write(output / "apartment.json")
+    if setting.known is not None:
+        setting.known.write(output / "known.json")
     EpisodeMaps(snapshots=tuple(watching.snapshots)).write(output / "maps.json")
     output.joinpath("episode.txt").write_text(episode_text(file), encoding="utf-8")
     write_log(output / "episode.mcap", watching.moments)

@@ -11,6 +11,7 @@ CATEGORIES = {"fruit": FRUIT, "toy": TOYS}
 FURNITURE = ("table", "bed", "sofa", "shelf", "fridge", "dresser")
 CARRIERS = ("plate", "fruit box", "toy box")
 """Small things on which others are put."""
+SMALL = (*FRUIT, *TOYS, "cup", "bottle", "can", "spoon", "sponge")
 THINGS = (*FRUIT, *TOYS, *CARRIERS, "cup", "bottle", "can", "spoon", "sponge", "book", "teapot")
 
 

@@ -6,10 +6,12 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, pi
 
-from stages.agent.body import Base, Body, Detection, Position, SeenFurniture
-from stages.agent.goals import CARRIERS
+from schemas.apartment import Apartment
+from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sweep
+from stages.agent.goals import CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.world.floor import Floor
 
 SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
@@ -26,7 +28,9 @@ top."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
 Region = tuple[int | str, bool]
-"""Quarter turn (or `hand`) from which something was seen, and whether from near by."""
+"""Quarter turn (or `hand`, or `map`) from which something was seen, and whether from near by."""
+MAPPED: Region = ("map", False)
+"""Of what was mapped before the robot came."""
 
 
 @dataclass
@@ -93,18 +97,36 @@ class SceneMap:
         self._named: Counter[str] = Counter()
         self._same_thing = body.same_thing
 
+    def know(self, apartment: Apartment) -> None:
+        """Believe in an apartment that somebody mapped before: floor, furniture, and things as one view saw them."""
+        free, occupied = Floor(apartment).cells()
+        self.obstacles.add(Sweep(free, occupied, ()))
+        keys = {}
+        for piece in apartment.furniture:
+            seen = SeenFurniture(piece.label, piece.centre, piece.size, piece.height, piece.door, piece.opened)
+            keys[piece.name] = self._enter(seen)
+        for thing in apartment.things:
+            at = (*thing.at, next(f.height for f in apartment.furniture if f.name == thing.on) + 0.02)
+            self.add(Detection(thing.label, at, thing.color, None, thing.radius), keys[thing.on], MAPPED)
+
     def sweep(self, body: Body) -> int:
         """Turn the head camera around and enter what it saw; return how many cells are new."""
         sweep = body.sweep()
         for seen in sweep.furniture:
-            key = next((k for k, f in self.furniture.items() if _same_piece(f, seen)), None)
-            self.furniture[key or self._name(seen.label)] = seen
+            self._enter(seen)
         return self.obstacles.add(sweep)
 
+    def _enter(self, seen: SeenFurniture) -> str:
+        known = next((k for k, f in self.furniture.items() if _same_piece(f, seen)), None)
+        key = known or self._name(seen.label)
+        self.furniture[key] = seen
+        return key
+
     def in_front(self, base: Base) -> str:
-        """Return the key of the furniture before a base pose, or nothing."""
-        near = [(edge_distance(f, base.x, base.y), key) for key, f in self.furniture.items()]
-        return min(near)[1] if near and min(near)[0] <= IN_FRONT else ""
+        """Return the key of the furniture before a base pose, rather what it faces; or nothing."""
+        near = [(edge_distance(f, base.x, base.y), key, f) for key, f in self.furniture.items()]
+        near = [entry for entry in near if entry[0] <= IN_FRONT]
+        return min(((not _faces(base, f), gap, key) for gap, key, f in near), default=(False, 0.0, ""))[2]
 
     def add(self, detection: Detection, place: str, region: Region) -> Item:
         """Enter a detection: a vote of its region for the thing that lies there, or a new thing."""
@@ -112,7 +134,8 @@ class SceneMap:
         if item is None:
             key = self._name(detection.label)
             item = self.items[key] = Item(key, detection.position, detection.color, detection.radius, place)
-        if not self.careful or (detection.label in CARRIERS) == (detection.radius >= CARRIES):
+        no_class_of_its_width = CARRIERS if detection.radius < CARRIES else SMALL
+        if not self.careful or detection.label not in no_class_of_its_width:
             item.votes[region] = detection.label
         item.position = detection.position
         if detection.used is not None:
@@ -163,6 +186,14 @@ class SceneMap:
         name = f"{label.replace(' ', '_')}_{self._named[label]}"
         self._named[label] += 1
         return name
+
+
+def _faces(base: Base, piece: SeenFurniture) -> bool:
+    """Whether the nearest point of a piece of furniture is within 45 degrees of where a base pose looks."""
+    x, y = (
+        min(max(p, c - s / 2), c + s / 2) for p, c, s in zip((base.x, base.y), piece.centre, piece.size, strict=True)
+    )
+    return abs((atan2(y - base.y, x - base.x) - base.yaw + pi) % (2 * pi) - pi) <= pi / 4
 
 
 def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:

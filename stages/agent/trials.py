@@ -40,6 +40,8 @@ class Setting:
     floor: Floor | None = None
     """Of the apartment, where several trials share it."""
     world: WorldName = "fast"
+    known: Apartment | None = None
+    """What was mapped of it before the robot came, as far as it is right."""
 
 
 def goals_of(words: str) -> tuple[Goal, ...]:
@@ -91,6 +93,8 @@ def run_trial(
     """Run one trial; close its world. A brain that is given answers turn by turn, unless it is to say `one_program`."""
     world = open_world(setting, arm)
     skills = ARMS[arm].skills(world)
+    if setting.known is not None:
+        skills.scene.know(setting.known)
 
     def see(turn: Turn) -> None:
         if watch is not None:

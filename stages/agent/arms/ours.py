@@ -98,7 +98,7 @@ class OwnSkills(CommonSkills):
         item = self.scene.items[target.key]
         for _ in range(MOST_VIEWS):
             if (quarter(self._body.base, item.position), True) in item.votes and self._use.other_sides:
-                self._go_round(item.place, {int(side) for side, close in item.votes if close and side != "hand"})
+                self._go_round(item.place, {side for side, close in item.votes if close and isinstance(side, int)})
             self._look(item.place, item)
             sure = abs(item.used_margin) >= (SURE_OF_USE if self._use.agreement else 1)
             if sure or item.key not in self.scene.items or not self._use.other_sides:
@@ -133,7 +133,7 @@ class OwnSkills(CommonSkills):
             if near is not None and self._there(near, item.place):
                 self._look(item.place, item)
                 continue
-            seen = {int(side) for side, _ in item.votes if side != "hand"}
+            seen = {side for side, _ in item.votes if isinstance(side, int)}
             if not self._use.other_sides or not self._go_round(item.place, seen):
                 return
             self._look(item.place)
