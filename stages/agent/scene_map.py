@@ -6,12 +6,10 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, pi
 
-from schemas.apartment import Apartment
 from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sweep
 from stages.agent.goals import CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.world.floor import Floor
 
 SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
@@ -31,6 +29,15 @@ Region = tuple[int | str, bool]
 """Quarter turn (or `hand`, or `map`) from which something was seen, and whether from near by."""
 MAPPED: Region = ("map", False)
 """Of what was mapped before the robot came."""
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """What was mapped of a place before the robot came."""
+
+    floor: Sweep
+    things: tuple[tuple[int, Detection], ...]
+    """Number of the furniture that each is on or in, and the thing."""
 
 
 @dataclass
@@ -97,17 +104,12 @@ class SceneMap:
         self._named: Counter[str] = Counter()
         self._same_thing = body.same_thing
 
-    def know(self, apartment: Apartment) -> None:
-        """Believe in an apartment that somebody mapped before: floor, furniture, and things as one view saw them."""
-        free, occupied = Floor(apartment).cells()
-        self.obstacles.add(Sweep(free, occupied, ()))
-        keys = {}
-        for piece in apartment.furniture:
-            seen = SeenFurniture(piece.label, piece.centre, piece.size, piece.height, piece.door, piece.opened)
-            keys[piece.name] = self._enter(seen)
-        for thing in apartment.things:
-            at = (*thing.at, next(f.height for f in apartment.furniture if f.name == thing.on) + 0.02)
-            self.add(Detection(thing.label, at, thing.color, None, thing.radius), keys[thing.on], MAPPED)
+    def know(self, before: Mapped) -> None:
+        """Believe in what somebody mapped before, the things as if one view had shown them."""
+        self.obstacles.add(before.floor)
+        keys = [self._enter(seen) for seen in before.floor.furniture]
+        for number, detection in before.things:
+            self.add(detection, keys[number], MAPPED)
 
     def sweep(self, body: Body) -> int:
         """Turn the head camera around and enter what it saw; return how many cells are new."""

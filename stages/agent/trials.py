@@ -20,6 +20,7 @@ from stages.agent.session import Limits, Session, Turn, run_session
 from stages.agent.world.failures import Rates
 from stages.agent.world.fast import FastWorld
 from stages.agent.world.floor import Floor
+from stages.agent.world.reconstructed import mapped
 from stages.agent.world.truth import World
 from stages.kit.rendering.segmenter_errors import Luck
 
@@ -94,7 +95,7 @@ def run_trial(
     world = open_world(setting, arm)
     skills = ARMS[arm].skills(world)
     if setting.known is not None:
-        skills.scene.know(setting.known)
+        skills.scene.know(mapped(setting.known))
 
     def see(turn: Turn) -> None:
         if watch is not None:

@@ -15,7 +15,9 @@ from scipy.ndimage import distance_transform_edt
 from schemas.apartment import LARGEST_SIDE, Apartment, Furniture, Room, Thing
 from schemas.errors import BadInput
 from schemas.interactive_scene import SceneBody
+from stages.agent.body import Detection, SeenFurniture, Sweep
 from stages.agent.obstacle_map import CELL
+from stages.agent.scene_map import Mapped
 from stages.agent.world.floor import Floor
 from stages.kit.geometry.transforms import transform_from_quaternion
 
@@ -52,6 +54,18 @@ def apartment_of(bodies: Sequence[SceneBody], where: str) -> Apartment:
         start=(*_point((low + high) / 2), 0.0),
     )
     return made.model_copy(update={"start": roomiest(made)})
+
+
+def mapped(known: Apartment) -> Mapped:
+    """Return what a robot believes that is given an apartment as its map."""
+    names = [piece.name for piece in known.furniture]
+    pieces = [SeenFurniture(f.label, f.centre, f.size, f.height, f.door, f.opened) for f in known.furniture]
+    things = []
+    for thing in known.things:
+        number = names.index(thing.on)
+        at = (*thing.at, pieces[number].height + 0.02)
+        things.append((number, Detection(thing.label, at, thing.color, None, thing.radius)))
+    return Mapped(Sweep(*Floor(known).cells(), tuple(pieces)), tuple(things))
 
 
 def roomiest(apartment: Apartment) -> tuple[float, float, float]:
