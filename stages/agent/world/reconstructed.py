@@ -22,8 +22,12 @@ from stages.agent.world.floor import Floor
 from stages.kit.geometry.transforms import transform_from_quaternion
 
 SHELL = ("floor", "wall", "ceiling")
-LEAST_HEIGHT = 0.1
-"""What is lower over the floor than this is no furniture [m]."""
+LEAST = 0.1
+"""What is smaller or lower than this is no furniture [m]."""
+HANGS = 0.5
+"""What begins higher over the floor hangs on a wall, whatever carries it in the graph [m]."""
+OPENED = 0.5
+"""Share of its range from which on a door counts as open."""
 
 
 def apartment_of(bodies: Sequence[SceneBody], where: str) -> Apartment:
@@ -108,7 +112,7 @@ def _furniture(body: SceneBody, carried: list[SceneBody], room: Room) -> Furnitu
     which something is inside."""
     low, high = _extent(body)
     low[:2], high[:2] = np.maximum(low[:2], room.low), np.minimum(high[:2], room.high)
-    if np.any(high[:2] - low[:2] < LEAST_HEIGHT) or high[2] < LEAST_HEIGHT:
+    if np.any(high[:2] - low[:2] < LEAST) or high[2] < LEAST or low[2] > HANGS:
         return None
     inside = [float(_extent(thing)[0][2]) for thing in carried if thing.relation == "contains"]
     doors = [joint for joint in body.joints if joint.type == "revolute"] or list(body.joints)
@@ -124,10 +128,6 @@ def _furniture(body: SceneBody, carried: list[SceneBody], room: Room) -> Furnitu
         door=bool(doors) and bool(inside or values and max(values) > OPENED),
         opened=bool(values) and max(values) > OPENED,
     )
-
-
-OPENED = 0.5
-"""Share of its range from which on a door counts as open."""
 
 
 def _thing(body: SceneBody, on: str) -> Thing:
