@@ -19,10 +19,6 @@ SURE = 0.8
 """A thing is taken to be on a small carrier within this share of its radius: nearer to the rim it may lean on it."""
 UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
-ENOUGH = 3
-"""Regions of views by which a class has to be ahead before anything is done about it. By the kit's error model one of
-five other things is taken for the one from three regions in 1 % of cases, from two in 3 %; the hand's view comes on
-top."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
 Region = tuple[int | str, bool]
@@ -102,7 +98,7 @@ class SceneMap:
         self.items: dict[str, Item] = {}
         self.obstacles = ObstacleMap(body.base, body.clearance)
         self._named: Counter[str] = Counter()
-        self._same_thing = body.same_thing
+        self._same_thing, self._enough = body.same_thing, body.enough
 
     def know(self, before: Mapped) -> None:
         """Believe in what somebody mapped before, the things as if one view had shown them."""
@@ -168,7 +164,7 @@ class SceneMap:
             piece = self.furniture[key]
             return SceneObject(key, piece.label, door=piece.door, opened=piece.opened)
         item = self.items[key]
-        doubt, ahead = (item.doubt, min(item.margin, ENOUGH)) if self.careful else ("", 0)
+        doubt, ahead = (item.doubt, min(item.margin, self._enough)) if self.careful else ("", 0)
         on = self.carrier_of(item)
         return SceneObject(key, item.label, item.place, item.color, item.used, on=on, doubt=doubt, ahead=ahead)
 

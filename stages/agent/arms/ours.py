@@ -16,7 +16,7 @@ from stages.agent.arms.stations import around, drivable, other_sides
 from stages.agent.body import Base, Body, Position
 from stages.agent.exploration import explore
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
-from stages.agent.scene_map import ENOUGH, Item, quarter
+from stages.agent.scene_map import Item, quarter
 
 SURE_OF_USE = 2
 """Regions of views by which a thing has to be ahead in being clean or used."""
@@ -127,7 +127,7 @@ class OwnSkills(CommonSkills):
         model all others tell equally much, so that the next is the cheapest from where it was not seen yet: from near
         by wherever the arm gets there, else from another side."""
         for _ in range(MOST_VIEWS):
-            if item.margin >= ENOUGH or item.key not in self.scene.items:
+            if item.margin >= self._body.enough or item.key not in self.scene.items:
                 return
             near = self._near_by(item)
             if near is not None and self._there(near, item.place):

@@ -11,12 +11,12 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import build_file_descriptor_set
 
-Add = Callable[[str, int, Message], None]
+AddMessage = Callable[[str, int, Message], None]
 """Topic, time [ns], message."""
 
 
 @contextmanager
-def foxglove_log(path: Path, topics: Mapping[str, type[Message]]) -> Iterator[Add]:
+def foxglove_log(path: Path, topics: Mapping[str, type[Message]]) -> Iterator[AddMessage]:
     """Open a new log for a `with` block; what it gives adds a message. `topics`: topic -> class of its messages."""
     with Path(path).open("wb") as file:
         writer = McapWriter(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)

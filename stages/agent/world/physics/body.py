@@ -27,6 +27,9 @@ class PhysicsBody:
     """
 
     same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.9, True
+    enough = 2
+    """Two are had from one stop, a third is not: where it is driven to for one, all that was measured before is off by
+    both stops' errors."""
 
     def __init__(self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int) -> None:
         rates = replace(rates, hidden=0.0)
