@@ -116,9 +116,10 @@ class EpisodeMaps(Model):
 
 
 class AgentEpisode(Artifact):
-    """`episode.json`, `episode.txt`, `apartment.json` (the true one), `maps.json`, `map.png` and `map.gif` (what
-    the robot knew, as it grew), in physics `views.png` (what the wrist camera saw last); `transcript.jsonl` when a
-    language model was asked."""
+    """`episode.json`, `episode.txt`, `apartment.json` (the true one), `known.json` (what was mapped
+    of it before, where that was given), `maps.json`, `map.png` and `map.gif` (what
+    the robot knew, as it grew), `episode.mcap` (the same by time, with base, words and views), in physics `views.png`
+    (what the wrist camera saw last); `transcript.jsonl` when a language model was asked."""
 
     kind: ClassVar[str] = "agent_episode"
     description: ClassVar[str] = "a robot told in words: programs, calls, maps, and what came of it"

@@ -21,6 +21,7 @@ from schemas.agent_episode import (
 from schemas.language import LanguageRecord
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.brains.brain import Brain, Reply
+from stages.agent.episode_log import Moment, write_log
 from stages.agent.judging import score
 from stages.agent.language.interpreter import Called, Ran
 from stages.agent.language.values import as_text
@@ -60,6 +61,8 @@ class Watching:
     def __init__(self) -> None:
         self.snapshots: list[MapSnapshot] = []
         self.panels: list[Panel] = []
+        self.moments: list[Moment] = []
+        self._views: list[np.ndarray] = []
         self._turn = 0
         self._way: list[tuple[float, float]] = []
 
@@ -70,13 +73,17 @@ class Watching:
         self._way.append((turn.base.x, turn.base.y))
         area = round(float(np.count_nonzero(scene.obstacles.window != UNKNOWN)) * CELL**2, 2)
         things = _things(scene)
+        views = [picture for _, picture in world.pictures]
+        fresh = tuple(v for v in views if not any(v is old for old in self._views))
+        self._views = views
+        window, origin = scene.obstacles.window.copy(), scene.obstacles.origin
+        said = turn_text(self._turn, _turn(turn))
+        self.moments.append(Moment(turn.seconds, turn.base, said, window, origin, things, fresh))
         if self.snapshots and self.snapshots[-1].things == things and self.snapshots[-1].known_area == area:
             return
         self.snapshots.append(MapSnapshot(turn=self._turn, known_area=area, things=things))
         title = f"turn {self._turn}: {turn.reply.code.splitlines()[0] if turn.reply.code else ''}"
-        self.panels.append(
-            Panel(title, scene.obstacles.window.copy(), scene.obstacles.origin, things, tuple(self._way), turn.base)
-        )
+        self.panels.append(Panel(title, window, origin, things, tuple(self._way), turn.base))
 
 
 def write_episode(
@@ -119,8 +126,11 @@ def write_episode(
     )
     file.write(output / "episode.json")
     setting.apartment.write(output / "apartment.json")
+    if setting.known is not None:
+        setting.known.write(output / "known.json")
     EpisodeMaps(snapshots=tuple(watching.snapshots)).write(output / "maps.json")
     output.joinpath("episode.txt").write_text(episode_text(file), encoding="utf-8")
+    write_log(output / "episode.mcap", watching.moments)
     draw_growing_map(output / "map.png", watching.panels, width)
     animate_map(output / "map.gif", watching.panels, width // 2)
     success = made.success if setting.goals else session.end == "done"
@@ -195,16 +205,21 @@ def episode_text(file: EpisodeFile) -> str:
     lines = [f"{file.words}", f"arm {file.arm}, brain {file.brain}"]
     lines += [] if file.language else ["No language model was asked: the programs are written by rules."]
     for number, turn in enumerate(file.turns, 1):
-        lines += ["", f"{number}. {turn.reason}"]
-        lines += [f"    {line}" for line in turn.code.splitlines()]
-        for call in turn.calls:
-            came = call.error.message if call.error is not None else call.returned
-            lines.append(f"  {call.name}({', '.join(call.arguments)}): {came}")
-        lines += [f"  printed: {text}" for text in turn.printed]
-        lines += [f"  error: {turn.error.message}"] if turn.error is not None and not turn.calls else []
+        lines += ["", turn_text(number, turn)]
     made = file.score
     truly = ("It is done." if made.success else "It is not done.") if file.understood else "No judge knows."
     lines += ["", f"end: {file.end}{f': {file.said}' if file.said else ''}. {truly}"]
     lines.append(f"{made.calls} calls, {made.executed} of {made.executions} executions did what they were to do,")
     lines.append(f"{made.recovered} of {made.replanned} tried again; {made.seconds:.0f} s, {made.metres:.0f} m")
     return "\n".join(lines) + "\n"
+
+
+def turn_text(number: int, turn: EpisodeTurn) -> str:
+    """Return a turn as people read it: why, the program, what its calls returned."""
+    lines = [f"{number}. {turn.reason}", *(f"    {line}" for line in turn.code.splitlines())]
+    for call in turn.calls:
+        came = call.error.message if call.error is not None else call.returned
+        lines.append(f"  {call.name}({', '.join(call.arguments)}): {came}")
+    lines += [f"  printed: {text}" for text in turn.printed]
+    lines += [f"  error: {turn.error.message}"] if turn.error is not None and not turn.calls else []
+    return "\n".join(lines)

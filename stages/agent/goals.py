@@ -8,10 +8,11 @@ FRUIT = ("apple", "banana", "orange", "lemon")
 TOYS = ("doll", "teddy", "duck", "toy car")
 CATEGORIES = {"fruit": FRUIT, "toy": TOYS}
 """What every child knows: a word for several classes."""
-FURNITURE = ("table", "bed", "sofa", "shelf", "fridge", "dresser")
+FURNITURE = ("table", "bed", "sofa", "shelf", "fridge", "dresser", "desk", "cabinet")
 CARRIERS = ("plate", "fruit box", "toy box")
 """Small things on which others are put."""
-THINGS = (*FRUIT, *TOYS, *CARRIERS, "cup", "bottle", "can", "spoon", "sponge", "book", "teapot")
+SMALL = (*FRUIT, *TOYS, "cup", "bottle", "can", "spoon", "sponge")
+THINGS = (*FRUIT, *TOYS, *CARRIERS, "cup", "bottle", "can", "spoon", "sponge", "book", "teapot", "bowl", "box")
 
 
 @dataclass(frozen=True)

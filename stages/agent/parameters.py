@@ -9,6 +9,8 @@ from pydantic import Field
 
 from schemas.agent_episode import AgentEpisode, AgentEvaluation
 from schemas.errors import UsageError
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
 from stages.kit.language.options import LanguageParameters
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
@@ -54,6 +56,10 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options that do not go together."""
     if not parameters.task.strip():
         raise UsageError("--task is empty", hint="say what you want, or name a built-in task")
+    if (inputs.get("scene") is None) != (inputs.get("truth") is None):
+        raise UsageError("--scene and --truth go together", hint="what the robot knows, and the room it is in")
+    if inputs.get("scene") is not None and inputs.get("world") is not None:
+        raise UsageError("--world and --scene are two rooms", hint="give one of them")
     if parameters.brain == "rules" and (inputs.get("transcript") is not None or parameters.language != "scripted"):
         raise UsageError("--brain rules asks no language model", hint="give --brain language too")
     if parameters.brain == "language" and parameters.language == "scripted":
@@ -62,11 +68,13 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
 
 RUN = Stage(
     name="agent run",
-    version=2,
+    version=3,
     summary="Tell a mobile robot in words what to do in an apartment that it has never seen (COME-robot)",
     parameters=RunParameters,
     reads={
         "world": Optionally(External("an apartment of your own, JSON (docs/AGENT.md)")),
+        "scene": Optionally(InteractiveScene),
+        "truth": Optionally(GroundTruth),
         "transcript": Optionally(External("transcript.jsonl of an earlier run, for --language recorded or openai")),
     },
     writes=AgentEpisode,
@@ -78,7 +86,7 @@ RUN = Stage(
 )
 REPLAY = Stage(
     name="agent replay",
-    version=2,
+    version=3,
     summary="Do an episode again with the programs that its brain wrote: the same bytes, nobody is asked",
     parameters=ReplayParameters,
     reads={"episode": AgentEpisode},
@@ -90,7 +98,7 @@ REPLAY = Stage(
 )
 EVALUATE = Stage(
     name="agent evaluate",
-    version=2,
+    version=3,
     summary="Compare arms of the agent over tasks and seeds in the fast world",
     parameters=EvaluateParameters,
     reads={},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 
 from schemas.agent_episode import AgentEpisode
+from schemas.apartment import Apartment
 from schemas.errors import BadInput
 from stages.agent.arms.registry import ARMS
 from stages.agent.brains.open_loop import OpenLoopBrain
@@ -31,6 +32,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         file.seed,
         Limits(turns=file.most_turns),
         world=file.simulation,
+        known=Apartment.read(episode.path("known.json")) if episode.path("known.json").is_file() else None,
     )
     made = write_episode(
         context.output,

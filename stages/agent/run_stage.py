@@ -6,6 +6,8 @@ from pathlib import Path
 
 from schemas.agent_episode import AgentEpisode
 from schemas.apartment import Apartment
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
 from schemas.outside import LARGEST_SETTINGS
 from stages.agent.arms.registry import ARMS
 from stages.agent.brains.brain import Brain
@@ -16,17 +18,32 @@ from stages.agent.session import Limits
 from stages.agent.tasks import TASKS, make_apartment, make_household
 from stages.agent.trials import Setting, goals_of, rules_brain
 from stages.agent.world.failures import Rates
+from stages.agent.world.reconstructed import apartment_of
 from stages.kit.language.chat import Chat
 from stages.kit.language.opening import open_chat
 from stages.kit.language.scripted import ScriptedBackend
 from stages.kit.stage import Context
 
 
-def run(world: Path | None, transcript: Path | None, *, parameters: RunParameters, context: Context) -> AgentEpisode:
-    """Let the robot do what it is told."""
+def run(
+    world: Path | None,
+    scene: InteractiveScene | None,
+    truth: GroundTruth | None,
+    transcript: Path | None,
+    *,
+    parameters: RunParameters,
+    context: Context,
+) -> AgentEpisode:
+    """Let the robot do what it is told: in the true room of `truth`, of which it knows `scene` from the start, in
+    `world`, or in an apartment of the seed."""
     task = TASKS.get(parameters.task)
     words = task.words if task else parameters.task
-    if world is not None:
+    known = None
+    if scene is not None and truth is not None:
+        known = apartment_of(scene.info.bodies, str(scene.root))
+        room = InteractiveSceneFile.read(truth.path("room") / "scene.json")
+        apartment = apartment_of(room.bodies, str(truth.root))
+    elif world is not None:
         apartment = Apartment.read(world, largest=LARGEST_SETTINGS, hint="see docs/AGENT.md")
     else:
         apartment = make_apartment(task, context.seed) if task else make_household(context.seed)
@@ -38,6 +55,7 @@ def run(world: Path | None, transcript: Path | None, *, parameters: RunParameter
         context.seed,
         Limits(turns=parameters.turns),
         world=parameters.simulation,
+        known=known,
     )
     chat = _chat(parameters, transcript, context) if parameters.brain == "language" else None
     brain: Brain = LanguageBrain(words, chat) if chat is not None else rules_brain(setting, parameters.arm)

@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, pi
 
-from stages.agent.body import Base, Body, Detection, Position, SeenFurniture
-from stages.agent.goals import CARRIERS
+from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sweep
+from stages.agent.goals import CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
 
@@ -19,8 +19,21 @@ SURE = 0.8
 """A thing is taken to be on a small carrier within this share of its radius: nearer to the rim it may lean on it."""
 UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
+CARRIES = 0.09
+"""Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
 Region = tuple[int | str, bool]
-"""Quarter turn (or `hand`) from which something was seen, and whether from near by."""
+"""Quarter turn (or `hand`, or `map`) from which something was seen, and whether from near by."""
+MAPPED: Region = ("map", False)
+"""Of what was mapped before the robot came."""
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """What was mapped of a place before the robot came."""
+
+    floor: Sweep
+    things: tuple[tuple[int, Detection], ...]
+    """Number of the furniture that each is on or in, and the thing."""
 
 
 @dataclass
@@ -50,6 +63,14 @@ class Item:
         own = said.pop(self.label, 0)
         return own - max([*said.values(), len(self.sides(seen=False))])
 
+    @property
+    def doubt(self) -> str:
+        """The class that it may as well be, as many regions say the one as the other; empty without one."""
+        said = Counter(vote for vote in self.votes.values() if vote is not None)
+        own = said.pop(self.label, 0)
+        other, count = said.most_common(1)[0] if said else ("", 0)
+        return other if count == own else ""
+
     def sides(self, *, seen: bool) -> set[int | str]:
         """Return the sides from which it was seen from near or far, or from which it should have been and was not:
         what hides a thing hides it from a side."""
@@ -59,33 +80,51 @@ class Item:
     @property
     def used(self) -> bool | None:
         """What most regions say; None where it could not be told, or as many say the one as the other."""
-        said = list(self.used_votes.values())
-        yes = said.count(True)
-        return None if 2 * yes == len(said) else 2 * yes > len(said)
+        return None if self.used_margin == 0 else self.used_margin > 0
+
+    @property
+    def used_margin(self) -> int:
+        """By how many regions more say that it is used than that it is clean."""
+        return sum(1 if used else -1 for used in self.used_votes.values())
 
 
 class SceneMap:
     """Furniture and things by key, names given in the order in which they were found."""
 
     def __init__(self, body: Body) -> None:
+        self.careful = False
+        """Whether doubts are told, and classes that a thing is too wide or too narrow for do not count."""
         self.furniture: dict[str, SeenFurniture] = {}
         self.items: dict[str, Item] = {}
         self.obstacles = ObstacleMap(body.base, body.clearance)
         self._named: Counter[str] = Counter()
-        self._same_thing = body.same_thing
+        self._same_thing, self._enough = body.same_thing, body.enough
+
+    def know(self, before: Mapped) -> None:
+        """Believe in what somebody mapped before, the things as if one view had shown them."""
+        self.obstacles.add(before.floor)
+        keys = [self._enter(seen) for seen in before.floor.furniture]
+        for number, detection in before.things:
+            self.add(detection, keys[number], MAPPED)
 
     def sweep(self, body: Body) -> int:
         """Turn the head camera around and enter what it saw; return how many cells are new."""
         sweep = body.sweep()
         for seen in sweep.furniture:
-            key = next((k for k, f in self.furniture.items() if _same_piece(f, seen)), None)
-            self.furniture[key or self._name(seen.label)] = seen
+            self._enter(seen)
         return self.obstacles.add(sweep)
 
+    def _enter(self, seen: SeenFurniture) -> str:
+        known = next((k for k, f in self.furniture.items() if _same_piece(f, seen)), None)
+        key = known or self._name(seen.label)
+        self.furniture[key] = seen
+        return key
+
     def in_front(self, base: Base) -> str:
-        """Return the key of the furniture before a base pose, or nothing."""
-        near = [(edge_distance(f, base.x, base.y), key) for key, f in self.furniture.items()]
-        return min(near)[1] if near and min(near)[0] <= IN_FRONT else ""
+        """Return the key of the furniture before a base pose, rather what it faces; or nothing."""
+        near = [(edge_distance(f, base.x, base.y), key, f) for key, f in self.furniture.items()]
+        near = [entry for entry in near if entry[0] <= IN_FRONT]
+        return min(((not _faces(base, f), gap, key) for gap, key, f in near), default=(False, 0.0, ""))[2]
 
     def add(self, detection: Detection, place: str, region: Region) -> Item:
         """Enter a detection: a vote of its region for the thing that lies there, or a new thing."""
@@ -93,7 +132,9 @@ class SceneMap:
         if item is None:
             key = self._name(detection.label)
             item = self.items[key] = Item(key, detection.position, detection.color, detection.radius, place)
-        item.votes[region] = detection.label
+        no_class_of_its_width = CARRIERS if detection.radius < CARRIES else SMALL
+        if not self.careful or detection.label not in no_class_of_its_width:
+            item.votes[region] = detection.label
         item.position = detection.position
         if detection.used is not None:
             item.used_votes[region] = detection.used
@@ -123,7 +164,9 @@ class SceneMap:
             piece = self.furniture[key]
             return SceneObject(key, piece.label, door=piece.door, opened=piece.opened)
         item = self.items[key]
-        return SceneObject(key, item.label, item.place, item.color, item.used, on=self.carrier_of(item))
+        doubt, ahead = (item.doubt, min(item.margin, self._enough)) if self.careful else ("", 0)
+        on = self.carrier_of(item)
+        return SceneObject(key, item.label, item.place, item.color, item.used, on=on, doubt=doubt, ahead=ahead)
 
     def global_map(self) -> ObjectMap:
         """Return the furniture."""
@@ -141,6 +184,14 @@ class SceneMap:
         name = f"{label.replace(' ', '_')}_{self._named[label]}"
         self._named[label] += 1
         return name
+
+
+def _faces(base: Base, piece: SeenFurniture) -> bool:
+    """Whether the nearest point of a piece of furniture is within 45 degrees of where a base pose looks."""
+    x, y = (
+        min(max(p, c - s / 2), c + s / 2) for p, c, s in zip((base.x, base.y), piece.centre, piece.size, strict=True)
+    )
+    return abs((atan2(y - base.y, x - base.x) - base.yaw + pi) % (2 * pi) - pi) <= pi / 4
 
 
 def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from schemas.apartment import Apartment
@@ -20,6 +20,7 @@ from stages.agent.session import Limits, Session, Turn, run_session
 from stages.agent.world.failures import Rates
 from stages.agent.world.fast import FastWorld
 from stages.agent.world.floor import Floor
+from stages.agent.world.reconstructed import mapped
 from stages.agent.world.truth import World
 from stages.kit.rendering.segmenter_errors import Luck
 
@@ -40,6 +41,8 @@ class Setting:
     floor: Floor | None = None
     """Of the apartment, where several trials share it."""
     world: WorldName = "fast"
+    known: Apartment | None = None
+    """What was mapped of it before the robot came, as far as it is right."""
 
 
 def goals_of(words: str) -> tuple[Goal, ...]:
@@ -53,18 +56,18 @@ def goals_of(words: str) -> tuple[Goal, ...]:
 def open_world(setting: Setting, arm: str) -> World:
     """Return the world of a trial: its eyes are prompted with the classes that the goals name. Close it.
 
-    In physics what hides a thing is in the way of the camera, so that hiding is not drawn. Raises UsageError for goals
-    with doors there.
+    Raises UsageError for goals with doors in physics.
     """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
     if setting.world == "physics":
-        from stages.agent.world.physics.body import DOORS, PhysicsBody  # heavy: pybullet and Open3D
+        from stages.agent.world.physics.body import PhysicsBody  # heavy: pybullet and Open3D
+        from stages.agent.world.physics.seen import DOORS
 
         if any(set(each.labels) & set(DOORS) for goal in setting.goals for each in descriptions(goal)) or any(
             isinstance(goal, Move) and goal.start in DOORS for goal in setting.goals
         ):
             raise UsageError("doors of the physics world do not move", hint="give --simulation fast")
-        return PhysicsBody(setting.apartment, sought(setting.goals), replace(rates, hidden=0.0), setting.seed)
+        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 
 
@@ -91,6 +94,8 @@ def run_trial(
     """Run one trial; close its world. A brain that is given answers turn by turn, unless it is to say `one_program`."""
     world = open_world(setting, arm)
     skills = ARMS[arm].skills(world)
+    if setting.known is not None:
+        skills.scene.know(mapped(setting.known))
 
     def see(turn: Turn) -> None:
         if watch is not None:

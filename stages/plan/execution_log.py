@@ -10,12 +10,10 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import Message
-from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
-from mcap_protobuf.schema import build_file_descriptor_set
 
 from schemas.scene_parts import Camera
 from stages.kit.formats import foxglove
+from stages.kit.formats.foxglove_log import foxglove_log
 from stages.kit.motion.recording import Snapshot
 
 COLOR, CALIBRATION, TRANSFORMS = "/camera/color", "/camera/calibration", "/tf"
@@ -33,14 +31,7 @@ def write_execution(
 
     A frame that did not move since it was last said (0.1 mm, 0.1 mrad) is not said again.
     """
-    with Path(path).open("wb") as file:
-        writer = McapWriter(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
-        writer.start(profile="", library="scenewright")
-        channels = {}
-        for topic, kind in _KINDS.items():
-            data = build_file_descriptor_set(kind).SerializeToString(deterministic=True)
-            schema = writer.register_schema(kind.DESCRIPTOR.full_name, "protobuf", data)
-            channels[topic] = writer.register_channel(topic, "protobuf", schema)
+    with foxglove_log(path, _KINDS) as add:
         last = -1
         logged: dict[str, np.ndarray] = {}
         for index, snapshot in enumerate(snapshots):
@@ -54,17 +45,12 @@ def write_execution(
             message = FrameTransforms()
             for name in changed:
                 message.transforms.extend(foxglove.transforms_message(stamp, "world", name, poses[name]).transforms)
-            _add(writer, channels[TRANSFORMS], stamp, message)
+            add(TRANSFORMS, stamp, message)
             if index in images:
-                _add(writer, channels[CALIBRATION], stamp, foxglove.calibration_message(stamp, camera, "camera"))
+                add(CALIBRATION, stamp, foxglove.calibration_message(stamp, camera, "camera"))
                 jpeg = foxglove.encode_jpeg(images[index])
-                _add(writer, channels[COLOR], stamp, foxglove.color_message(stamp, jpeg, "camera"))
-        writer.finish()
+                add(COLOR, stamp, foxglove.color_message(stamp, jpeg, "camera"))
 
 
 def _differs(first: np.ndarray, second: np.ndarray) -> bool:
     return bool(np.abs(first - second).max() > 1e-4)
-
-
-def _add(writer: McapWriter, channel: int, stamp: int, message: Message) -> None:
-    writer.add_message(channel, stamp, message.SerializeToString(deterministic=True), publish_time=stamp)

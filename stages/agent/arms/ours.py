@@ -18,8 +18,8 @@ from stages.agent.exploration import explore
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from stages.agent.scene_map import Item, quarter
 
-ENOUGH = 2
-"""Regions of views by which a class has to be ahead before anything is done about it."""
+SURE_OF_USE = 2
+"""Regions of views by which a thing has to be ahead in being clean or used."""
 MOST_VIEWS = 6
 TRIES = 6
 """Executions within one call."""
@@ -58,17 +58,20 @@ class OwnSkills(CommonSkills):
     def __init__(self, body: Body, mechanisms: Mechanisms | None = None) -> None:
         super().__init__(body)
         self._use = mechanisms or Mechanisms()
+        self.scene.careful = self._use.agreement
         self._bad: dict[str, list[tuple[Base, Position]]] = {}
         """Furniture -> base poses that failed, and what for."""
         self._off: list[Position] = []
         """Spots from which something rolled off."""
         self._looked: dict[str, set[int]] = {}
         self._explored = False
+        self._told: set[str] = set()
+        """Things of which the brain was told that they may be something else: it is done if it asks again."""
 
     # ---- eyes ----
 
     def explore_local(self, place: str) -> ObjectMap:
-        """Look from here, where that was done already from another side, and where there is none at each thing from
+        """Look from here; where that was done already, from another side, then at each thing that is not sure yet from
         near by. What was seen before stays."""
         piece, looked = self.scene.furniture[place], self._looked.get(place, set())
         again = self._use.other_sides and quarter(self._body.base, piece.centre) in looked
@@ -78,7 +81,7 @@ class OwnSkills(CommonSkills):
         self._look(place)
         if self._use.agreement:
             for item in [i for i in self.scene.items.values() if i.place == place]:
-                if len(set(item.votes.values())) > 1:
+                if again or len(set(item.votes.values())) > 1:
                     self._confirm(item)
         return self.scene.local_map(place)
 
@@ -95,9 +98,10 @@ class OwnSkills(CommonSkills):
         item = self.scene.items[target.key]
         for _ in range(MOST_VIEWS):
             if (quarter(self._body.base, item.position), True) in item.votes and self._use.other_sides:
-                self._go_round(item.place, {int(side) for side, close in item.votes if close and side != "hand"})
+                self._go_round(item.place, {side for side, close in item.votes if close and isinstance(side, int)})
             self._look(item.place, item)
-            if item.used is not None or item.key not in self.scene.items or not self._use.other_sides:
+            sure = abs(item.used_margin) >= (SURE_OF_USE if self._use.agreement else 1)
+            if sure or item.key not in self.scene.items or not self._use.other_sides:
                 break
         gone = item.key not in self.scene.items
         return Observation(target.key, () if gone else (item.label,), item.used)
@@ -120,18 +124,28 @@ class OwnSkills(CommonSkills):
 
     def _confirm(self, item: Item) -> None:
         """Take views of a thing until one class is enough ahead. Views of one region say the same, and by the error
-        model all others tell equally much, so that the next is the cheapest from where it was not seen yet."""
+        model all others tell equally much, so that the next is the cheapest from where it was not seen yet: from near
+        by wherever the arm gets there, else from another side."""
         for _ in range(MOST_VIEWS):
-            if item.margin >= ENOUGH or item.key not in self.scene.items:
+            if item.margin >= self._body.enough or item.key not in self.scene.items:
                 return
-            here = quarter(self._body.base, item.position)
-            if (here, True) not in item.votes and self._body.reaches(self._body.base, item.position):
+            near = self._near_by(item)
+            if near is not None and self._there(near, item.place):
                 self._look(item.place, item)
                 continue
-            seen = {int(side) for side, _ in item.votes if side != "hand"}
+            seen = {side for side, _ in item.votes if isinstance(side, int)}
             if not self._use.other_sides or not self._go_round(item.place, seen):
                 return
             self._look(item.place)
+
+    def _near_by(self, item: Item) -> Base | None:
+        """Return the nearest base pose from which the arm gets to a thing that was not looked at from near there."""
+        here = self._body.base
+        poses = [(0.0, here)] if self.scene.in_front(here) == item.place else []
+        if self._use.other_sides:
+            poses += drivable(self.scene, here, around(self.scene.furniture[item.place], self._body.stand_off))
+        fresh = (b for _, b in poses if (quarter(b, item.position), True) not in item.votes)
+        return next((base for base in fresh if self._body.reaches(base, item.position)), None)
 
     def _go_round(self, place: str, seen: set[int]) -> bool:
         """Drive to another side of furniture; False where none can be got to."""
@@ -218,6 +232,10 @@ class OwnSkills(CommonSkills):
                 return Outcome(False, "gone", f"{item.key} is not there, seen from {len(item.votes)} views")
             if item.label != believed:
                 return Outcome(False, "wrong_object", f"{item.key} is rather a {item.label}", label=item.label)
+            if item.doubt and item.key not in self._told:
+                self._told.add(item.key)
+                said = f"{item.key} may be a {item.label} or a {item.doubt}: {len(item.votes)} views do not agree"
+                return Outcome(False, "doubtful", said, label=item.doubt)
         place, candidate, tries = item.place, 0, 0
         last: Failure | None = None
         for base in self._stations(place, item.position):
@@ -244,11 +262,15 @@ class OwnSkills(CommonSkills):
         return self._unreachable(place, tries, last)
 
     def _holds(self, item: Item, held: str) -> Outcome:
+        """Count what the hand's view says as one more vote: it is of one region, as any other."""
         believed = item.label
         item.votes["hand", True] = held
         self.took(item)
         if held == believed:
             return Outcome(True)
+        if self._use.agreement and item.label == believed:
+            said = f"what the hand holds may be a {believed} or a {held}"
+            return Outcome(False, "doubtful_in_hand", said, label=held)
         return Outcome(False, "wrong_in_hand", f"what the hand holds looks like a {held}", label=held)
 
     def _found_again(self, item: Item) -> bool:
@@ -262,6 +284,7 @@ class OwnSkills(CommonSkills):
                 item.position = near[0].position
                 self.scene.items[item.key] = item
                 return True
+        self._looked[item.place] = {quarter(self._body.base, item.position)}
         return False
 
     def place(self, target: SceneObject) -> Outcome:
@@ -315,6 +338,7 @@ class OwnSkills(CommonSkills):
         self._off.append(at)
         if item.key in self.scene.items:
             return Outcome(False, "not_there", f"{item.key} lies beside {label}, not on it")
+        self._looked[place] = {quarter(self._body.base, at)}  # what was seen from other sides was before this
         return Outcome(False, "lost", f"{item.key} is not seen on {label}")
 
     def pull(self, key: str, *, opening: bool) -> Outcome:

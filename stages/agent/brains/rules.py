@@ -48,6 +48,7 @@ class RulesBrain:
 
     def __init__(self, words: str, style: Style, slips: Slips) -> None:
         self._words, self._style, self._slips = words, style, slips
+        self._goals: tuple[Goal, ...] = ()
         self._rooms: dict[str, SceneObject] = {}
         self._things: dict[str, SceneObject] = {}
         self._written: dict[str, str] = {}
@@ -55,6 +56,10 @@ class RulesBrain:
         self._looked: Counter[str] = Counter()
         self._failed: Counter[tuple[str, str]] = Counter()
         self._rejected: set[str] = set()
+        self._unmoved: set[str] = set()
+        """Those of them that the arm did not get."""
+        self._doubted: dict[str, str] = {}
+        """Key of what looked like something else in the hand -> as what."""
         self._checked: set[str] = set()
         self._moved: set[str] = set()
         self._handled: set[str] = set()
@@ -80,6 +85,7 @@ class RulesBrain:
             goals = understood(self._words)
         except NotUnderstood as error:
             return Reply(str(error), f"ask({str(error)!r})")
+        self._goals = goals
         if last is not None:
             self._learn(last)
         try:
@@ -165,8 +171,15 @@ class RulesBrain:
             self._lost.append(thing)
         if outcome.kind == "wrong_in_hand":
             self._held = replace(self._things.pop(thing.key), label=outcome.label)
+        elif outcome.kind == "doubtful_in_hand":
+            self._held = replace(self._things.pop(thing.key), doubt=outcome.label)
+            self._doubted[thing.key] = outcome.label
+            self._put_back = not any(self._anyway(self._held, goal) for goal in self._goals)
+        elif outcome.kind == "doubtful":
+            self._things[thing.key] = replace(thing, doubt=outcome.label)
         elif outcome.kind == "unreachable" or tries >= MOST_FAILURES:
             self._rejected.add(thing.key)
+            self._unmoved.add(thing.key)
         else:
             self._at = thing.place
             self._look_again = True
@@ -248,7 +261,8 @@ class RulesBrain:
             return self._return_it(self._held)
         if self._held is not None:
             held = self._held
-            goals = tuple(g for g in goals if self._moves(g).fits(held.label, held.color, held.used))
+            labels = {held.label, held.doubt}
+            goals = tuple(g for g in goals if any(self._moves(g).fits(c, held.color, held.used) for c in labels))
             if not goals:
                 self._put_back = True
                 return self._return_it(held)
@@ -262,7 +276,35 @@ class RulesBrain:
             return self._look(f"Where is {missing[0].key}?")
         if missing:
             raise _GiveUp(f"{missing[0].key} got lost on the way")
+        for goal in goals:
+            left = self._left_over(goal)
+            if left:
+                raise _GiveUp(left)
         return self._write("Everything is where it belongs.", "done", "", "done()")
+
+    def _left_over(self, goal: Goal) -> str:
+        """Say why a goal about all things of a kind is not known to be met: one was left alone, or may be of it."""
+        what = goal.around if isinstance(goal, Among) else goal.what
+        if not isinstance(goal, Among | Gather) and not (isinstance(goal, Move) and goal.every):
+            return ""
+        for thing in self._things.values():
+            started = (
+                not isinstance(goal, Move)
+                or not goal.start
+                or thing.place in self._furniture(Description((goal.start,)))
+            )
+            if not started or (isinstance(goal, Move) and self._is_on(thing, goal.onto, "place")):
+                continue
+            doubt = thing.doubt or self._doubted.get(thing.key, thing.label)
+            if (thing.label in what.labels) != (doubt in what.labels):
+                return f"{thing.key} may be a {thing.label} or a {doubt}"
+            if (
+                not isinstance(goal, Among)
+                and thing.key in self._unmoved
+                and what.fits(thing.label, thing.color, thing.used)
+            ):
+                return f"{thing.key} could not be moved"
+        return ""
 
     def _is_missed(self, thing: SceneObject, goal: Goal) -> bool:
         every = isinstance(goal, Gather) or (isinstance(goal, Move) and goal.every)
@@ -297,15 +339,16 @@ class RulesBrain:
             unseen = [p for p in needed if self._looked[p] < (self._style.thorough if all_of_them else 1)]
             if unseen:
                 return self._go_and_look(unseen[0])
-        there = [t for t in self._fitting(what) if self._is_on(t, onto, how)]
+        fitting = [t for t in self._things.values() if t.key not in self._rejected]
+        fitting = [t for t in fitting if t in self._fitting(what) or self._anyway(t, goal)]
+        there = [t for t in fitting if self._is_on(t, onto, how)]
         away = [
-            t
-            for t in self._fitting(what)
-            if t not in there and (not goal.start or t.place in starts or t.label in self._handled)
+            t for t in fitting if t not in there and (not goal.start or t.place in starts or t.label in self._handled)
         ]
         if self._held is None and ((there and not goal.every) or (goal.every and not away and there)):
             return None
-        thing = self._held or next(iter(sorted(away, key=lambda t: (t.place != self._at, t.key))), None)
+        away.sort(key=lambda t: (t.place != self._at, -t.ahead, t.key))
+        thing = self._held or next(iter(away), None)
         if thing is None:
             return self._search(what, starts)
         target = self._carrier(onto)
@@ -450,7 +493,17 @@ class RulesBrain:
         return [key for key, item in self._rooms.items() if item.label in what.labels]
 
     def _fitting(self, what: Description) -> list[SceneObject]:
-        return [t for t in self._things.values() if what.fits(t.label, t.color, t.used) and t.key not in self._rejected]
+        fitting = [t for t in self._things.values() if what.fits(t.label, t.color, t.used)]
+        return [t for t in fitting if t.key not in self._rejected and t.doubt in ("", *what.labels)]
+
+    def _anyway(self, thing: SceneObject, goal: Goal) -> bool:
+        """Whether what may as well be of a kind as not is brought: where all are to be, unless another goal is about
+        what else it may be."""
+        if not (isinstance(goal, Move) and goal.every and thing.doubt):
+            return False
+        classes = {thing.label, thing.doubt}
+        others = {label for g in self._goals if g is not goal for label in self._moves(g).labels}
+        return bool(classes & set(goal.what.labels)) and not classes & others
 
     def _is_on(self, thing: SceneObject, onto: Description, how: str) -> bool:
         if how == "place_among":

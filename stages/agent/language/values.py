@@ -23,11 +23,16 @@ class SceneObject:
     opened: bool = False
     on: str = ""
     """Key of the small carrier (plate, box) on which it lies."""
+    doubt: str = ""
+    """The class that it may as well be."""
+    ahead: int = 0
+    """By how many regions of views its class is ahead of any other, three at most."""
 
     @property
     def text(self) -> str:
         """As feedback says it."""
         look = [] if self.key.startswith(self.label.replace(" ", "_")) else [f"looks like a {self.label}"]
+        look += [f"may be a {self.doubt}"] if self.doubt else []
         look += [self.color] if self.color else []
         look += [] if self.used is None else ["used" if self.used else "clean"]
         look += [] if not self.door else ["open" if self.opened else "closed"]

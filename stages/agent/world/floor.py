@@ -57,6 +57,10 @@ class Floor:
             return False
         return not self.occupied[i - k : i + k + 1, j - k : j + k + 1].any()
 
+    def cells(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return free and occupied cells (N, 2) of all that there is."""
+        return np.argwhere(~self.occupied) + self._corner, np.argwhere(self.occupied) + self._corner
+
     def swept(self, base: Base) -> Swept:
         """Return free and occupied cells (N, 2) that are seen from a base pose, and numbers of furniture made out."""
         at = (base.x, base.y)

@@ -35,9 +35,16 @@ class World(Body, Protocol):
     """A world that a trial runs in: the robot in it, and the truth for the judge alone."""
 
     apartment: Apartment
-    metres: float
-    pictures: list[tuple[str, np.ndarray]]
-    """What the wrist camera took last, (H, W, 3) uint8, with a name each; none in a world without pictures."""
+
+    @property
+    def metres(self) -> float:
+        """Driven so far."""
+        ...
+
+    @property
+    def pictures(self) -> list[tuple[str, np.ndarray]]:
+        """What the wrist camera took last, (H, W, 3) uint8, with a name each; none in a world without pictures."""
+        ...
 
     @property
     def bodies(self) -> Mapping[str, Lying]:

@@ -57,6 +57,9 @@ class Mask:
 class Segmenter(Protocol):
     """A segmentation backend. `view` names the region of views."""
 
+    missed: set[str]
+    """Things of which an oracle knows that they were in a picture and are not among its masks."""
+
     def masks(self, picture: Picture, view: tuple[object, ...]) -> list[Mask]:
         """Return the things of a picture."""
         ...

@@ -123,6 +123,11 @@ class Room:
 
     # ---- truth ----
 
+    def gap(self, piece: Furniture, x: float, y: float) -> float:
+        """Return the free distance [m] of a point from a piece of furniture."""
+        off = [max(0.0, abs(p - c) - s / 2) for p, c, s in zip((x, y), piece.centre, piece.size, strict=True)]
+        return hypot(*off)
+
     def lies(self, name: str) -> tuple[float, float, float]:
         """Return the middle of a thing's foot [m], world frame."""
         if name not in self.world.bodies:

@@ -1,0 +1,106 @@
+"""Driving along the robot's own map: asked for contacts where the hand is empty, simulated where it holds something."""
+
+from __future__ import annotations
+
+from math import atan2, pi
+
+import numpy as np
+
+from stages.agent.body import Base, Felt
+from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.agent.world.physics.seen import Seen
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.segments import Segment
+from stages.kit.simulation.engine import engine
+from stages.kit.simulation.robot import Configuration
+
+LOCALISATION, TURNED = 0.008, 0.006
+"""Standard deviation of where the base thinks that it stands [m], [rad], drawn at every stop."""
+STEP = 0.05
+"""Between poses of the base at which collisions are looked for [m]."""
+
+
+class Driving:
+    """The base of a robot."""
+
+    def __init__(self, robot: RobotInRoom, seen: Seen) -> None:
+        self._robot, self._seen = robot, seen
+
+    def drive(self, base: Base, length: float, toward: str) -> Felt:
+        """Drive along the robot's own map; with empty hands it is moved and asked for contacts, not simulated."""
+        goal = np.array([base.x, base.y, base.yaw])
+        way = self._seen.obstacles.path(self._robot.base, (base.x, base.y))
+        failed = MotionFailed("no_way", "the obstacle map shows no way there") if way is None else None
+        if way is not None:
+            if not np.allclose(self._robot.arm, self._robot.description.carry):
+                self._robot.arm_to(self._robot.description.carry)
+            error = self._robot.random.normal(0, 1, 3) * (LOCALISATION, LOCALISATION, TURNED)
+            points = [np.array([*point, 0.0]) - self._robot.error for point in way[1:-1]]
+            ease = [self._seen.obstacles.at_ease(*point) for point in way[1:-1]]
+            for turns in (ease, [False] * len(ease), [True] * len(ease)):
+                start = self._robot.true_base()
+                failed = self._roll_along(start, _facing_on(start, points, turns, goal - error))
+                if failed is None:
+                    break
+            self._robot.error = error
+            self._robot.believed = goal if failed is None else self._robot.true_base() + error
+            self._robot.believed[2] = (self._robot.believed[2] + pi) % (2 * pi) - pi
+            self._robot.metres += length
+        if toward:
+            self._robot.log.done("drive", f"drive to {toward.rsplit('_', 1)[0]}", failed is None, "navigation", "")
+        return Felt(True) if failed is None else Felt(False, "no_way", failed.failure)
+
+    def _roll_along(self, start: np.ndarray, rows: list[np.ndarray]) -> MotionFailed | None:
+        arm = self._robot.arm + self._robot.joint_error
+        if self._robot.hold is not None:
+            try:
+                self._robot.driver.follow(Segment(_whole_body_rows(np.array([start, *rows]), arm), 0.0), None)
+            except MotionFailed as failed:
+                if failed.failure.kind == "path_blocked":
+                    return failed
+            return None
+        here = start
+        opening = self._robot.driver.robot.configuration().opening
+        for row in rows:
+            count = max(1, int(np.ceil(np.abs(row - here)[:2].max() / STEP)))
+            for k in range(1, count + 1):
+                at = here + (row - here) * k / count
+                self._robot.driver.robot.set_body(np.concatenate([at, arm]))
+                struck = self._struck()
+                if struck:
+                    back = here + (row - here) * (k - 1) / count
+                    self._robot.driver.put(Configuration(back, arm, opening))
+                    return MotionFailed("path_blocked", f"the base touched {struck}", (struck,))
+            self._robot.seconds_aside += float(np.linalg.norm((row - here)[:2])) / self._robot.description.base_speed
+            here = row
+        self._robot.driver.put(Configuration(here, arm, opening))
+        self._robot.seconds_aside += 1.0
+        return None
+
+    def _struck(self) -> str:
+        engine.performCollisionDetection(physicsClientId=self._robot.room.world.client)
+        for contact in self._robot.room.world.contacts(self._robot.driver.robot.body_id):
+            name = self._robot.room.world.name_of(contact.other_body)
+            if name is not None and name != "floor" and contact.depth > 0.001:
+                return self._robot.room.world.bodies[name].record.class_name
+        return ""
+
+
+def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    """Return (N, 10) rows of base poses (N, 3) with one arm (7,)."""
+    return np.concatenate([bases, np.tile(arm, (len(bases), 1))], axis=1)
+
+
+def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:
+    """Return base poses (3,) through points to a goal pose that turn little from each to the next: along the way at
+    points where it `turns`, as before at the others, for the base drives to any side."""
+    made: list[np.ndarray] = []
+    before = start
+    for point, turn in zip([*points, goal], [*turns, True], strict=True):
+        turned = point.copy()
+        if len(made) < len(points):
+            turned[2] = atan2(point[1] - before[1], point[0] - before[0]) if turn else before[2]
+        turned[2] = before[2] + (turned[2] - before[2] + pi) % (2 * pi) - pi
+        made.append(turned)
+        before = turned
+    return made

@@ -1,0 +1,219 @@
+"""Handling: grasps of what was seen, letting go, doors. Grasps, falls and collisions are pybullet's."""
+
+from __future__ import annotations
+
+from math import hypot
+
+import numpy as np
+
+from stages.agent.body import Base, Felt, FeltKind, Position
+from stages.agent.world.physics.hands import (
+    DROP,
+    JUST_OVER,
+    SOME_WAY_OVER,
+    Motion,
+    Target,
+    plan_grasp,
+    plan_release,
+    reachable,
+)
+from stages.agent.world.physics.looking import Looking
+from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
+from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.segments import Segment, whole_body
+from stages.kit.simulation.robot import Configuration
+
+CLOSED_ON_NOTHING = 0.004
+"""Opening of the fingers below which they hold nothing [m]."""
+
+
+class Handling:
+    """The hand of a robot."""
+
+    def __init__(self, robot: RobotInRoom, seen: Seen, looking: Looking) -> None:
+        self._robot, self._seen, self._looking = robot, seen, looking
+
+    def reaches(self, base: Base, at: Position) -> bool:
+        """Whether a free arm pose over a position exists in the robot's own map, from a base pose."""
+        self._robot.beliefs.hold(None)
+        self._robot.beliefs.show(self._seen.boxes(at))
+        return reachable(self._robot.beliefs, np.array([base.x, base.y, base.yaw]), at, np.random.default_rng(5))
+
+    def grasp(self, at: Position, label: str, candidate: int) -> Felt:
+        """Take the surface that was seen at a position. A slip and a wrong thing are not felt."""
+        meant = self._nearest_thing(at)
+        step = f"grasp {meant}" if meant and self._robot.room.things[meant].label == label else f"grasp a {label}"
+        if self._robot.carried is not None or self._robot.hold is not None:
+            self._robot.log.done("grasp", step, False, "api", "")
+            return Felt(False, "no_grasp")
+        try:
+            self._take(at, candidate)
+        except MotionFailed as failed:
+            self._recover()
+            self._robot.log.done("grasp", step, False, "grasp", "")
+            return Felt(False, _felt_kind(failed), failed.failure)
+        held = self._robot.driver.held
+        self._robot.carried = held
+        right = held is not None and self._robot.room.things[held].label == label
+        cause = "grasp" if held is None else "false_positive"
+        self._robot.log.done("grasp", step, right, cause, self._robot.room.things[held].label if held else "")
+        return Felt(True)
+
+    def _see_from_here(self, at: Position) -> None:
+        """Look once more at what will be grasped: what was measured from another stop is off by both stops' errors."""
+        if self._looking.looked_from == self._robot.base:
+            return
+        before = self._seen.surfaces
+        self._looking.look(at, close=True)
+        if not any(hypot(s.middle[0] - at[0], s.middle[1] - at[1]) <= FOUND_WITHIN for s in self._seen.surfaces):
+            self._seen.surfaces = before
+
+    def _take(self, at: Position, candidate: int) -> None:
+        self._see_from_here(at)
+        away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._seen.surfaces]
+        number = int(np.argmin(away)) if away else -1
+        if number < 0 or away[number] > FOUND_WITHIN:
+            raise MotionFailed("no_grasp", "no surface was seen there", (), {"distance": min(away, default=9.0)})
+        surface = self._seen.surfaces[number]
+        self._seen.surfaces = [s for s in self._seen.surfaces if s is surface or not s.same_as(surface)]
+        number = next(k for k, s in enumerate(self._seen.surfaces) if s is surface)
+        self._robot.beliefs.hold(None)
+        self._robot.beliefs.show(self._seen.boxes())
+        piece = self._seen.piece_at(at)
+        floor = self._seen.tops.get(piece, float(surface.low[2])) if piece is not None else float(surface.low[2])
+        target = Target(surface, f"thing_{number}", candidate, floor)
+        motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, self._robot.random)
+        self._robot.grasps += 1
+        self._robot.carry_out(motion.there)
+        self._close_hand()
+        self._seen.surfaces.pop(number)
+        self._robot.hold = motion.hold
+        try:
+            self._robot.carry_out(motion.away)
+        except MotionFailed:
+            self._robot.driver.release()  # lifting is blocked: let go
+            self._robot.hold = None
+            raise
+        if self._robot.driver.robot.configuration().opening < CLOSED_ON_NOTHING:
+            self._robot.hold = None
+            self._robot.driver.held = None
+
+    def _close_hand(self) -> None:
+        tool = self._robot.driver.robot.tool_pose()[:3, 3]
+        world = self._robot.room.world
+        near = [(float(np.linalg.norm(world.center_of_mass(n)[:3, 3] - tool)), n) for n in self._loose()]
+        world.wake()
+        for _, name in sorted(near)[:2]:
+            self._robot.room.moved[name] += 1
+        try:
+            self._robot.driver.grasp(min(near)[1] if near else "")
+        except (MotionFailed, KeyError):
+            self._robot.driver.held = None
+
+    def _loose(self) -> list[str]:
+        return [name for name in self._robot.room.things if name in self._robot.room.world.bodies]
+
+    def _recover(self) -> None:
+        """Draw the arm in after a motion that could not be planned or was stopped, with what it holds."""
+        if self._robot.hold is not None:
+            self._robot.arm = self._robot.measured_arm()
+            self._robot.arm_to(self._robot.description.carry)
+            return
+        self._robot.arm = self._robot.description.carry
+        start = Configuration(
+            self._robot.true_base(), self._robot.arm + self._robot.joint_error, self._robot.description.opening
+        )
+        self._robot.driver.put(start)
+
+    def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
+        """Let go 15 cm over a position, or gently: down to contact."""
+        name = self._robot.carried
+        step = f"place {name or 'nothing'} on {label}"
+        if name is None:
+            self._robot.hold = None
+            self._robot.log.done("release", step, False, "", "")
+            return Felt(True)
+        here = (at[0], at[1], self._seen.support(at))
+        self._robot.beliefs.show(self._seen.boxes(at))
+        try:
+            self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
+        except MotionFailed as failed:
+            self._recover()
+            self._robot.log.done("release", step, False, "place", "")
+            return Felt(False, "no_trajectory", failed.failure)
+        body = self._robot.room.body(name, None)
+        on = self._robot.room.furniture[body.on].label if body.on in self._robot.room.furniture else ""
+        on = self._robot.room.things[body.on].label if body.on in self._robot.room.things else on
+        self._robot.log.done("release", step, on == label, "place", "")
+        return Felt(True)
+
+    def _way_down(self, here: Position, heights: tuple[float, ...]) -> Motion:
+        """Plan to let go at the first of the heights over a position that can be got to. Raises MotionFailed."""
+        for number, height in enumerate(heights):
+            try:
+                return plan_release(
+                    self._robot.beliefs,
+                    self._robot.believed,
+                    self._robot.arm,
+                    self._robot.hold,
+                    here,
+                    height,
+                    self._robot.random,
+                )
+            except MotionFailed:
+                if number + 1 == len(heights):
+                    raise
+        raise AssertionError("unreachable")
+
+    def _let_go(self, motion: Motion, gently: bool) -> None:
+        reach, down = motion.there
+        self._robot.carry_out((reach,))
+        parts = np.array_split(down.path, min(4, len(down.path))) if gently else [down.path]
+        for rows in parts:
+            self._robot.carry_out((Segment(rows, 0.0, down.pace),))
+            if gently and self._touches():
+                break
+        held = self._robot.carried
+        self._robot.driver.release()
+        self._robot.carried, self._robot.hold = None, None
+        if held is not None:
+            self._robot.room.moved[held] += 1
+        back = np.concatenate([self._robot.arm[None], motion.away[0].path[:, 3:]])
+        rows = whole_body(self._robot.true_base(), back)
+        try:
+            self._robot.carry_out(
+                (Segment(rows, self._robot.description.opening, motion.away[0].pace), *motion.away[1:])
+            )
+        except MotionFailed:
+            self._recover()  # it let go already: what became of it is for the eyes
+        self._robot.driver.wait(0.5)
+
+    def _touches(self) -> bool:
+        """Whether the wrist feels that what is held stands on something."""
+        if self._robot.carried is None:
+            return True
+        own = self._robot.room.world.bodies[self._robot.carried].body_id
+        contacts = self._robot.room.world.contacts(own)
+        return sum(c.force for c in contacts if c.other_body != self._robot.driver.robot.body_id) > 1.0
+
+    def pull(self, at: Position, *, opening: bool) -> Felt:
+        """Doors of this world do not move."""
+        self._robot.log.done("pull", f"{'open' if opening else 'close'} something", False, "grasp", "")
+        return Felt(False, "door_stuck")
+
+    def _nearest_thing(self, at: Position) -> str:
+        true = apply(inverse(self._robot.map_from_true()), np.array([at], float))[0]
+        near = [
+            (hypot(x - true[0], y - true[1]), name)
+            for name in self._loose()
+            if not self._robot.room.things[name].carries
+            for x, y, _ in [self._robot.room.lies(name)]
+        ]
+        return min(near)[1] if near and min(near)[0] <= FOUND_WITHIN else ""
+
+
+def _felt_kind(failed: MotionFailed) -> FeltKind:
+    kinds: dict[str, FeltKind] = {"no_grasp": "no_grasp", "no_inverse_kinematics": "out_of_reach"}
+    return kinds.get(failed.failure.kind, "no_trajectory")

@@ -1,0 +1,132 @@
+"""Looking: the head camera's turn over floor and furniture, the wrist camera's views of things, the hand's own."""
+
+from __future__ import annotations
+
+from math import atan2, cos, pi, sin
+
+import numpy as np
+
+from stages.agent.body import Base, Detection, Look, Position, Sweep
+from stages.agent.scene_map import quarter
+from stages.agent.world.physics import head
+from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Segmenter, Surface, fuse, seen_in, take
+from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
+from stages.kit.geometry.cameras import back_project
+from stages.kit.geometry.transforms import apply, inverse, look_at
+
+VIEW = np.array([0.0, -0.9, 0.0, -2.2, 0.0, 2.1, 0.785])
+"""Arm that holds the wrist camera over a surface in front, looking down by 45 degrees [rad]."""
+SIDEWAYS = (0.0, -0.5, 0.5)
+"""Turns of the first joint for the three wrist poses [rad]."""
+PICTURE_SECONDS = 0.5
+"""**Assumed**: of a picture."""
+
+
+class Looking:
+    """The eyes of a robot. `sought`: classes that they are asked for."""
+
+    def __init__(self, robot: RobotInRoom, seen: Seen, segmenter: Segmenter, sought: tuple[str, ...]) -> None:
+        self._robot, self._seen, self._segmenter, self._sought = robot, seen, segmenter, sought
+        self.looked_from: Base | None = None
+        self.pictures: list[tuple[str, np.ndarray]] = []
+        """What the wrist camera took last, for people."""
+
+    def sweep(self) -> Sweep:
+        """Turn the head camera around: floor, obstacles, large furniture."""
+        true, map_from_true = self._robot.true_base(), self._robot.map_from_true()
+        eye = np.array([true[0], true[1], head.HEIGHT])
+        renderer = self._robot.room.renderer(eye)
+        clouds = []
+        for turn in range(head.TURNS):
+            yaw = true[2] + 2 * pi * turn / head.TURNS
+            away = np.array([cos(yaw) * cos(head.PITCH), sin(yaw) * cos(head.PITCH), -sin(head.PITCH)])
+            pose = look_at(eye, eye + away)
+            picture = take(renderer, HEAD, pose, self._robot.random)
+            points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
+            there = head.steady(picture.depth).reshape(-1)
+            clouds.append(points[there])
+            numbers = picture.instance.reshape(-1)
+            for number in np.unique(numbers[there]):
+                name = self._robot.room.named.get(int(number), "")
+                own = there & (numbers == number) & (picture.depth.reshape(-1) < head.SURE)
+                if name in self._robot.room.furniture and own.sum() >= head.LEAST:
+                    head.enter(self._seen.pieces, self._robot.room.furniture[name].label, points[own])
+            self._robot.seconds_aside += PICTURE_SECONDS
+        free, occupied = head.cells_of(np.concatenate(clouds), apply(map_from_true, eye[None])[0])
+        sweep = Sweep(free, occupied, tuple(self._seen.furniture()))
+        self._seen.obstacles.add(sweep)
+        return sweep
+
+    def look(self, at: Position, *, close: bool) -> Look:
+        """Look at a surface from three wrist poses and fuse what they show, or at a thing at twice the resolution."""
+        sector, piece = quarter(self._robot.base, at), self._seen.piece_at(at)
+        toward = atan2(at[1] - self._robot.believed[1], at[0] - self._robot.believed[0]) - self._robot.believed[2]
+        toward = (toward + pi) % (2 * pi) - pi
+        found: list[Surface] = []
+        renderer = None
+        for turn in (0.0,) if close else SIDEWAYS:
+            arm = VIEW.copy()
+            arm[0] = np.clip(toward + turn, -2.7, 2.7)
+            self._robot.arm_to(arm)
+            pose, seen_pose = self._robot.wrist_poses()
+            renderer = renderer or self._robot.room.renderer(pose[:3, 3])
+            picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, at, close), self._robot.random)
+            camera = self._aimed(seen_pose, at, close)
+            if not close:  # a thing fills a picture from near by
+                self._seen.keep_top(picture, camera, piece)
+            masks = self._segmenter.masks(picture, (sector, close))
+            found += seen_in(picture, masks, camera, camera[:3, 3])
+            self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{turn:+.1f}", picture.color)]
+            self._robot.seconds_aside += PICTURE_SECONDS
+        for name in sorted(self._segmenter.missed):
+            if self._robot.room.things[name].label in self._sought:
+                self._robot.log.mistaken("missed", f"look {name}")
+        self._segmenter.missed.clear()
+        self.looked_from = self._robot.base
+        near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
+        old = [s for s in self._seen.surfaces if not self._seen.belongs(s, at, piece, close)]
+        self._seen.surfaces = old + near
+        return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
+
+    def _aimed(self, pose: np.ndarray, at: Position, close: bool) -> np.ndarray:
+        """Return a camera pose, with the crop of a near look turned to the position that it is of."""
+        if not close:
+            return pose
+        shift = self._robot.map_from_true()
+        target = np.array(at)
+        if np.allclose(pose, self._robot.wrist_poses()[0]):
+            target = apply(inverse(shift), target[None])[0]
+        return look_at(pose[:3, 3], target)
+
+    def _detection(self, surface: Surface, sector: int, close: bool, at: Position) -> Detection:
+        used = surface.stain >= STAINED if close else None
+        spot = tuple(np.round(surface.middle[:2], 1))
+        if close and self._robot.luck.happens(self._robot.rates.feedback, "used", spot, sector):
+            used = not used
+        low, high, middle = surface.low, surface.high, surface.middle
+        radius = float(max(high[0] - low[0], high[1] - low[1]) / 2)
+        position = (float(middle[0]), float(middle[1]), float(low[2]) + 0.02)
+        return Detection(surface.label, position, surface.color, used, radius)
+
+    def look_at_hand(self, view: int) -> Detection | None:
+        """See from the head what the hand holds; a view of one state may be misjudged for good."""
+        self._robot.seconds_aside += PICTURE_SECONDS
+        true = self._robot.true_base()
+        eye = np.array([true[0], true[1], head.HEIGHT])
+        tool = self._robot.driver.robot.tool_pose()[:3, 3]
+        picture = take(self._robot.room.renderer(eye), WRIST, look_at(eye, tool), self._robot.random)
+        near = [
+            (float(np.linalg.norm(s.middle - tool)), k, s)
+            for k, s in enumerate(
+                seen_in(picture, self._segmenter.masks(picture, ("hand", view)), look_at(eye, tool), eye)
+            )
+        ]
+        seen = min(near, default=None)
+        held = seen[2] if seen is not None and seen[0] < FOUND_WITHIN else None
+        position = (float(tool[0]), float(tool[1]), float(tool[2]))
+        if self._robot.luck.happens(self._robot.rates.feedback, "feedback", self._robot.grasps, view):
+            self._robot.log.mistaken("feedback", f"hand {self._robot.grasps}")
+            label = self._sought[0] if self._sought else "thing"
+            return Detection(label, position, "", None, 0.04) if held is None else None
+        return None if held is None else Detection(held.label, position, held.color, None, 0.04)

@@ -1,0 +1,126 @@
+"""The robot itself: where it is and where it believes to be, its arm by its encoders, what moves it, its clock.
+
+Two frames: the true one, in which pybullet lives, and the map's, which is where localisation says that things are.
+Between them lies an error that is drawn anew wherever the base comes to a stop. Joints stand a little beside where
+their encoders say.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+
+from stages.agent.body import Base
+from stages.agent.world.events import EventLog
+from stages.agent.world.failures import Rates
+from stages.agent.world.physics.hands import Beliefs, Hold
+from stages.agent.world.physics.room import Room
+from stages.kit.geometry.transforms import inverse
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import forward
+from stages.kit.motion.physical_robot import PhysicalRobot
+from stages.kit.motion.segments import Segment, whole_body
+from stages.kit.rendering.segmenter_errors import Luck
+from stages.kit.simulation.robot import Configuration, base_pose
+from stages.kit.simulation.robot_description import load_robot
+
+JOINTS = 0.001
+"""Standard deviation of each joint's encoder [rad], drawn once."""
+TOOL_FROM_CAMERA = np.array([[0, -1, 0, 0.06], [1, 0, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]], float)
+LOOK_SECONDS = 3.0
+"""**Assumed**: of a motion of the arm to a view."""
+NEARER = 0.1
+"""The arm is shorter than the one of the fast world: it starts so much nearer to a table before it [m]."""
+
+
+class RobotInRoom:
+    """Robot and room, with what goes wrong in them (`rates`, `luck`) and the log of it."""
+
+    def __init__(self, room: Room, rates: Rates, seed: int) -> None:
+        self.room, self.rates, self.luck = room, rates, Luck(seed)
+        self.random = np.random.default_rng([seed, 83])
+        self.description = load_robot("panda")
+        self.beliefs = Beliefs(self.description)
+        self.joint_error = self.random.normal(0, JOINTS, 7)
+        self.error = np.zeros(3)
+        """Of localisation: what is believed less what is true, as of the last stop."""
+        x, y, yaw = room.apartment.start
+        if any(room.gap(piece, x, y) < 0.5 for piece in room.apartment.furniture):
+            x, y = x + NEARER * cos(yaw), y + NEARER * sin(yaw)
+        self.believed = np.array([x, y, yaw])
+        self.arm = self.description.carry
+        start = Configuration(self.believed, self.arm + self.joint_error, self.description.opening)
+        self.driver = PhysicalRobot(room.world, self.description, start, record_rate=1.0)
+        self.driver.put(start)
+        self.hold: Hold | None = None
+        """What it believes to hold."""
+        self.carried: str | None = None
+        """What was in its fingers when they closed."""
+        self.grasps = 0
+        self.log = EventLog()
+        self.seconds_aside = self.metres = 0.0
+
+    def close(self) -> None:
+        """End the pybullet world of its beliefs."""
+        self.beliefs.close()
+
+    @property
+    def base(self) -> Base:
+        """Where localisation says that the robot stands."""
+        return Base(*(float(v) for v in self.believed))
+
+    @property
+    def seconds(self) -> float:
+        """Since the beginning."""
+        return self.seconds_aside + self.room.world.time
+
+    def true_base(self) -> np.ndarray:
+        """Return where it stands (3,), true frame."""
+        return self.driver.robot.configuration().base
+
+    def map_from_true(self) -> np.ndarray:
+        """Return the transform (4, 4) of localisation's error."""
+        return base_pose(self.believed, self.description) @ inverse(base_pose(self.true_base(), self.description))
+
+    def arm_to(self, arm: np.ndarray) -> None:
+        """Bring the arm to joint values; with empty hands it is put there."""
+        base = self.true_base()
+        self.seconds_aside += LOOK_SECONDS
+        if self.hold is None:
+            opening = self.driver.robot.configuration().opening
+            self.driver.put(Configuration(base, arm + self.joint_error, opening))
+        else:
+            rows = whole_body(base, np.array([self.arm, arm]) + self.joint_error)
+            try:
+                self.carefully(Segment(rows, 0.0, 0.6))
+            except MotionFailed:
+                arm = self.measured_arm()  # something is in the way: it looks from where it got to
+        self.arm = arm
+
+    def measured_arm(self) -> np.ndarray:
+        """Return the joint values (7,) by the encoders."""
+        return self.driver.robot.configuration().arm - self.joint_error
+
+    def carefully(self, segment: Segment) -> None:
+        """Follow a segment; what slips out of the hand is not noticed. Raises MotionFailed `path_blocked`."""
+        try:
+            self.driver.follow(segment, None)
+        except MotionFailed as failed:
+            if failed.failure.kind != "grasp_lost":
+                raise
+
+    def carry_out(self, segments: tuple[Segment, ...]) -> None:
+        """Follow planned motions of the arm where the base stands. Raises MotionFailed `path_blocked`."""
+        base = self.true_base()
+        for segment in segments:
+            arms = segment.path[:, 3:]
+            rows = whole_body(base, arms + self.joint_error)
+            self.carefully(Segment(rows, segment.opening, segment.pace))
+            self.arm = arms[-1]
+
+    def wrist_poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the wrist camera's pose (4, 4) in truth, and in the map by base and encoders."""
+        true = self.driver.robot.tool_pose() @ TOOL_FROM_CAMERA
+        seen = base_pose(self.believed, self.description) @ forward(self.beliefs.chain, self.arm)
+        return true, seen @ TOOL_FROM_CAMERA

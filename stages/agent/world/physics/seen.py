@@ -1,0 +1,122 @@
+"""What the cameras saw so far: furniture and surfaces of things in the map frame, and boxes of it for the arm."""
+
+from __future__ import annotations
+
+from math import hypot
+
+import numpy as np
+
+from stages.agent.body import Position, SeenFurniture
+from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.world.physics import head
+from stages.agent.world.physics.eyes import Picture, Surface
+from stages.agent.world.physics.hands import Box
+from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.kit.geometry.cameras import back_project
+from stages.kit.geometry.transforms import apply
+
+FOUND_WITHIN = 0.12
+"""A surface this near to a position is meant by it [m]."""
+DOORS = ("fridge", "dresser")
+AROUND = 1.4
+"""What is farther from the base does not matter to the arm [m]."""
+COMFORT = 4.5
+"""Cells of the map within which a turn of the pedestal (0.28 m) with its folded arm (0.39 m) may touch something."""
+
+
+class Seen:
+    """The map of one robot. `clearance`: cells that its base keeps from what is occupied."""
+
+    def __init__(self, robot: RobotInRoom, clearance: float) -> None:
+        self._robot = robot
+        self.pieces: list[head.SeenPiece] = []
+        self.tops: dict[int, float] = {}
+        """Piece -> height of its top as the wrist camera measured it [m]."""
+        self.surfaces: list[Surface] = []
+        self.obstacles = ObstacleMap(robot.base, clearance, COMFORT)
+
+    def furniture(self) -> list[SeenFurniture]:
+        """Return the pieces of which enough was seen."""
+        made = []
+        for piece in self.pieces:
+            if len(piece.cubes) < head.LEAST:
+                continue
+            low, high = piece.box
+            centre, size = (low + high) / 2, np.maximum(high - low, 0.1)
+            made.append(
+                SeenFurniture(
+                    piece.label,
+                    (float(centre[0]), float(centre[1])),
+                    (float(size[0]), float(size[1])),
+                    float(high[2]),
+                    piece.label in DOORS,
+                    False,
+                )
+            )
+        return made
+
+    def keep_top(self, picture: Picture, map_from_camera: np.ndarray, piece: int | None) -> None:
+        """Measure the height of the top of furniture that fills the picture: the most frequent height [m]."""
+        if piece is None:
+            return
+        points = apply(map_from_camera, back_project(picture.depth, picture.camera)[::3, ::3].reshape(-1, 3))
+        low, high = self.pieces[piece].box
+        inside = np.all((points[:, :2] > low[:2]) & (points[:, :2] < high[:2]), axis=1)
+        heights = points[inside & (np.abs(points[:, 2] - high[2]) < 0.08), 2]
+        if len(heights) > 200:
+            counts, edges = np.histogram(heights, bins=np.arange(high[2] - 0.08, high[2] + 0.081, 0.005))
+            top = edges[counts.argmax()] + 0.0025
+            self.tops[piece] = float(np.median(heights[np.abs(heights - top) < 0.006]))
+
+    def piece_at(self, at: Position) -> int | None:
+        """Return the number of the piece at a position, with a hand's breadth around it."""
+        for number, piece in enumerate(self.pieces):
+            low, high = piece.box
+            if len(piece.cubes) >= head.LEAST and np.all((at[:2] > low[:2] - 0.1) & (at[:2] < high[:2] + 0.1)):
+                return number
+        return None
+
+    def belongs(self, surface: Surface, at: Position, piece: int | None, close: bool) -> bool:
+        """Whether a surface is of a piece of furniture, or lies where a look from near by was at."""
+        middle = surface.middle
+        if close:
+            return hypot(middle[0] - at[0], middle[1] - at[1]) <= FOUND_WITHIN
+        if piece is None:
+            return False
+        low, high = self.pieces[piece].box
+        return bool(
+            np.all((middle[:2] > low[:2] - 0.05) & (middle[:2] < high[:2] + 0.05)) and middle[2] > high[2] - 0.1
+        )
+
+    def boxes(self, without: Position | None = None) -> dict[str, Box]:
+        """Return what is around the base in the map; what covers a position is left out."""
+        boxes: dict[str, Box] = {}
+        for number, piece in enumerate(self.pieces):
+            low, high = piece.box
+            off = np.maximum(0.0, np.maximum(low[:2] - self._robot.believed[:2], self._robot.believed[:2] - high[:2]))
+            if len(piece.cubes) >= head.LEAST and np.hypot(*off) < AROUND:
+                top = min(float(high[2]), self.tops.get(number, float(high[2]))) - 0.004
+                inner = 0.02
+                boxes[f"furniture_{number}"] = (
+                    np.array([*(low[:2] + inner), 0.0]),
+                    np.array([*(high[:2] - inner), top]),
+                )
+        for number, surface in enumerate(self.surfaces):
+            low, high = surface.low, surface.high
+            covers = without is not None and bool(
+                np.all((np.array(without[:2]) > low[:2] - 0.03) & (np.array(without[:2]) < high[:2] + 0.03))
+            )
+            if not covers and np.hypot(*(surface.middle - [*self._robot.believed[:2], 0])[:2]) < AROUND:
+                boxes[f"thing_{number}"] = (low, high)
+        return boxes
+
+    def support(self, at: Position) -> float:
+        """Return the height [m] of what was seen at a position: of a thing there, else of the furniture."""
+        for surface in self.surfaces:
+            near = np.hypot(*(surface.points[:, :2] - at[:2]).T) < 0.035
+            if near.sum() > 5:
+                return float(np.median(surface.points[near, 2]))
+        piece = self.piece_at(at)
+        if piece is None:
+            return at[2]
+        return self.tops.get(piece, float(self.pieces[piece].box[1][2]))
