@@ -9,6 +9,7 @@ from schemas.panoptic_map import PanopticMap
 from stages.edit.anchoring import Fitting
 from stages.edit.applying import apply_edits
 from stages.edit.edits_file import read_edits
+from stages.edit.map_edits import MAP_EDITS
 from stages.edit.map_state import MapState, read_state
 from stages.edit.outcome import outcome_of, write_records
 from stages.edit.parameters import EditMapParameters
@@ -32,7 +33,7 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
         state, info = read_state(panoptic_map)
     with context.progress.step("apply the edits"):
         vertices_before = len(state.surface.vertices)
-        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()))
+        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()), MAP_EDITS)
         entities, meshes = state.finished()
     with context.progress.step("write the map"):
         root = context.output

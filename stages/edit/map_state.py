@@ -72,6 +72,10 @@ class MapState:
                     self._things[instance] = Thing(instance, class_name, minimum_box(points), cKDTree(points))
         return [self._things[instance] for instance in sorted(self._things) if instance in self.entities]
 
+    def name_of(self, instance: int) -> str:
+        """Return what a thing is called."""
+        return f"{self.entities[instance].class_name}_{instance}"
+
     def called(self, points: np.ndarray, reach: float) -> np.ndarray:
         """Return the instance (N,) of the vertex that is nearest to each point (N, 3), -1 beyond `reach` [m]."""
         if self._tree is None or self._tree[0] is not self.surface:

@@ -15,8 +15,9 @@ from schemas.edits import AppliedEdit, MapEdit
 from schemas.errors import BadInput
 from schemas.panoptic_map import PanopticMap
 from stages.edit.anchoring import Fitting, anchor_of
-from stages.edit.applying import apply_edits, box_surface
+from stages.edit.applying import apply_edits
 from stages.edit.edits_file import append_edits, line_of, read_edits
+from stages.edit.map_edits import MAP_EDITS, box_surface
 from stages.edit.map_state import MapState, read_state
 from stages.edit.parameters import EditMapParameters
 from stages.kit.formats.entity_meshes import load_entity_mesh
@@ -43,7 +44,7 @@ def edit(what: str, seen: PanopticMap, *instances: int, **values: Any) -> MapEdi
 
 def applied(panoptic_map: PanopticMap, *edits: MapEdit) -> tuple[MapState, list[AppliedEdit]]:
     state, _ = read_state(panoptic_map)
-    records = apply_edits(state, edits, FITTING)
+    records = apply_edits(state, edits, FITTING, MAP_EDITS)
     state.finished()
     return state, records
 
@@ -96,7 +97,7 @@ def test_two_things_that_fit_alike_are_a_conflict(seen: PanopticMap, tmp_path: P
     own = state.instance == CUP
     vertices, faces = box_surface(gravity_aligned_box((0.24, 0.04, 0.80), (0.09, 0.09, 0.11), 0.0), 0.02)
     state.add_surface(vertices, faces, state.new_entity("cup", 3))
-    (record,) = apply_edits(state, [asked], FITTING)
+    (record,) = apply_edits(state, [asked], FITTING, MAP_EDITS)
     assert record.status == "conflict" and "more than one" in record.reason and "cup_3" in record.reason
     assert (state.instance[: len(own)] == CUP).sum() == own.sum()
 
@@ -169,7 +170,7 @@ def test_a_thing_of_which_less_was_seen_fits_unless_it_is_a_piece(seen: Panoptic
         if rest:
             assert state.new_entity("cabinet", 3) == rest
         state.relabel((state.instance == CABINET) & ~near, rest)
-        (record,) = apply_edits(state, [asked], FITTING)
+        (record,) = apply_edits(state, [asked], FITTING, MAP_EDITS)
         assert record.status == status, record
 
 
