@@ -201,7 +201,7 @@ class Desk:
 
 def _said(edit: Edit) -> str:
     """Return an edit in a few words."""
-    values = edit.model_dump(mode="json", by_alias=True, exclude={"what", "by", "when", "note"})
+    values = edit.model_dump(mode="json", by_alias=True, exclude={"what", "by", "when", "note"}, exclude_defaults=True)
     of = values.get("of")
     things = of if isinstance(of, list) else [of] if isinstance(of, dict) else []
     words = [

@@ -124,13 +124,14 @@ window.addEventListener("scenewright-ready", async function () {
     point: (field) => clicked(field, "click where"),
     place: (field) => clicked(field, "click what it is to stand on"),
     direction(field) {
-      const whole = clicked(field, { normal: "click a surface: out of it", along: corners.length ? "and to where" : "click from where" }[way] || "");
+      const row = made("div", undefined, "kinds"), whole = clicked(field, { normal: "click a surface: out of it", along: corners.length ? "and to where" : "click from where" }[way] || "");
       for (const [word, given] of [["up", [0, 0, 1]], ["down", [0, 0, -1]], ["out of a surface", "normal"], ["along two clicks", "along"]]) {
         const one = made("button", word);
         one.type = "button";
         one.addEventListener("click", () => { corners = []; if (typeof given === "string") { way = given; wanted = field; } else { way = ""; values[field.name] = given; following(); } fill(); });
-        whole.prepend(one);
+        row.append(one);
       }
+      whole.prepend(row);
       return whole;
     },
     joint(field) {
@@ -142,15 +143,15 @@ window.addEventListener("scenewright-ready", async function () {
       return input;
     },
     model(field) {
-      const whole = made("div"), input = line(field, "a model");
+      const whole = made("div"), row = made("div", undefined, "kinds"), input = line(field, "a model");
       input.setAttribute("list", "models");
       for (const word of [...field.choices, ...(known_()?.models || [])]) {
         const one = made("button", word);
         one.type = "button";
         one.addEventListener("click", () => { input.value = word; set(field, word); });
-        whole.append(one);
+        row.append(one);
       }
-      whole.prepend(input);
+      whole.append(input, row);
       return whole;
     },
     numbers: (field) => several(field, field.count, "", values[field.name], (numbers) => set(field, numbers)),
@@ -290,7 +291,7 @@ window.addEventListener("scenewright-ready", async function () {
   function following() { wanted = form.fields.find((field) => CLICKED.includes(field.kind) && field.needed && empty(field)) || null; fill(); }
   on("chosen", (name) => {
     if (!form || !name) return;
-    const field = wanted && ["thing", "things"].includes(wanted.kind) ? wanted : form.fields.find((one) => one.kind === "things") || form.fields.find((one) => one.kind === "thing" && empty(one));
+    const field = wanted && ["thing", "things"].includes(wanted.kind) ? wanted : form.fields.find((one) => one.kind === "things") || form.fields.find((one) => one.kind === "thing" && empty(one)) || form.fields.find((one) => one.kind === "thing");
     if (!field) return;
     take(field, name);
     const goes = form.fields.find((one) => one.kind === "place");

@@ -183,7 +183,8 @@ def test_a_scene_is_put_right_by_clicking(room: dict[str, Path], tmp_path: Path)
         settled(window)
         assert window.complaints() == []
     moved, joint, model = read_edits(file).edits
-    assert (moved.what, joint.what, model.what) == ("move", "no_joint", "model")
+    said = [(edit.what, edit.model_dump()["of"]["class_name"]) for edit in (moved, joint, model)]
+    assert said == [("move", "cabinet"), ("no_joint", "fridge"), ("model", "box")]
     place = moved.model_dump()["to"]
     assert abs(place[0] - 0.6) < 0.03 and abs(place[1] + 0.9) < 0.03 and abs(place[2] - node.box.size[2] / 2) < 0.03
     assert moved.model_dump()["turn_degrees"] == 45
