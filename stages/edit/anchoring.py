@@ -140,10 +140,11 @@ def _by_surface(
         raise Conflict(f"{_place(anchor)} lies no thing")
     within = [(share, thing) for share, thing in there if inside[thing.instance] >= fitting.minimum_inside]
     if not within:
-        share, best = there[0]
-        raise Conflict(
-            f"{_place(anchor)} lies {best.name}, of which {100 * inside[best.instance]:.0f} % is where it was"
-        )
+        best = there[0][1]
+        if not _may_be(best, anchor, classes):
+            raise Conflict(f"{_place(anchor)} lies {best.name}, which is no {anchor.class_name}")
+        here = 100 * inside[best.instance]
+        raise Conflict(f"{_place(anchor)} lies {best.name}, of which {here:.0f} % is where it was")
     share, best = within[0]
     nameless = best.class_name == NAMELESS != anchor.class_name
     least = fitting.minimum_share if nameless else fitting.minimum_part  # its name says nothing for it
