@@ -108,6 +108,21 @@ class Add(Edit):
     """`seen`: the surface in the box that nothing else owns. `box`: its six faces, for what no camera sees (glass)."""
 
 
+class SetGravity(Edit):
+    """These places lie on a surface that is level in truth: the map is turned until it is."""
+
+    what: Literal["gravity"]
+    level: tuple[Point, ...] = Field(min_length=3, max_length=64)
+    """On the surface, not on one line [m]."""
+
+
+class SetFloor(Edit):
+    """The floor is level and as high as this place; other surface that is called floor is none."""
+
+    what: Literal["floor"]
+    at: Point
+
+
 class Support(Edit):
     """What the thing stands on, in, at or below, whatever was measured."""
 
@@ -202,11 +217,24 @@ class AddJoint(Edit):
     """Where a hand takes hold of the part, closed, in the world [m]."""
 
 
-MapEdit = Annotated[Rename | Delete | Merge | Split | Add, Field(discriminator="what")]
+MapEdit = Annotated[Rename | Delete | Merge | Split | Add | SetGravity | SetFloor, Field(discriminator="what")]
 GraphEdit = Annotated[Support | Mark, Field(discriminator="what")]
 SceneEdit = Annotated[ChooseModel | Move | SetJoint | RemoveJoint | AddJoint | Mark, Field(discriminator="what")]
 AnyEdit = Annotated[
-    Rename | Delete | Merge | Split | Add | Support | Mark | ChooseModel | Move | SetJoint | RemoveJoint | AddJoint,
+    Rename
+    | Delete
+    | Merge
+    | Split
+    | Add
+    | SetGravity
+    | SetFloor
+    | Support
+    | Mark
+    | ChooseModel
+    | Move
+    | SetJoint
+    | RemoveJoint
+    | AddJoint,
     Field(discriminator="what"),
 ]
 """What a line of edits.toml may say. Each step applies the kinds that are its own and leaves the others."""

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from schemas.edits import Add, Anchor, Delete, Merge, Rename, Split
+from schemas.edits import Add, Anchor, Delete, Merge, Rename, SetFloor, SetGravity, Split
 from schemas.hand_written import UprightBox
 from schemas.scene_parts import Box
 from stages.edit.anchoring import Conflict, Fitting, find, joint_anchor, passes, shares
 from stages.edit.applying import Done, Table
 from stages.edit.map_state import MapState, Thing
-from stages.kit.geometry.boxes import box_rotation, points_in_box, upright_box
+from stages.kit.geometry.boxes import box_rotation, gravity_aligned_box, points_in_box, top, upright_box
+from stages.kit.geometry.transforms import rotation_between, transform_from
 
 FEWEST_VERTICES = 20
 """Of a thing that an edit makes, and of what it leaves of another: as `fuse` drops smaller ones."""
@@ -21,6 +23,15 @@ MOST_STEPS = 200
 
 MOSTLY_ONE = 0.8
 """Of the surface of each thing that was merged already, this share is called what they are together."""
+FLOOR = "floor"
+THICKNESS = 0.02
+"""Of a floor that is drawn [m]."""
+FLOOR_STEP = 0.05
+"""Between its vertices [m]."""
+NARROWEST = 0.05
+"""Places that are to be level are spread by this across their line [m]."""
+STEEPEST, LEVEL_ENOUGH = 80.0, 0.1
+"""Degrees."""
 BOX_TOLERANCE = 1e-3
 """Boxes that people wrote are rounded to millimetres [m]."""
 
@@ -122,6 +133,61 @@ def add(state: MapState, edit: Add, fitting: Fitting) -> Done:
     return Done("applied", (new,))
 
 
+def set_gravity(state: MapState, edit: SetGravity, fitting: Fitting) -> Done:
+    """Turn the map about the middle of the places until the surface there is level."""
+    places = np.array(edit.level)
+    surface = state.surface.vertices.astype(float)
+    tree = cKDTree(surface)
+    far, _ = tree.query(places)
+    if far.max() > fitting.reach:
+        x, y, z = places[int(np.argmax(far))]
+        raise Conflict(f"at ({x:.2f}, {y:.2f}, {z:.2f}) m is no surface")
+    means = np.array([surface[near].mean(axis=0) for near in tree.query_ball_point(places, fitting.reach)])
+    middle = means.mean(axis=0)
+    _, spread, axes = np.linalg.svd(means - middle, full_matrices=False)
+    if spread[1] < NARROWEST:
+        raise Conflict("its places lie nearly on one line: three corners of the surface say how it lies")
+    normal = axes[2] * (1.0 if axes[2][2] >= 0 else -1.0)
+    tilt = float(np.degrees(np.arccos(np.clip(normal[2], -1.0, 1.0))))
+    if tilt > STEEPEST:
+        raise Conflict(f"the surface there is {tilt:.0f} degrees from level: which side of it is up?")
+    if tilt < LEVEL_ENOUGH:
+        return Done("already", reason="it is level")
+    rotation = rotation_between(normal, np.array([0.0, 0.0, 1.0]))
+    state.turn(transform_from(rotation, middle - rotation @ middle))
+    return Done("applied", reason=f"turned by {tilt:.1f} degrees")
+
+
+def set_floor(state: MapState, edit: SetFloor, fitting: Fitting) -> Done:
+    """Draw the floor below the whole map. Surface that was called floor belongs to it where it is as high; elsewhere it
+    loses its name."""
+    height = edit.at[2]
+    floors = [thing for thing in state.things() if thing.class_name == FLOOR]
+    if (
+        len(floors) == 1
+        and abs(top(floors[0].box) - height) < BOX_TOLERANCE
+        and not state.entities[floors[0].instance].observations
+    ):
+        return Done("already", (floors[0].instance,), "it is there")
+    named = state.surface.vertices[state.instance > 0] if (state.instance > 0).any() else state.surface.vertices
+    if not len(named):
+        raise Conflict("the map is empty")
+    low, high = named.min(axis=0), named.max(axis=0)
+    new = state.new_entity(FLOOR, 0)
+    for thing in floors:
+        own = state.instance == thing.instance
+        near = np.abs(state.surface.vertices[:, 2] - height) <= fitting.reach
+        state.relabel(own & near, new)
+        state.relabel(own & ~near, 0)
+        state.remove(thing.instance)
+    size = np.array([*np.maximum(high[:2] - low[:2], THICKNESS), THICKNESS])
+    center = np.array([*(low[:2] + high[:2]) / 2, height - THICKNESS / 2])
+    slab = gravity_aligned_box(center, size, 0.0)
+    state.add_surface(*box_surface(slab, max(state.voxel_size, FLOOR_STEP)), new)
+    before = ", ".join(thing.name for thing in floors)
+    return Done("applied", (new,), f"in place of {before}" if before else "")
+
+
 def _inside(state: MapState, where: UprightBox) -> np.ndarray:
     """Return (V,) bool: which vertices of the map lie in a box."""
     return points_in_box(upright_box(where), state.surface.vertices, BOX_TOLERANCE)
@@ -157,4 +223,12 @@ def box_surface(box: Box, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     return local @ box_rotation(box).T + np.asarray(box.center), np.concatenate(faces)
 
 
-MAP_EDITS: Table[MapState] = {Rename: rename, Delete: delete, Merge: merge, Split: split, Add: add}
+MAP_EDITS: Table[MapState] = {
+    Rename: rename,
+    Delete: delete,
+    Merge: merge,
+    Split: split,
+    Add: add,
+    SetGravity: set_gravity,
+    SetFloor: set_floor,
+}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import open3d as o3d
@@ -35,7 +36,8 @@ def run(
     that its ray meets first. So is every pixel whose ray meets a thing that a person drew (`edit add --drawn`: glass)
     before what the camera measured. Frames without a pose are left out. Raises BadInput when no frame has one.
     """
-    state, _ = read_state(panoptic_map)
+    state, known = read_state(panoptic_map)
+    turned = np.eye(4) if known.world_from_sequence is None else np.array(known.world_from_sequence)
     if max(state.entities, default=0) > LARGEST_ID:
         raise BadInput(f"{panoptic_map.root}: an instance is beyond {LARGEST_ID}", hint="make the map again")
     info, caster = sequence.info, _RayCaster(state)
@@ -47,6 +49,7 @@ def run(
             for frame in context.progress.track(frames, total=len(reader), description="draw masks"):
                 if frame.world_from_camera is None:
                     continue
+                frame = replace(frame, world_from_camera=turned @ frame.world_from_camera)
                 ids = frame_ids(frame, reader.cameras[frame.camera_name], state, caster, parameters.reach)
                 annotations.append(FrameSegments(frame=frame.index, segments=_segments(ids, state)))
                 yield frame.index, ids

@@ -37,6 +37,11 @@ def run(
     What nobody looked at is as true as the machine made it: that is for whoever edits to see to. Raises BadInput when
     the graph or the scene is of another map.
     """
+    if panoptic_map.info.world_from_sequence is not None:
+        raise BadInput(
+            f"{panoptic_map.root}: an edit of gravity turned it out of the world of the sequence",
+            hint="give `ingest` what is up, and make the map again",
+        )
     mesh = read_mesh(panoptic_map.path("mesh.ply"), may_be_empty=True, hint=HINT)
     (instances,) = read_arrays(panoptic_map.path("mesh_labels.npz"), "instance", shapes=("V",), hint=HINT)
     graph = contact_graph.info if cad_scene is None else cad_scene.graph

@@ -65,9 +65,9 @@ window.addEventListener("scenewright-ready", async function () {
     wanted = one.fields.find((field) => CLICKED.includes(field.kind) && (field.kind === "things" || field.needed && empty(field))) || null;
     fill();
   }
-  const CLICKED = ["thing", "things", "box", "point", "place", "direction"];
+  const CLICKED = ["thing", "things", "box", "point", "points", "place", "direction"];
   const known_ = () => served.things?.[values.of];  // what the server says of the thing that the edit is about
-  const empty = (field) => values[field.name] === null || values[field.name] === undefined || values[field.name] === "" || (field.kind === "things" && values[field.name].length < field.fewest);
+  const empty = (field) => values[field.name] === null || values[field.name] === undefined || values[field.name] === "" || (["things", "points"].includes(field.kind) && (values[field.name]?.length ?? 0) < field.fewest);
   const complete = () => form.fields.every((field) => !field.needed || !empty(field));
 
   function fill() {
@@ -122,6 +122,17 @@ window.addEventListener("scenewright-ready", async function () {
       return input;
     },
     point: (field) => clicked(field, "click where"),
+    points(field) {
+      const whole = clicked(field, `click ${values[field.name]?.length ? "another one" : "places on it"}`, false), given = values[field.name] || [];
+      if (given.length) {
+        const again = made("button", `${given.length} places ×`, "thing");
+        again.type = "button";
+        again.title = "begin again";
+        again.addEventListener("click", () => { values[field.name] = []; wanted = field; fill(); });
+        whole.append(again);
+      }
+      return whole;
+    },
     place: (field) => clicked(field, "click what it is to stand on"),
     direction(field) {
       const row = made("div", undefined, "kinds"), whole = clicked(field, { normal: "click a surface: out of it", along: corners.length ? "and to where" : "click from where" }[way] || "");
@@ -181,12 +192,12 @@ window.addEventListener("scenewright-ready", async function () {
     return whole;
   }
   let way = "";          // how the next clicks say a direction
-  function clicked(field, hint) {
+  function clicked(field, hint, numbers = true) {
     const whole = made("div"), where = made("div", undefined, "slot");
     if (wanted === field) where.classList.add("wanted");
     where.append(made("span", wanted === field ? hint : "click to point at it", "hint"));
     where.addEventListener("click", () => { wanted = field; corners = []; fill(); });
-    whole.append(...(hint ? [where] : []), several(field, 3, "", values[field.name], (numbers) => set(field, numbers)));
+    whole.append(...(hint ? [where] : []), ...(numbers ? [several(field, 3, "", values[field.name], (numbers) => set(field, numbers))] : []));
     return whole;
   }
   function slot(field) {
@@ -244,6 +255,7 @@ window.addEventListener("scenewright-ready", async function () {
     }
     draw();
   }
+  const drawMarks = (points) => drawBox(points.length ? { center: points[points.length - 1], size: [0.03, 0.03, 0.03] } : null);
   function preview() {
     const box = form?.fields.find((field) => field.kind === "box"), goes = form?.fields.find((field) => field.kind === "place"), at = known_()?.box;
     if (goes && at) drawBox({ ...at, center: values[goes.name] || at.center, yaw_degrees: at.yaw_degrees + (values.turn_degrees || 0) });
@@ -258,7 +270,7 @@ window.addEventListener("scenewright-ready", async function () {
   }
 
   // ---- clicks --------------------------------------------------------------------------------------------------------
-  const POINTED = ["box", "point", "place", "direction"];
+  const POINTED = ["box", "point", "points", "place", "direction"];
   function aim() {
     const picking = form && wanted && POINTED.includes(wanted.kind);
     element("picture").classList.toggle("aiming", Boolean(picking));
@@ -272,6 +284,7 @@ window.addEventListener("scenewright-ready", async function () {
   on("point", (point, normal) => {
     if (!form || !wanted || !POINTED.includes(wanted.kind) || wanted.kind === "direction" && !way) return false;
     if (wanted.kind === "point") { values[wanted.name] = point.map(round); following(); return true; }
+    if (wanted.kind === "points") { values[wanted.name] = [...(values[wanted.name] || []), point.map(round)]; drawMarks(values[wanted.name]); fill(); return true; }
     if (wanted.kind === "place") { values[wanted.name] = [point[0], point[1], point[2] + (known_()?.box.size[2] || 0) / 2].map(round); wanted = null; fill(); return true; }
     if (way === "normal") { values[wanted.name] = normal.map(round); way = ""; following(); return true; }
     corners.push(point);

@@ -105,6 +105,9 @@ def _kind_of_tuple(parts: tuple[Any, ...], metadata: tuple[Any, ...]) -> Form | 
     if parts == (edits.Anchor, ...):
         fewest = next((one.min_length for one in metadata if hasattr(one, "min_length")), 1)
         return {"kind": "things", "fewest": fewest}
+    if len(parts) == 2 and parts[0] == Point and parts[1] is Ellipsis:
+        fewest = next((one.min_length for one in metadata if hasattr(one, "min_length")), 1)
+        return {"kind": "points", "fewest": fewest}
     if Ellipsis not in parts and all(part is float or _is_number(part) for part in parts):
         return {"kind": "numbers", "count": len(parts)}
     return None
