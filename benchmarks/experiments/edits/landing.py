@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.experiments.edits.making import Asked
 from benchmarks.experiments.edits.truth import MapTruth, true_object
-from schemas.edits import Add, Anchor, Merge
+from schemas.edits import Add, Anchor, Merge, SetFloor, SetGravity
 from stages.edit.anchoring import Fitting
 from stages.edit.applying import apply_edits
 from stages.edit.map_edits import MAP_EDITS
@@ -60,7 +60,7 @@ def by_nearest(asked: Asked, state: MapState, truth: MapTruth, room: TrueRoom) -
 
 
 def _anchors(asked: Asked) -> tuple[Anchor, ...]:
-    if isinstance(asked.edit, Add):
+    if isinstance(asked.edit, Add | SetGravity | SetFloor):
         return ()
     return asked.edit.of if isinstance(asked.edit, Merge) else (asked.edit.of,)
 

@@ -50,7 +50,7 @@ class Desk:
         artifact = open_artifact(self.path)
         if viewer_of(type(artifact)) is None:
             raise BadInput(f"{self.path}: a {artifact.kind!r} artifact has no view", hint="open its files elsewhere")
-        self._subjects = [] if self.edits is None else subjects_of(artifact, self.edits)
+        self.subjects = [] if self.edits is None else subjects_of(artifact, self.edits)
         self._artifact = artifact
         self._applied: tuple[AnyEdit, ...] = ()
         self._records: list[AppliedEdit] = []
@@ -82,9 +82,9 @@ class Desk:
         done = len(self._applied)
         if tuple(asked[:done]) != self._applied:
             self._records, done = [], 0
-            for subject in self._subjects:
+            for subject in self.subjects:
                 subject.restart()
-        for record in (record for subject in self._subjects for record in subject.apply(asked[done:])):
+        for record in (record for subject in self.subjects for record in subject.apply(asked[done:])):
             self._records.append(record.model_copy(update={"number": done + record.number}))
         self._records.sort(key=lambda record: record.number)
         self._applied, self._revision = tuple(asked), revision
@@ -110,7 +110,7 @@ class Desk:
 
     def _draw(self, canvas: Canvas) -> None:
         if self._shows_edits:
-            self._subjects[0].draw(canvas)
+            self.subjects[0].draw(canvas)
             return
         draw = viewer_of(type(self._artifact))
         assert draw is not None
@@ -119,7 +119,7 @@ class Desk:
     @property
     def _shows_edits(self) -> bool:
         """Whether what is shown is itself what edits are of, and not only made from that."""
-        return bool(self._subjects) and isinstance(self._artifact, type(self._subjects[0].artifact))
+        return bool(self.subjects) and isinstance(self._artifact, type(self.subjects[0].artifact))
 
     def _facts(self) -> dict[str, Any]:
         if self.edits is None:
@@ -128,11 +128,11 @@ class Desk:
             "artifact": self.shown,
             "read_only": self.read_only,
             "revision": self._revision or "",
-            "forms": [form | {"of": one.artifact.kind} for one in self._subjects for form in forms_of(one.table)],
+            "forms": [form | {"of": one.artifact.kind} for one in self.subjects for form in forms_of(one.table)],
             "classes": [entry.name for entry in load_vocabulary().classes],
-            "next": [cleaned(f"{one.command()} --edits {self.edits} --out ...") for one in self._subjects],
+            "next": [cleaned(f"{one.command()} --edits {self.edits} --out ...") for one in self.subjects],
             "shows_edits": self._shows_edits,
-            **self._subjects[0].facts(),
+            **self.subjects[0].facts(),
         }
 
     def now(self) -> dict[str, Any]:
@@ -153,7 +153,7 @@ class Desk:
                     "trouble": trouble or cleaned(self._trouble),
                     "revision": self._revision or "",
                     "rows": rows,
-                    "things": [thing.name for thing in self._subjects[0].state.things()],
+                    "things": [thing.name for thing in self.subjects[0].state.things()],
                 }
             return told
 
@@ -191,7 +191,7 @@ class Desk:
 
     def _anchored(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of an edit with anchors where things are named."""
-        forms = {form["what"]: (one, form["fields"]) for one in self._subjects for form in forms_of(one.table)}
+        forms = {form["what"]: (one, form["fields"]) for one in self.subjects for form in forms_of(one.table)}
         what = asked.get("what")
         if not isinstance(what, str) or what not in forms:
             raise UsageError(f"there is no edit {what!r:.40} here", hint=f"there are {', '.join(forms)}")

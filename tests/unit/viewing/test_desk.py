@@ -22,7 +22,7 @@ from cli.main import run as scenewright
 from cli.viewing.desk.desk import Desk
 from cli.viewing.desk.forms import forms_of, kinds_of
 from cli.viewing.desk.server import DeskServer
-from schemas.edits import Anchor, ClassName, Edit, MapEdit, Mark
+from schemas.edits import Anchor, AnyEdit, ClassName, Edit, MapEdit, Mark
 from schemas.errors import BadInput, MachineFailure, UsageError
 from schemas.hand_written import Point, UprightBox
 from schemas.panoptic_map import EntitiesFile, PanopticMap
@@ -310,7 +310,19 @@ def test_forms_come_from_the_declaration_of_the_edits() -> None:
         "merge": {"of": "things"},
         "split": {"of": "thing", "part": "box", "class": "class"},
         "add": {"box": "box", "class": "class", "surface": "choice"},
+        "gravity": {"level": "points"},
+        "floor": {"at": "point"},
     }
+    scene = {form["what"]: {field["name"]: field for field in form["fields"]} for form in forms_of(kinds_of(AnyEdit))}
+    assert {name: field["kind"] for name, field in scene["move"].items()} == {
+        "of": "thing", "to": "place", "turn_degrees": "number", "carried": "yes",
+    }  # fmt: skip
+    assert scene["new_joint"]["axis"]["kind"] == "direction" and scene["joint"]["at"]["kind"] == "joint"
+    assert scene["model"]["model"] == {
+        "name": "model", "needed": True, "start": None, "kind": "model", "choices": ["none"],
+    }  # fmt: skip
+    assert scene["support"]["on"]["choices"] == ["nothing"] and scene["support"]["on"]["needed"]
+    assert not scene["new_joint"]["handle"]["needed"]
     assert forms["merge"]["fields"][0]["fewest"] == 2 and forms["rename"]["says"].startswith("The thing is")
     assert next(field for field in forms["add"]["fields"] if field["name"] == "surface")["start"] == "seen"
     (support,) = forms_of([Support, Strange])
