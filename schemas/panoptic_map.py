@@ -43,7 +43,7 @@ class EntitiesFile(Model):
     frames_integrated: int
     segmentation: str
     """`label` of the segments artifact: which masks these entities come from."""
-    world_from_sequence: Transform | None = Field(None, exclude_if=lambda pose: pose is None)
+    world_from_sequence: Transform | None = Field(default=None, exclude_if=lambda pose: pose is None)
     """How an edit of gravity turned the map; its world is that of the sequence else. Absent otherwise."""
     entities: tuple[Entity, ...]
 

@@ -1,5 +1,5 @@
-"""Putting a whole room right at the desk: a script that knows the truth edits a map, its graph and its scene, as the page
-does, until the scene settles with the right supports, and counts what that took."""
+"""Putting a whole room right at the desk: a script that knows the truth edits a map, its graph and its scene, as the
+page does, until the scene settles with the right supports, and counts what that took."""
 
 from __future__ import annotations
 
