@@ -324,9 +324,8 @@ window.addEventListener("scenewright-ready", async function () {
     busy = true; ready(); complain("");
     try {
       const told = await ask("do", { artifact: served.artifact, revision: known.revision, by: "", ...more });
-      const changed = told.revision !== known.revision;
       show(told);
-      if (changed && served.shows_edits) again();
+      if (outdated()) again();
       return true;
     } catch (error) {
       complain(error.message);
@@ -334,6 +333,8 @@ window.addEventListener("scenewright-ready", async function () {
       return false;
     } finally { busy = false; ready(); }
   }
+  // By what this page was made with, not by what was told last: of an answer and a look that cross, either may be the last.
+  const outdated = () => served.shows_edits && known.revision !== served.revision && !known.trouble;
   function again() {
     // The server draws the map as the edits leave it; the address keeps the view.
     state.chosen = "";
@@ -372,9 +373,8 @@ window.addEventListener("scenewright-ready", async function () {
     asking = true;
     try {
       const told = await ask("now");
-      const other = known && told.revision !== known.revision;
       show(told);
-      if (other && served.shows_edits && !form && !busy) again();
+      if (outdated() && !form && !busy) again();
     } catch (error) { complain(error.message); }
     asking = false;
   }
