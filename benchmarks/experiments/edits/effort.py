@@ -109,17 +109,19 @@ def owners(state: MapState, told: Told) -> dict[int, Counter[int]]:
     """Return thing -> true thing (0: none) -> vertices. What was drawn is of none."""
     owner = np.concatenate([told.owner, np.zeros(len(state.instance) - len(told.owner), told.owner.dtype)])
     found: dict[int, Counter[int]] = {}
-    pairs, counts = np.unique(np.stack([state.instance, owner]), axis=1, return_counts=True)
-    for (thing, true), count in zip(pairs.T.tolist(), counts.tolist(), strict=True):
-        found.setdefault(thing, Counter())[true] = count
+    span = int(owner.max(initial=0)) + 1
+    pairs, counts = np.unique(state.instance.astype(np.int64) * span + owner, return_counts=True)
+    for pair, count in zip(pairs.tolist(), counts.tolist(), strict=True):
+        found.setdefault(pair // span, Counter())[pair % span] = count
     return found
 
 
 def put_map_right(editor: Editor, told: Told) -> dict[str, int]:
     """Split what holds several things, join what is in parts, name, add and delete. Return true name -> instance."""
     for _ in range(2):  # what was split off may hold another one
+        seen = owners(editor.state, told)
         for thing in editor.state.things():
-            counts = owners(editor.state, told)[thing.instance]
+            counts = seen[thing.instance]
             main = max(counts, key=lambda k: counts[k])
             for k, count in counts.items():
                 node = told.nodes.get(k)
@@ -128,8 +130,9 @@ def put_map_right(editor: Editor, told: Told) -> dict[str, int]:
                 if count >= MOST * int((told.owner == k).sum()):
                     editor.ask("split", of=thing.name, part=_around(node.box), **{"class": node.class_name})
     parts: dict[int, list[str]] = {}
+    seen = owners(editor.state, told)
     for thing in sorted(editor.state.things(), key=lambda thing: -(thing.surface.n if thing.surface else 0)):
-        counts = owners(editor.state, told)[thing.instance]
+        counts = seen[thing.instance]
         main, most = counts.most_common(1)[0]
         if main and most >= MOST * counts.total():
             parts.setdefault(main, []).append(thing.name)

@@ -74,6 +74,12 @@ def test_masks_of_a_map_are_those_of_its_things(room: Path) -> None:
     assert classes["cup"] in found and classes["bottle"] not in found
 
 
+def test_diff_says_who_changed_what(room: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert scenewright(["diff", str(room / "map"), str(room / "edited")]) == 0
+    told = capsys.readouterr().out
+    assert "edit 1 (rename): none -> applied, cup_3" in told and "edit 2 (rename): none -> applied, cabinet_5" in told
+
+
 def test_what_was_put_right_is_truth_for_evaluate(room: Path) -> None:
     for name in ("map", "edited"):
         words = ["graph", "--panoptic-map", str(room / name), "--out", str(room / f"graph_{name}")]
