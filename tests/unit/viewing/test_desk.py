@@ -50,7 +50,7 @@ def served(desk: Desk) -> Iterator[DeskServer]:
 def asked(server: DeskServer, path: str, body: Any = None, **headers: str) -> tuple[int, Any]:
     """Ask a server as a program would; return status and answer."""
     parts = urlsplit(server.page_address)
-    connection = http.client.HTTPConnection("127.0.0.1", parts.port, timeout=20)
+    connection = http.client.HTTPConnection("127.0.0.1", parts.port, timeout=120)
     data = None if body is None else json.dumps(body).encode()
     sent = {"Content-Type": "application/json", **{name.replace("_", "-"): value for name, value in headers.items()}}
     connection.request("GET" if data is None else "POST", parts.path + path, data, sent)
