@@ -1,4 +1,5 @@
-"""`scenewright edit rename | delete | merge | split | add`: a line more in edits.toml, which `edit map` applies."""
+"""`scenewright edit rename | delete | merge | split | add | gravity | floor`: a line more in edits.toml, which
+`edit map` applies."""
 
 from __future__ import annotations
 
@@ -93,6 +94,33 @@ def add(
     return append(file, by, note, what="add", box=box, surface=surface, **{"class": class_name})
 
 
+Place = tuple[float, float, float]
+
+
+def gravity(
+    file: File,
+    first: Annotated[Place, typer.Option("--first", help="A place x y z [m] of a surface that is level in truth.")],
+    second: Annotated[Place, typer.Option("--second", help="Another one.")],
+    third: Annotated[Place, typer.Option("--third", help="Another one, not on a line with them.")],
+    by: By = "",
+    note: Note = "",
+    debug: Debug = False,
+) -> int:
+    """Say what is level: the map is turned until it is."""
+    return append(file, by, note, what="gravity", level=(first, second, third))
+
+
+def floor(
+    file: File,
+    at: Annotated[Place, typer.Option("--at", help="A place on the floor: x y z [m].")],
+    by: By = "",
+    note: Note = "",
+    debug: Debug = False,
+) -> int:
+    """Say where the floor is: level, at this height, below the whole map."""
+    return append(file, by, note, what="floor", at=at)
+
+
 GRAPH, SCENE = "graph --contact-graph", "scene --cad-scene"
 APPLIED_BY = {
     "support": GRAPH,
@@ -100,7 +128,7 @@ APPLIED_BY = {
     **dict.fromkeys(("model", "move", "joint", "no_joint", "new_joint"), SCENE),
 }
 """What applies an edit that is none of a map, and to what."""
-COMMANDS = (rename, delete, merge, split, add)
+COMMANDS = (rename, delete, merge, split, add, gravity, floor)
 
 
 def _anchors(path: Path, names: list[str]) -> list[Any]:

@@ -3,7 +3,6 @@ node of a graph or a CAD scene, which `edit graph` or `edit scene` applies."""
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -88,21 +87,17 @@ def move(
     debug: Debug = False,
 ) -> int:
     """Say where a thing of a scene stands and how it is turned."""
+    from stages.edit.scene_edits import asked_move
+
     if to is not None and by_metres is not None:
         raise UsageError("edit move: give --to or --shift, not both", hint="see --help")
     state = _opened(cad_scene)
     of = _anchor(state.things(), thing, cad_scene)
     node = state.graph.nodes[_named(state.things(), thing, cad_scene).instance]
-    box = of["box"]["center"]
-    shift = by_metres or (0.0, 0.0, 0.0)
-    values: dict[str, Any] = {"to": to or tuple(round(a + b, 3) for a, b in zip(box, shift, strict=True))}
-    if turn and node.world_from_model is not None:
-        pose = node.world_from_model
-        heading = (math.degrees(math.atan2(pose[1][0], pose[0][0])) + turn + 180.0) % 360.0 - 180.0
-        values |= {"heading_degrees": round(heading, 2), "model": node.model_id}
-    elif turn:
-        values["turn_degrees"] = turn
-    return append(file, by, note, what="move", of=of, carried=carried, **values)
+    if by_metres is not None:
+        x, y, z = (a + b for a, b in zip(of["box"]["center"], by_metres, strict=True))
+        to = (x, y, z)
+    return append(file, by, note, what="move", of=of, carried=carried, **asked_move(node, to, turn))
 
 
 def joint(

@@ -7,6 +7,7 @@ It says where the thing is (a box around it, a point on its surface) and what it
 from __future__ import annotations
 
 from collections.abc import Iterator
+from enum import StrEnum
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -21,6 +22,17 @@ LONGEST_TEXT = 10_000
 """Letters of a name or a note."""
 
 Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
+
+
+class Asked(StrEnum):
+    """How a page asks for a field, where the type alone does not say it."""
+
+    PLACE = "place"
+    """Where the middle of the thing's box goes."""
+    DIRECTION = "direction"
+    MODEL = "model"
+    NOT = "not"
+    """It is worked out from the rest."""
 
 
 def _check_class(value: str) -> str:
@@ -96,6 +108,21 @@ class Add(Edit):
     """`seen`: the surface in the box that nothing else owns. `box`: its six faces, for what no camera sees (glass)."""
 
 
+class SetGravity(Edit):
+    """These places lie on a surface that is level in truth: the map is turned until it is."""
+
+    what: Literal["gravity"]
+    level: tuple[Point, ...] = Field(min_length=3, max_length=64)
+    """On the surface, not on one line [m]."""
+
+
+class SetFloor(Edit):
+    """The floor is level and as high as this place; other surface that is called floor is none."""
+
+    what: Literal["floor"]
+    at: Point
+
+
 class Support(Edit):
     """What the thing stands on, in, at or below, whatever was measured."""
 
@@ -120,7 +147,7 @@ class ChooseModel(Edit):
 
     what: Literal["model"]
     of: Anchor
-    model: Name | None = None
+    model: Annotated[Name | None, Asked.MODEL] = None
     """Of the scene or the library; None: none, its own mesh does."""
 
 
@@ -129,11 +156,11 @@ class Move(Edit):
 
     what: Literal["move"]
     of: Anchor
-    to: Point
+    to: Annotated[Point, Asked.PLACE]
     """The middle of its box [m]."""
-    heading_degrees: float | None = Field(default=None, ge=-360, le=360)
+    heading_degrees: Annotated[float | None, Asked.NOT] = Field(default=None, ge=-360, le=360)
     """Of the x axis of its `model` about the vertical; None: as it is."""
-    model: Name | None = None
+    model: Annotated[Name | None, Asked.NOT] = None
     """What the heading is of: other models look another way."""
     turn_degrees: float = Field(default=0.0, ge=-360, le=360)
     """Of a thing with a mesh of its own: how far it is turned about the middle of its box."""
@@ -179,7 +206,7 @@ class AddJoint(Edit):
     of: Anchor
     part: UprightBox
     type: Literal["revolute", "prismatic"]
-    axis: Point
+    axis: Annotated[Point, Asked.DIRECTION]
     """Direction in the world; opening goes by it (right-handed)."""
     origin: Point
     """On the axis, in the world [m]."""
@@ -190,11 +217,24 @@ class AddJoint(Edit):
     """Where a hand takes hold of the part, closed, in the world [m]."""
 
 
-MapEdit = Annotated[Rename | Delete | Merge | Split | Add, Field(discriminator="what")]
+MapEdit = Annotated[Rename | Delete | Merge | Split | Add | SetGravity | SetFloor, Field(discriminator="what")]
 GraphEdit = Annotated[Support | Mark, Field(discriminator="what")]
 SceneEdit = Annotated[ChooseModel | Move | SetJoint | RemoveJoint | AddJoint | Mark, Field(discriminator="what")]
 AnyEdit = Annotated[
-    Rename | Delete | Merge | Split | Add | Support | Mark | ChooseModel | Move | SetJoint | RemoveJoint | AddJoint,
+    Rename
+    | Delete
+    | Merge
+    | Split
+    | Add
+    | SetGravity
+    | SetFloor
+    | Support
+    | Mark
+    | ChooseModel
+    | Move
+    | SetJoint
+    | RemoveJoint
+    | AddJoint,
     Field(discriminator="what"),
 ]
 """What a line of edits.toml may say. Each step applies the kinds that are its own and leaves the others."""

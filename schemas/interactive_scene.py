@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from schemas.artifact import Artifact, Document
+from schemas.artifact import Artifact, Document, OptionalDocument
 from schemas.base import Model, Name, RelativePath, Transform
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Joint
@@ -55,11 +55,40 @@ class InteractiveSceneFile(Model):
     bodies: tuple[SceneBody, ...]
 
 
+class SettledBody(Model):
+    """What became of a movable body that was let go."""
+
+    name: Name
+    moved: float
+    """[m]"""
+    turned: float
+    """[rad]"""
+    leaves: float | None = None
+    """When it first was farther from where it stood than it may be [s]; None: it stays."""
+    fell_through: bool = False
+    poses: tuple[tuple[float, float, float, float, float, float, float], ...] = ()
+    """Of its frame in the world at each of the times, x y z [m] and quaternion x y z w; none where it hardly moved."""
+
+
+class SettleFile(Model):
+    """settle.json: the settle test as it went, to be looked at."""
+
+    times: tuple[float, ...]
+    """[s]"""
+    bodies: tuple[SettledBody, ...]
+    troubles: tuple[str, ...] = ()
+    """What else is wrong, in words: pairs that lie in each other, joints that meet something."""
+    verdict: str
+    reason: str
+
+
 class InteractiveScene(Artifact):
     """`scene.urdf` (whole kinematic tree, root link `world`), `static.urdf`, `bodies/<name>.urdf`, `scene.json`,
-    `graph.json` (cg'), `meshes/`; beside it `scene.mjcf.xml`, `scene.srdf`, `scene.glb` and `scene.mcap`."""
+    `graph.json` (cg'), `meshes/`; beside it `scene.mjcf.xml`, `scene.srdf`, `scene.glb` and `scene.mcap`.
+    `settle.json`: how the settle test went, where one was made."""
 
     kind: ClassVar[str] = "interactive_scene"
     description: ClassVar[str] = "URDF scene: whole kinematic tree, static tree, one file per movable body"
     info = Document(InteractiveSceneFile, "scene.json")
     graph = Document(ContactGraphFile, "graph.json")
+    settling = OptionalDocument(SettleFile, "settle.json")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from pydantic import Field
+
 from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, RelativePath, Vector3
+from schemas.base import Model, RelativePath, Transform, Vector3
 from schemas.edits import AppliedEditsFile
 
 SNAPSHOTS = "snapshots"
@@ -41,6 +43,8 @@ class EntitiesFile(Model):
     frames_integrated: int
     segmentation: str
     """`label` of the segments artifact: which masks these entities come from."""
+    world_from_sequence: Transform | None = Field(default=None, exclude_if=lambda pose: pose is None)
+    """How an edit of gravity turned the map; its world is that of the sequence else. Absent otherwise."""
     entities: tuple[Entity, ...]
 
 

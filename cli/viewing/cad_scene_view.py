@@ -33,7 +33,13 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
     Candidates whose model the scene has no copy of come from the library that it was made from, where that is still
     there.
     """
-    library = input_artifact(cad_scene, CadLibrary)
+    draw_cad_scene_of(cad_scene, input_artifact(cad_scene, CadLibrary), input_artifact(cad_scene, PanopticMap), canvas)
+
+
+def draw_cad_scene_of(
+    cad_scene: CadScene, library: CadLibrary | None, panoptic_map: PanopticMap | None, canvas: Canvas
+) -> None:
+    """Draw a scene that was made from this library and map, where these are there."""
     roots = [cad_scene.path("models")] + ([library.path("models")] if library is not None else [])
     rows = ["| node | decision | model | matching error | alignment error [m] |", "|---|---|---|---|---|"]
     for replacement in cad_scene.info.replacements:
@@ -53,7 +59,6 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
     nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
     if nameless.exists():
         canvas.mesh(SURROUNDINGS, load_mesh(nameless), front_only=True)
-    panoptic_map = input_artifact(cad_scene, PanopticMap)
     if panoptic_map is not None and panoptic_map.path("mesh.ply").exists():
         canvas.mesh(MAP, load_mesh(panoptic_map.path("mesh.ply")), front_only=True)
     draw_graph(cad_scene.graph, canvas, CANDIDATES, MAP, trusted=trust_of_models(cad_scene.info))

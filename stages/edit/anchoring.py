@@ -124,28 +124,38 @@ def find(anchor: Anchor, where: Where, fitting: Fitting, also: Sequence[str] = (
 def _by_surface(
     anchor: Anchor, things: Sequence[Thing], found: Mapping[int, float], fitting: Fitting, classes: Sequence[str]
 ) -> Thing:
-    """Return the thing that most of the anchor's surface is called, if most of the thing lies in the anchor's box, and
-    none of its class has a like share. Raises Conflict."""
-    named = sum(found.get(thing.instance, 0.0) for thing in things)
+    """Return the thing that most of the anchor's surface is called, of those that lie mostly in the anchor's box: what
+    a thing stands on or in takes of its fringe, and is none of its size. It must be of its class, and none other have
+    a like share. Raises Conflict."""
+    box, inside = upright_box(anchor.box), {}
+    for thing in things:
+        if thing.instance in found:
+            assert thing.surface is not None  # of a map
+            inside[thing.instance] = float(points_in_box(box, np.asarray(thing.surface.data), fitting.margin).mean())
     there = sorted(
         ((found[thing.instance], thing) for thing in things if thing.instance in found),
         key=lambda pair: (-pair[0], pair[1].instance),
     )
     if not there:
         raise Conflict(f"{_place(anchor)} lies no thing")
-    share, best = there[0]
-    if share < fitting.minimum_part or share < fitting.minimum_share * named:
+    within = [(share, thing) for share, thing in there if inside[thing.instance] >= fitting.minimum_inside]
+    if not within:
+        best = there[0][1]
+        if not _may_be(best, anchor, classes):
+            raise Conflict(f"{_place(anchor)} lies {best.name}, which is no {anchor.class_name}")
+        here = 100 * inside[best.instance]
+        raise Conflict(f"{_place(anchor)} lies {best.name}, of which {here:.0f} % is where it was")
+    share, best = within[0]
+    nameless = best.class_name == NAMELESS != anchor.class_name
+    least = fitting.minimum_share if nameless else fitting.minimum_part  # its name says nothing for it
+    if share < least or share < fitting.minimum_share * sum(other for other, _ in within):
         raise Conflict(f"{_place(anchor)} {best.name} has {100 * share:.0f} % of its surface, and nothing has more")
     if not _may_be(best, anchor, classes):
         raise Conflict(f"{_place(anchor)} lies {best.name}, which is no {anchor.class_name}")
-    assert best.surface is not None  # of a map
-    box = upright_box(anchor.box)
-    inside = float(points_in_box(box, np.asarray(best.surface.data), fitting.margin).mean())
-    if inside < fitting.minimum_inside:
-        raise Conflict(f"{_place(anchor)} lies {best.name}, of which {100 * inside:.0f} % is where it was")
     alike = max(fitting.minimum_overlap, fitting.clear_share * fitting.overlap(box, best.box))
+    rivals = {thing.instance for other, thing in within if other >= fitting.rival_share * share}
     for thing in things:
-        same = found.get(thing.instance, 0.0) >= fitting.rival_share * share
+        same = thing.instance in rivals
         if thing.instance != best.instance and (same or fitting.overlap(box, thing.box) >= alike):
             raise Conflict(f"{_place(anchor)} more than one thing fits: {best.name}, {thing.name}")
     return best

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.edits import AnyEdit, AppliedEdit, Edit, Mark, Support
+from schemas.edits import Mark, Support
 from schemas.scene_parts import TREE_RELATIONS, Box, Relation
 from stages.edit.anchoring import Conflict, Fitting, find
-from stages.edit.applying import Done, in_order
+from stages.edit.applying import Done, Table
 from stages.edit.map_state import Thing
 from stages.kit.geometry.boxes import bottom, box_corners, clip_polygon, footprint, polygon_area, refined_box, top
 from stages.kit.geometry.planes import level_plane, plane_height
@@ -42,6 +40,10 @@ class GraphState:
             if node.box is not None
         ]
 
+    def name_of(self, instance: int) -> str:
+        """Return the id of the node at a place."""
+        return self.graph.nodes[instance].id
+
     def called(self, points: np.ndarray, reach: float) -> None:
         """A graph knows no surface."""
 
@@ -49,13 +51,6 @@ class GraphState:
         """Put a node into the place of the one with its id."""
         nodes = tuple(node if other.id == node.id else other for other in self.graph.nodes)
         self.graph = self.graph.model_copy(update={"nodes": nodes})
-
-
-def apply_graph_edits(state: GraphState, edits: Iterable[AnyEdit], fitting: Fitting) -> list[AppliedEdit]:
-    """Apply the edits of graphs to the state, and return what became of each. Conflicts leave it as it is."""
-    return in_order(
-        edits, lambda edit: APPLY[type(edit)](state, edit, fitting), APPLY, lambda k: state.graph.nodes[k].id
-    )
 
 
 def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
@@ -202,4 +197,4 @@ def _hanging(link: Relation, box: Box, parent: GraphNode) -> Relation:
     return link.model_copy(update={"plane": k, "gap": distance})
 
 
-APPLY: dict[type[Edit], Callable[[GraphState, Any, Fitting], Done]] = {Support: support, Mark: mark}
+GRAPH_EDITS: Table[GraphState] = {Support: support, Mark: mark}

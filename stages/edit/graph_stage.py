@@ -7,8 +7,9 @@ from pathlib import Path
 from schemas.contact_graph import ContactGraph
 from schemas.scene_parts import TREE_RELATIONS
 from stages.edit.anchoring import Fitting
+from stages.edit.applying import apply_edits
 from stages.edit.edits_file import read_edits
-from stages.edit.graph_edits import GraphState, apply_graph_edits
+from stages.edit.graph_edits import GRAPH_EDITS, GraphState
 from stages.edit.outcome import outcome_of, write_records
 from stages.edit.parameters import EditMapParameters
 from stages.kit.stage import Context
@@ -23,7 +24,7 @@ def run(contact_graph: ContactGraph, edits: Path, *, parameters: EditMapParamete
     asked = read_edits(edits)
     state = GraphState(contact_graph.info)
     with context.progress.step("apply the edits"):
-        records = apply_graph_edits(state, asked.edits, Fitting(**parameters.model_dump()))
+        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()), GRAPH_EDITS)
     state.graph.write(context.output / "graph.json")
     summary = write_records(records, len(asked.edits), context)
     summary |= {

@@ -5,10 +5,14 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
+
+from schemas.base import as_transform
 from schemas.panoptic_map import PanopticMap
 from stages.edit.anchoring import Fitting
 from stages.edit.applying import apply_edits
 from stages.edit.edits_file import read_edits
+from stages.edit.map_edits import MAP_EDITS
 from stages.edit.map_state import MapState, read_state
 from stages.edit.outcome import outcome_of, write_records
 from stages.edit.parameters import EditMapParameters
@@ -32,23 +36,27 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
         state, info = read_state(panoptic_map)
     with context.progress.step("apply the edits"):
         vertices_before = len(state.surface.vertices)
-        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()))
+        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()), MAP_EDITS)
         entities, meshes = state.finished()
     with context.progress.step("write the map"):
         root = context.output
         (root / "entities").mkdir(parents=True, exist_ok=True)
-        info.model_copy(update={"entities": tuple(entities)}).write(root / "entities.json")
+        changed: dict[str, object] = {"entities": tuple(entities)}
+        if state.turned is not None:
+            before = np.eye(4) if info.world_from_sequence is None else np.array(info.world_from_sequence)
+            changed["world_from_sequence"] = as_transform(state.turned @ before)
+        info.model_copy(update=changed).write(root / "entities.json")
         for entity in entities:
             if entity.instance in meshes:
                 write_ply(root / mesh_name(entity.instance), meshes[entity.instance])
             else:
                 shutil.copyfile(panoptic_map.path(entity.mesh), root / entity.mesh)
-        if len(state.surface.vertices) == vertices_before:
+        if len(state.surface.vertices) == vertices_before and state.turned is None:
             shutil.copyfile(panoptic_map.path(EDITED), root / EDITED)
         else:
             write_ply(root / EDITED, state.surface)
         _write_labels(root, state)
-        for name in KEPT:
+        for name in KEPT if state.turned is None else KEPT[:1]:  # voxels lie along the axes of before
             if panoptic_map.path(name).is_file():
                 shutil.copyfile(panoptic_map.path(name), root / name)
     summary = write_records(records, len(asked.edits), context)

@@ -17,6 +17,7 @@ from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.formats.ply_files import ColoredMesh
 from stages.kit.geometry.boxes import minimum_box
+from stages.kit.geometry.transforms import apply
 
 GREY = 128
 HINT = "make the panoptic map again"
@@ -56,6 +57,8 @@ class MapState:
     touched: set[int] = field(default_factory=set)
     """Instances whose surface is no longer that of the map that was read."""
     next_instance: int = 1
+    turned: np.ndarray | None = None
+    """(4, 4) from the world in which the map was read, where it was turned."""
     _things: dict[int, Thing] = field(default_factory=dict)
     _tree: tuple[ColoredMesh, cKDTree] | None = None
 
@@ -71,6 +74,10 @@ class MapState:
                     class_name = self.entities[instance].class_name
                     self._things[instance] = Thing(instance, class_name, minimum_box(points), cKDTree(points))
         return [self._things[instance] for instance in sorted(self._things) if instance in self.entities]
+
+    def name_of(self, instance: int) -> str:
+        """Return what a thing is called."""
+        return f"{self.entities[instance].class_name}_{instance}"
 
     def called(self, points: np.ndarray, reach: float) -> np.ndarray:
         """Return the instance (N,) of the vertex that is nearest to each point (N, 3), -1 beyond `reach` [m]."""
@@ -130,6 +137,14 @@ class MapState:
         self.segment = np.concatenate([self.segment, np.zeros(count, np.int32)])
         self.touched.add(instance)
         self._things.pop(instance, None)
+
+    def turn(self, motion: np.ndarray) -> None:
+        """Move the whole map by (4, 4)."""
+        vertices = apply(motion, self.surface.vertices.astype(float)).astype(np.float32)
+        self.surface = replace(self.surface, vertices=vertices)
+        self.turned = motion if self.turned is None else motion @ self.turned
+        self.touched |= set(self.entities)
+        self._things.clear()
 
     def class_ids(self) -> np.ndarray:
         """Return the class id (V,) int32 of every vertex."""

@@ -1,4 +1,4 @@
-"""Declarations of `scenewright edit map`, `edit graph` and `edit scene`."""
+"""Declarations of `scenewright edit map`, `edit graph`, `edit scene` and `edit masks`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph
 from schemas.panoptic_map import PanopticMap
+from schemas.segments import Segments
+from schemas.sequence import Sequence
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
 
@@ -47,9 +49,17 @@ class EditMapParameters(Parameters):
     )
 
 
+class EditMasksParameters(Parameters):
+    """How masks are drawn from a map."""
+
+    reach: float = Field(
+        0.04, gt=0, le=1, description="A pixel is of the thing whose surface is nearest to its point, within this [m]"
+    )
+
+
 MAP = Stage(
     name="edit map",
-    version=3,
+    version=4,
     summary="Apply edits (edits.toml) to a panoptic map; what no longer fits is a conflict, and not applied",
     parameters=EditMapParameters,
     reads={"panoptic_map": PanopticMap, "edits": External("edits.toml, as `edit rename` and the like write it")},
@@ -91,4 +101,17 @@ SCENE = Stage(
     "--out outputs/demo/edited_scene",
 )
 
-STAGES = (MAP, GRAPH, SCENE)
+MASKS = Stage(
+    name="edit masks",
+    version=1,
+    summary="Draw masks for every frame from a map that was put right, to train with (`export --layout coco`)",
+    parameters=EditMasksParameters,
+    reads={"sequence": Sequence, "panoptic_map": PanopticMap},
+    writes=Segments,
+    libraries=("numpy", "scipy", "open3d"),
+    module="masks_stage",
+    example="scenewright edit masks --sequence outputs/demo/sequence --panoptic-map outputs/demo/edited_map "
+    "--out outputs/demo/masks",
+)
+
+STAGES = (MAP, GRAPH, SCENE, MASKS)

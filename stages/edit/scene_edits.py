@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,21 +12,10 @@ from schemas.base import as_transform
 from schemas.cad_library import CadModel
 from schemas.cad_scene import CadCandidate, JointEvidence, Replacement
 from schemas.contact_graph import GraphNode
-from schemas.edits import (
-    AddJoint,
-    AnyEdit,
-    AppliedEdit,
-    ChooseModel,
-    Edit,
-    JointAnchor,
-    Mark,
-    Move,
-    RemoveJoint,
-    SetJoint,
-)
+from schemas.edits import AddJoint, ChooseModel, JointAnchor, Mark, Move, RemoveJoint, SetJoint
 from schemas.scene_parts import Joint
-from stages.edit.anchoring import Conflict, Fitting, find
-from stages.edit.applying import Done, in_order
+from stages.edit.anchoring import MILLIMETRES, Conflict, Fitting, find
+from stages.edit.applying import Done, Table
 from stages.edit.graph_edits import and_below, mark, relink
 from stages.edit.joint_making import with_limits, with_new_joint
 from stages.edit.scene_state import SceneState, about
@@ -41,13 +30,6 @@ JOINT_REACH = 0.25
 JOINT_CLEAR = 0.6
 """... and nearer than this share of the distance of the next one."""
 JOINT_ANGLE = math.radians(25.0)
-
-
-def apply_scene_edits(state: SceneState, edits: Iterable[AnyEdit], fitting: Fitting) -> list[AppliedEdit]:
-    """Apply the edits of scenes to the state, and return what became of each. Conflicts leave it as it is."""
-    return in_order(
-        edits, lambda edit: APPLY[type(edit)](state, edit, fitting), APPLY, lambda k: state.graph.nodes[k].id
-    )
 
 
 def choose_model(state: SceneState, edit: ChooseModel, fitting: Fitting) -> Done:
@@ -152,6 +134,20 @@ def move(state: SceneState, edit: Move, fitting: Fitting) -> Done:
     return Done("applied", (place,), f"by {distance:.2f} m and {math.degrees(turn):.0f} degrees")
 
 
+def asked_move(node: GraphNode, to: Sequence[float] | None, turn: float) -> dict[str, Any]:
+    """Return the fields of a move out of where the middle of a node's box goes [m] (None: it stays) and how far it
+    turns [degrees]: the heading that its model then has, or else the turn of its own mesh."""
+    assert node.box is not None  # it was found by it
+    values: dict[str, Any] = {"to": tuple(round(float(value), MILLIMETRES) for value in to or node.box.center)}
+    if turn and node.world_from_model is not None:
+        pose = node.world_from_model
+        heading = (math.degrees(math.atan2(pose[1][0], pose[0][0])) + turn + 180.0) % 360.0 - 180.0
+        values |= {"heading_degrees": round(heading, 2), "model": node.model_id}
+    elif turn:
+        values["turn_degrees"] = turn
+    return values
+
+
 def joint_anchors(state: SceneState, node: GraphNode) -> dict[str, JointAnchor]:
     """Return joint -> its anchor, for the joints of the model that stands for a node. Raises Conflict without one."""
     model, folder, pose = state.model_of(node)
@@ -251,7 +247,7 @@ def add_joint(state: SceneState, edit: AddJoint, fitting: Fitting) -> Done:
     return Done("applied", (place,), f"{name} moves")
 
 
-APPLY: dict[type[Edit], Callable[[SceneState, Any, Fitting], Done]] = {
+SCENE_EDITS: Table[SceneState] = {
     ChooseModel: choose_model,
     Move: move,
     SetJoint: set_joint,

@@ -8,10 +8,11 @@ from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.panoptic_map import PanopticMap
 from stages.edit.anchoring import Fitting
+from stages.edit.applying import apply_edits
 from stages.edit.edits_file import read_edits
 from stages.edit.outcome import outcome_of, write_records
 from stages.edit.parameters import EditMapParameters
-from stages.edit.scene_edits import apply_scene_edits
+from stages.edit.scene_edits import SCENE_EDITS
 from stages.edit.scene_state import SceneState
 from stages.kit.stage import Context
 
@@ -40,9 +41,9 @@ def run(
         context.output,
     )
     with context.progress.step("apply the edits"):
-        records = apply_scene_edits(state, asked.edits, Fitting(**parameters.model_dump()))
+        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()), SCENE_EDITS)
     with context.progress.step("write the scene"):
-        state.write()
+        state.write(context.output)
         replacements = tuple(state.replacements.values())
         before.model_copy(update={"replacements": replacements}).write(context.output / "scene.json")
         state.graph.write(context.output / "graph.json")

@@ -39,7 +39,7 @@ class SceneState(GraphState):
     map_root: Path | None = None
     """Of the panoptic map, which has the meshes of what models stood for."""
     output: Path = Path()
-    """Where the edited scene is written; models that edits make are written at once."""
+    """Where models that edits make are written, at once."""
     made: dict[str, Path] = field(default_factory=dict)
     """Folder of each model that an edit made."""
     meshes: dict[str, Path] = field(default_factory=dict)
@@ -122,22 +122,22 @@ class SceneState(GraphState):
             self.moved[name] = motion @ self.moved.get(name, np.eye(4))
         self.replace_node(node.model_copy(update=values))
 
-    def write(self) -> None:
-        """Write models, meshes and layout of the scene as it is now."""
+    def write(self, root: Path) -> None:
+        """Write models, meshes and layout of the scene as it is now into a folder."""
         assert self.scene is not None
         used = {node.model_id for node in self.graph.nodes if node.model_id is not None}
         for model_id in sorted(used):
             folder = self.model_folder(model_id)
-            target = self.output / "models" / model_id
+            target = root / "models" / model_id
             if folder is None:
                 raise BadInput(f"{self.scene.path('models') / model_id}: model is missing", hint=HINT)
             if folder != target:
                 shutil.copytree(folder, target)
-        for model_id in self.made.keys() - used:
+        for model_id in self.made.keys() - used if root == self.output else ():
             shutil.rmtree(self.made[model_id])
         for node in self.graph.nodes:
             if node.model_id is None and (file := self.mesh_file(node)).is_file():
-                target = self.output / ("layout" if node.node_type == "layout" else "meshes") / f"{node.id}.ply"
+                target = root / ("layout" if node.node_type == "layout" else "meshes") / f"{node.id}.ply"
                 target.parent.mkdir(parents=True, exist_ok=True)
                 if node.id in self.moved:
                     write_ply(target, colored(self.mesh_of(node)))
@@ -145,8 +145,8 @@ class SceneState(GraphState):
                     shutil.copyfile(file, target)
         nameless = self.scene.path("meshes") / f"{SURROUNDINGS}.ply"
         if nameless.is_file():
-            (self.output / "meshes").mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(nameless, self.output / "meshes" / nameless.name)
+            (root / "meshes").mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(nameless, root / "meshes" / nameless.name)
 
 
 def transform_from_box(yaw: float) -> np.ndarray:

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from schemas.edits import AppliedEditsFile
 from schemas.errors import BadInput
 from schemas.evaluation import Evaluation, MetricsFile
 from schemas.manifest import Manifest
+from schemas.plain_text import cleaned
 from stages.engine.reading import read_manifest
 from stages.engine.run_folders import artifacts_of, is_artifact
 
@@ -26,7 +28,7 @@ class Change:
     """One thing that is not the same. None: it is not there on that side."""
 
     group: str
-    """`stage`, `parameter`, `library`, `data file`, `input`, `version`, `outcome`, `summary` or `problem`."""
+    """`stage`, `parameter`, `library`, `data file`, `input`, `version`, `outcome`, `summary`, `edit` or `problem`."""
     name: str
     before: Any
     after: Any
@@ -154,6 +156,10 @@ def _compare_one(name: str, first: Path | None, second: Path | None) -> Artifact
         return ArtifactComparison(name, known.kind, "only in second" if before is None else "only in first")
     assert first is not None and second is not None
     changes = list(_changes(before, after))
+    try:
+        changes += _differences("edit", _edits(first), _edits(second))
+    except BadInput as error:
+        changes.append(Change("problem", "edits", None, str(error)))
     measures: list[Figure] = []
     if before.kind == after.kind == Evaluation.kind:
         measures, broken = _measures(first, second)
@@ -183,6 +189,19 @@ def _changes(before: Manifest, after: Manifest) -> list[Change]:
     found += _differences("outcome", {"outcome": before.outcome}, {"outcome": after.outcome})
     found += _differences("summary", before.summary, after.summary)
     return found
+
+
+def _edits(root: Path) -> dict[str, str]:
+    """Return what became of each edit by hand of an artifact, and who made it."""
+    path = root / "edits.json"
+    if not path.is_file():
+        return {}
+    return {
+        f"{edit.number} ({edit.what})": cleaned(
+            ", ".join(word for word in (edit.status, *edit.things, edit.reason, edit.by, edit.when, edit.note) if word)
+        )
+        for edit in AppliedEditsFile.read(path).edits
+    }
 
 
 def _differences(group: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Change]:

@@ -129,6 +129,11 @@ def run(
     for folder in ("tables", "plots"):
         (context.output / folder).mkdir()
     if panoptic_map is not None:
+        if ground_truth is not None and panoptic_map.info.world_from_sequence is not None:
+            raise BadInput(
+                f"{panoptic_map.root}: an edit of gravity turned it out of the world that the truth is in",
+                hint="measure the map that was made before it",
+            )
         inputs.predicted_map = load_map(panoptic_map)
     if ground_truth is not None:
         with context.progress.step("read ground truth"):

@@ -1,4 +1,4 @@
-"""Declarations of the steps `truth scenenn` and `truth supports`."""
+"""Declarations of the steps `truth scenenn`, `truth supports` and `truth edited`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraph
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence
@@ -37,6 +39,12 @@ class SupportsParameters(Parameters):
     point_reach: float = Field(
         0.1, gt=0, le=1, description="A node that is given by a point is the entity of the map at most this far [m]"
     )
+
+
+class EditedParameters(Parameters):
+    """How an edited scene is called as an annotation."""
+
+    name: str = Field("", pattern=r"^[A-Za-z0-9_.\-]*$", description="Name of the scene")
 
 
 SCENENN = Stage(
@@ -73,4 +81,22 @@ SUPPORTS = Stage(
     "--sequence outputs/kitchen/sequence --out outputs/kitchen/ground_truth",
 )
 
-STAGES = (SCENENN, SUPPORTS)
+EDITED = Stage(
+    name="truth edited",
+    version=1,
+    summary="Make ground truth out of a map, graph and scene that somebody put right by hand (`edit`)",
+    parameters=EditedParameters,
+    reads={
+        "sequence": Sequence,
+        "panoptic_map": PanopticMap,
+        "contact_graph": ContactGraph,
+        "cad_scene": Optionally(CadScene),
+    },
+    writes=GroundTruth,
+    libraries=("numpy", "scipy", "trimesh"),
+    module="edited",
+    example="scenewright truth edited --sequence outputs/room/sequence --panoptic-map outputs/room/edited_map "
+    "--contact-graph outputs/room/edited_graph --out outputs/room/ground_truth",
+)
+
+STAGES = (SCENENN, SUPPORTS, EDITED)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from schemas.interactive_scene import SettledBody, SettleFile
 from schemas.vocabulary import load_vocabulary
+from stages.kit.geometry.transforms import quaternion_of
 from stages.kit.simulation.engine import engine
 from stages.kit.simulation.world import PhysicsWorld, load_scene
 from stages.urdf.joint_sweep import JointRange, sweep_joints
@@ -22,6 +24,10 @@ MOVED_LIMIT = 0.01
 """A movable body that moves further has not stayed [m]."""
 TURNED_LIMIT = np.radians(2.0)
 """A movable body that turns further has not stayed [rad]."""
+WATCHED = 0.05
+"""How often is looked at what was let go [s]."""
+SEEN_MOVE = 1e-3
+"""A body that never goes further is shown standing still [m]."""
 COLLISION_DEPTH = 0.005
 """Two bodies collide when they lie deeper than this in each other at rest [m]."""
 
@@ -39,6 +45,10 @@ class BodyMotion:
     """Whether all of it ended below the top of the floor (without a floor: below everything that is fixed)."""
     moved_limit: float = MOVED_LIMIT
     turned_limit: float = TURNED_LIMIT
+    leaves: float | None = None
+    """When it first was beyond a limit, as far as it was looked at [s]."""
+    poses: tuple[np.ndarray, ...] = field(default=(), compare=False, repr=False)
+    """(4, 4) of its frame in the world, every WATCHED seconds from the start on."""
 
     @property
     def stays(self) -> bool:
@@ -127,10 +137,16 @@ class SettleReport:
             "seconds": self.seconds,
             "max_penetration_mm": self.max_penetration_mm,
             "collisions": len(self.collisions),
-            "bodies": [asdict(body) | {"stays": body.stays} for body in self.bodies],
+            "bodies": [_plain(body) for body in self.bodies],
             "joints": [asdict(joint) | {"free_at_start": joint.free_at_start} for joint in self.joints],
             "overlaps": [asdict(overlap) for overlap in self.overlaps],
         }
+
+
+def _plain(body: BodyMotion) -> dict[str, Any]:
+    values = asdict(replace(body, poses=()))
+    del values["poses"], values["leaves"]
+    return values | {"stays": body.stays}
 
 
 def settle_report(
@@ -172,21 +188,69 @@ def _let_go(world: PhysicsWorld, seconds: float, moved_limit: float, turned_limi
     ground = _ground(world)
     movable = free_bodies(world)
     before = {name: world.center_of_mass(name) for name in movable}
-    world.step(round(seconds / world.time_step))
+    left: dict[str, float] = {}
+    seen = {name: [world.pose(name)] for name in movable}
+    steps = round(seconds / world.time_step)
+    every = max(1, round(WATCHED / world.time_step))
+    for done in range(0, steps, every):
+        count = min(every, steps - done)
+        world.step(count)
+        for name in movable:
+            moved, turned = _gone(before[name], world.center_of_mass(name))
+            seen[name].append(world.pose(name))
+            if moved > moved_limit or turned > turned_limit:
+                left.setdefault(name, (done + count) * world.time_step)
     motions = []
     for name in movable:
-        after = world.center_of_mass(name)
+        moved, turned = _gone(before[name], world.center_of_mass(name))
         motions.append(
             BodyMotion(
                 name,
-                moved=float(np.linalg.norm(after[:3, 3] - before[name][:3, 3])),
-                turned=float(Rotation.from_matrix(before[name][:3, :3].T @ after[:3, :3]).magnitude()),
+                moved,
+                turned,
                 fell_through=bool(world.bounds(name)[1][2] < ground),
                 moved_limit=moved_limit,
                 turned_limit=turned_limit,
+                leaves=left.get(name),
+                poses=tuple(seen[name]),
             )
         )
     return motions
+
+
+def _gone(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
+    """Return how far [m] and by how much [rad] a pose (4, 4) is another one."""
+    turned = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).magnitude()
+    return float(np.linalg.norm(after[:3, 3] - before[:3, 3])), float(turned)
+
+
+def settle_file(report: SettleReport) -> SettleFile:
+    """Return how the test went, as it is kept: to tenths of a millimetre."""
+    count = max((len(body.poses) for body in report.bodies), default=0)
+    times = tuple(round(min(k * WATCHED, report.seconds), 4) for k in range(count))
+    troubles = [f"{pair.first} lies {1000 * pair.depth:.0f} mm in {pair.second}" for pair in report.collisions]
+    troubles += [f"{joint.joint} meets {joint.hit_link} at the start of its motion" for joint in report.blocked]
+    return SettleFile(
+        times=times,
+        bodies=tuple(_settled(body) for body in report.bodies),
+        troubles=tuple(troubles),
+        verdict=report.verdict,
+        reason=report.reason,
+    )
+
+
+def _settled(body: BodyMotion) -> SettledBody:
+    far = max((_gone(body.poses[0], pose)[0] for pose in body.poses), default=0.0)
+    shown = body.poses if far > SEEN_MOVE or not body.stays else ()
+    rows = [np.round([*pose[:3, 3], *quaternion_of(pose)], 4).tolist() for pose in shown]
+    return SettledBody(
+        name=body.name,
+        moved=round(body.moved, 4),
+        turned=round(body.turned, 4),
+        leaves=None if body.stays else body.leaves,
+        fell_through=body.fell_through,
+        poses=tuple(tuple(row) for row in rows),
+    )
 
 
 def _ground(world: PhysicsWorld) -> float:

@@ -17,7 +17,7 @@ from stages.urdf.bodies import scene_bodies
 from stages.urdf.exports import write_exports
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.resting import rested_bodies
-from stages.urdf.settle_report import SettleReport, settle_report
+from stages.urdf.settle_report import SettleReport, settle_file, settle_report
 from stages.urdf.wedged import wedged_furniture
 
 
@@ -58,6 +58,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
     if parameters.settle_seconds:
         with context.progress.step("settle in physics"):
             report = _settle(context, parameters)
+        settle_file(report).write(context.output / "settle.json")
         summary |= _measures(report)
         if scene.bodies and not report.settled:
             outcome, summary["reason"] = report.verdict, report.reason

@@ -40,7 +40,7 @@ FUSED: dict[str, dict[str, Any]] = {
 CORRUPTION = 0.2
 """Of the true masks."""
 TUNING = tuple(f"{recipe}-40" for recipe in RECIPES)
-REPORTING = tuple(f"{recipe}-{seed}" for seed in range(7400, 7404) for recipe in RECIPES)
+REPORTING = tuple(f"{recipe}-{seed}" for seed in range(8100, 8113) for recipe in RECIPES)
 LANDINGS = ("right", "wrong", "conflict", "absent")
 
 Landed = dict[str, float]

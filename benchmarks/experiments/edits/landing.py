@@ -10,9 +10,10 @@ import numpy as np
 
 from benchmarks.experiments.edits.making import Asked
 from benchmarks.experiments.edits.truth import MapTruth, true_object
-from schemas.edits import Add, Anchor, Merge
+from schemas.edits import Add, Anchor, Merge, SetFloor, SetGravity
 from stages.edit.anchoring import Fitting
 from stages.edit.applying import apply_edits
+from stages.edit.map_edits import MAP_EDITS
 from stages.edit.map_state import MapState
 from stages.edit.parameters import EditMapParameters
 from stages.evaluate.truth import TrueRoom
@@ -26,7 +27,7 @@ Arm = Callable[[Asked, MapState, MapTruth, TrueRoom], "Landing | None"]
 def by_geometry(asked: Asked, state: MapState, truth: MapTruth, room: TrueRoom) -> Landing:
     """Apply the edit to a copy of the map and look at what it changed."""
     after = replace(state, entities=dict(state.entities), touched=set(), _things=dict(state._things))
-    (record,) = apply_edits(after, [asked.edit], FITTING)
+    (record,) = apply_edits(after, [asked.edit], FITTING, MAP_EDITS)
     if record.status == "conflict":
         return "conflict" if all(truth.has(true) for true in asked.true) else "absent"
     named = [int(name.rsplit("_", 1)[1]) for name in record.things]
@@ -59,7 +60,7 @@ def by_nearest(asked: Asked, state: MapState, truth: MapTruth, room: TrueRoom) -
 
 
 def _anchors(asked: Asked) -> tuple[Anchor, ...]:
-    if isinstance(asked.edit, Add):
+    if isinstance(asked.edit, Add | SetGravity | SetFloor):
         return ()
     return asked.edit.of if isinstance(asked.edit, Merge) else (asked.edit.of,)
 

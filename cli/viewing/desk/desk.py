@@ -1,44 +1,27 @@
-"""What lies on the desk: an artifact, the edits of a file, and what these come to on the map that it was made from.
-
-The map is held as the edits leave it, as each is applied to what those before it left: who clicks on a thing means it
-as it is now, and what became of every edit is said at once.
-"""
+"""What lies on the desk: an artifact, the edits of a file, and what these come to, said at once, on the artifact and on
+what it was made from."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import trimesh
-
 from cli.edit_command import asked_edit
-from cli.viewing.desk.forms import forms_of, kinds_of
-from cli.viewing.inputs import input_artifact
+from cli.viewing.desk.forms import forms_of
+from cli.viewing.desk.subjects import subjects_of
 from cli.viewing.view import viewer_of
-from schemas.artifact import Artifact
-from schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile, MapEdit
+from schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile
 from schemas.errors import BadInput, ScenewrightError, UsageError
-from schemas.panoptic_map import PanopticMap
 from schemas.plain_text import cleaned
 from schemas.vocabulary import load_vocabulary
-from stages.edit.anchoring import Fitting, anchor_of
-from stages.edit.applying import apply_edits
 from stages.edit.edits_file import UNWRITTEN, Changed, append_edits, read_edits, remove_edit, revision_of
-from stages.edit.map_state import MapState, read_state
-from stages.edit.parameters import EditMapParameters
 from stages.engine.reading import open_artifact, read_manifest
 from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.maps import ShownThing, draw_map
 from stages.kit.viewing.page.page_canvas import PageCanvas, ServedPage
 
 SCRIPT = Path(__file__).with_name("editing.js")
-MOST_GENERATIONS = 20
-"""Artifacts between one and the map that it was made from."""
-FITTING = Fitting(**EditMapParameters.model_validate({}).model_dump())
-"""As `edit map` takes it unless it is told otherwise."""
 EMPTY = EditsFile(format="scenewright-edits", version=1)
 
 
@@ -49,7 +32,7 @@ class Stale(BadInput):
 class Desk:
     """One artifact, one file of edits (or None: there is nothing to edit), one who asks at a time.
 
-    Raises BadInput for an artifact that cannot be shown, or of which no map is found that could be edited.
+    Raises BadInput for an artifact that cannot be shown, or when neither it nor what it was made from can be edited.
     """
 
     def __init__(self, path: Path, edits: Path | None, *, read_only: bool = False) -> None:
@@ -67,21 +50,12 @@ class Desk:
         artifact = open_artifact(self.path)
         if viewer_of(type(artifact)) is None:
             raise BadInput(f"{self.path}: a {artifact.kind!r} artifact has no view", hint="open its files elsewhere")
-        origin, seen, instances = None, None, {}
-        if self.edits is not None:
-            origin = next(maps_behind(artifact), None)
-            if origin is None:
-                raise BadInput(
-                    f"{self.path}: the map that it was made from is not there any more",
-                    hint="give the panoptic map itself",
-                )
-            seen, _ = read_state(origin)
-            instances = {thing.name: thing.instance for thing in seen.things()}
-        self._artifact, self._origin, self._seen, self._instances = artifact, origin, seen, instances
-        self._state: MapState | None = None
+        self.subjects = [] if self.edits is None else subjects_of(artifact, self.edits)
+        self._artifact = artifact
         self._applied: tuple[AnyEdit, ...] = ()
         self._records: list[AppliedEdit] = []
-        self._revision, self._trouble = "", ""
+        self._revision: str | None = None
+        self._trouble = ""
 
     @property
     def shown(self) -> str:
@@ -94,23 +68,25 @@ class Desk:
         return read_manifest(self.path).content_digest
 
     def _apply(self) -> None:
-        """Bring the map up to what the file says now; a file that is broken is said, and changes nothing."""
-        assert self.edits is not None and self._seen is not None
+        """Bring what is held up to what the file says now; a file that is broken is said, and changes nothing."""
+        assert self.edits is not None
         try:
             revision = revision_of(self.edits)
-            if revision == self._revision and self._state is not None:
+            if revision == self._revision:
                 return
             asked: Sequence[AnyEdit] = (read_edits(self.edits) if revision else EMPTY).edits
         except ScenewrightError as error:
             self._trouble = str(error)
-            self._state = self._state or _copy(self._seen)
             return
         self._trouble = ""
         done = len(self._applied)
-        if self._state is None or tuple(asked[:done]) != self._applied:
-            self._state, self._records, done = _copy(self._seen), [], 0
-        for record in apply_edits(self._state, asked[done:], FITTING):
+        if tuple(asked[:done]) != self._applied:
+            self._records, done = [], 0
+            for subject in self.subjects:
+                subject.restart()
+        for record in (record for subject in self.subjects for record in subject.apply(asked[done:])):
             self._records.append(record.model_copy(update={"number": done + record.number}))
+        self._records.sort(key=lambda record: record.number)
         self._applied, self._revision = tuple(asked), revision
 
     # ---- what the page shows -----------------------------------------------------------------------------------------
@@ -124,7 +100,7 @@ class Desk:
                 pass  # half written, or gone: `now` says so on the page
             if self.edits is not None:
                 self._apply()
-            made_of = (self.shown, self._revision)
+            made_of = (self.shown, self._revision or "")
             if made_of != self._page_of:
                 canvas = PageCanvas(f"{self._artifact.kind} {self.path.resolve().name}")
                 self._draw(canvas)
@@ -133,31 +109,30 @@ class Desk:
             return self._page
 
     def _draw(self, canvas: Canvas) -> None:
-        if self._state is None or not isinstance(self._artifact, PanopticMap):
-            draw = viewer_of(type(self._artifact))
-            assert draw is not None
-            draw(self._artifact, canvas)
+        if self._shows_edits:
+            self.subjects[0].draw(canvas)
             return
-        surface, state = self._state.surface, self._state
-        mesh = trimesh.Trimesh(surface.vertices, surface.faces, vertex_colors=surface.colors, process=False)
-        things = [
-            ShownThing(thing.instance, thing.class_name, state.entities[thing.instance].confidence, thing.box)
-            for thing in state.things()
-        ]
-        draw_map(mesh, state.instance, things, canvas)
+        draw = viewer_of(type(self._artifact))
+        assert draw is not None
+        draw(self._artifact, canvas)
+
+    @property
+    def _shows_edits(self) -> bool:
+        """Whether what is shown is itself what edits are of, and not only made from that."""
+        return bool(self.subjects) and isinstance(self._artifact, type(self.subjects[0].artifact))
 
     def _facts(self) -> dict[str, Any]:
-        if self.edits is None or self._origin is None:
+        if self.edits is None:
             return {"artifact": self.shown}
         return {
             "artifact": self.shown,
             "read_only": self.read_only,
-            "revision": self._revision,
-            "forms": forms_of(kinds_of(MapEdit)),
+            "revision": self._revision or "",
+            "forms": [form | {"of": one.artifact.kind} for one in self.subjects for form in forms_of(one.table)],
             "classes": [entry.name for entry in load_vocabulary().classes],
-            "file": cleaned(str(self.edits)),
-            "next": cleaned(f"scenewright edit map --panoptic-map {self._origin.root} --edits {self.edits} --out ..."),
-            "is_map": isinstance(self._artifact, PanopticMap),
+            "next": [cleaned(f"{one.command()} --edits {self.edits} --out ...") for one in self.subjects],
+            "shows_edits": self._shows_edits,
+            **self.subjects[0].facts(),
         }
 
     def now(self) -> dict[str, Any]:
@@ -173,13 +148,12 @@ class Desk:
             told: dict[str, Any] = {"artifact": there, "trouble": trouble}
             if self.edits is not None:
                 self._apply()
-                assert self._state is not None
                 rows = [{**record.model_dump(mode="json"), "of": _said(edit)} for record, edit in self._pairs()]
                 told |= {
                     "trouble": trouble or cleaned(self._trouble),
-                    "revision": self._revision,
+                    "revision": self._revision or "",
                     "rows": rows,
-                    "things": [thing.name for thing in self._state.things()],
+                    "things": [thing.name for thing in self.subjects[0].state.things()],
                 }
             return told
 
@@ -211,71 +185,23 @@ class Desk:
         if artifact != self.shown or self._there() != self.shown:
             raise Stale(f"{self.path}: what the page shows was made anew since", hint="load the page again")
         self._apply()
-        if revision != self._revision:
+        if revision != (self._revision or ""):
             raise Changed(f"{self.edits}: somebody else has changed it meanwhile", hint=UNWRITTEN)
         return self.edits
 
     def _anchored(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of an edit with anchors where things are named."""
-        fields = {form["what"]: form["fields"] for form in forms_of(kinds_of(MapEdit))}
+        forms = {form["what"]: (one, form["fields"]) for one in self.subjects for form in forms_of(one.table)}
         what = asked.get("what")
-        if not isinstance(what, str) or what not in fields:
-            raise UsageError(f"there is no edit {what!r:.40} here", hint=f"there are {', '.join(fields)}")
-        values: dict[str, Any] = {"what": what}
-        for field in fields[what]:
-            given = asked.get(field["name"])
-            if given is None:
-                continue
-            if field["kind"] == "thing" and given not in field.get("choices", ()):
-                given = self._anchor(given)
-            elif field["kind"] == "things" and isinstance(given, list):
-                given = [self._anchor(name) for name in given]
-            values[field["name"]] = given
-        return values
-
-    def _anchor(self, name: object) -> dict[str, Any]:
-        assert self._state is not None
-        instances = {thing.name: thing.instance for thing in self._state.things()}
-        instance = instances.get(str(name), self._instances.get(str(name)))
-        if instance is None:
-            raise UsageError(f"there is no thing {str(name)!r:.80} here", hint="click on one")
-        if instance not in instances.values():
-            raise UsageError(f"{name} is not there any more: an edit took it away", hint="delete that edit first")
-        return anchor_of(self._state, instance).model_dump(mode="json", by_alias=True)
-
-
-def maps_behind(artifact: Artifact) -> Iterator[PanopticMap]:
-    """Yield the map that an artifact is, or was made from, the nearest first, as far as they are still there."""
-    waiting = [artifact]
-    for _ in range(MOST_GENERATIONS):
-        below: list[Artifact] = []
-        for one in waiting:
-            if isinstance(one, PanopticMap):
-                yield one
-                continue
-            found = input_artifact(one, PanopticMap)
-            if found is not None:
-                yield found
-                continue
-            kinds = {record.kind for record in one.manifest.inputs} if one.manifest is not None else set()
-            below += [made for kind in sorted(kinds) if (made := _input_of(one, kind)) is not None]
-        waiting = below
-
-
-def _input_of(artifact: Artifact, kind: str) -> Artifact | None:
-    from schemas.kinds import KINDS
-
-    return input_artifact(artifact, KINDS[kind]) if kind in KINDS else None
-
-
-def _copy(state: MapState) -> MapState:
-    """Return a map that is edited without changing the one it was copied from."""
-    return replace(state, entities=dict(state.entities), touched=set(state.touched), _things=dict(state._things))
+        if not isinstance(what, str) or what not in forms:
+            raise UsageError(f"there is no edit {what!r:.40} here", hint=f"there are {', '.join(forms)}")
+        subject, fields = forms[what]
+        return subject.fields(what, fields, asked)
 
 
 def _said(edit: Edit) -> str:
     """Return an edit in a few words."""
-    values = edit.model_dump(mode="json", by_alias=True, exclude={"what", "by", "when", "note"})
+    values = edit.model_dump(mode="json", by_alias=True, exclude={"what", "by", "when", "note"}, exclude_defaults=True)
     of = values.get("of")
     things = of if isinstance(of, list) else [of] if isinstance(of, dict) else []
     words = [

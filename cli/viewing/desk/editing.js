@@ -31,7 +31,10 @@ window.addEventListener("scenewright-ready", async function () {
   names.id = "classes";
   if (served.forms) {
     for (const name of served.classes) { const option = made("option"); option.value = name; names.append(option); }
+    const several_ = new Set(served.forms.map((one) => one.of)).size > 1;
+    let of = "";
     for (const one of served.read_only ? [] : served.forms) {
+      if (several_ && one.of !== of) kinds.append(made("small", `${of = one.of}`.replaceAll("_", " "), "of"));
       const button = made("button", one.what);
       button.type = "button";
       button.dataset.kind = one.what;
@@ -39,9 +42,12 @@ window.addEventListener("scenewright-ready", async function () {
       button.addEventListener("click", () => begin(form === one ? null : one));
       kinds.append(button);
     }
-    const next = made("details"), command = made("code", served.next);
-    next.append(made("summary", "The next command"), command);
-    card.append(kinds, place, list, names);
+    const next = made("details");
+    next.append(made("summary", served.next.length > 1 ? "The next commands" : "The next command"), ...served.next.map((line) => made("code", line)));
+    const models = made("datalist");
+    models.id = "models";
+    for (const name of served.models) { const option = made("option"); option.value = name; models.append(option); }
+    card.append(kinds, place, list, names, models);
     desk.append(card, next);
     for (const name of ["by", "note"]) values[name] = "";
   } else desk.append(trouble);
@@ -54,20 +60,23 @@ window.addEventListener("scenewright-ready", async function () {
     if (!one) { place.hidden = true; place.replaceChildren(); aim(); return; }
     for (const field of one.fields) {
       values[field.name] = field.kind === "things" ? [] : field.start;
-      if (["thing", "things"].includes(field.kind) && state.chosen) take(field, state.chosen);
+      if (state.chosen && (field.kind === "things" || field.kind === "thing" && !values.of)) take(field, state.chosen);
     }
-    wanted = one.fields.find((field) => field.kind === "things" || empty(field)) || null;
+    wanted = one.fields.find((field) => CLICKED.includes(field.kind) && (field.kind === "things" || field.needed && empty(field))) || null;
     fill();
   }
-  const empty = (field) => values[field.name] === null || values[field.name] === undefined || values[field.name] === "" || (field.kind === "things" && values[field.name].length < field.fewest);
+  const CLICKED = ["thing", "things", "box", "point", "points", "place", "direction"];
+  const known_ = () => served.things?.[values.of];  // what the server says of the thing that the edit is about
+  const empty = (field) => values[field.name] === null || values[field.name] === undefined || values[field.name] === "" || (["things", "points"].includes(field.kind) && (values[field.name]?.length ?? 0) < field.fewest);
   const complete = () => form.fields.every((field) => !field.needed || !empty(field));
 
   function fill() {
     place.replaceChildren(made("p", form.says, "says"));
+    if (known_()?.says) place.append(made("p", `${values.of}: ${known_().says}`, "says"));
     place.hidden = false;
     for (const field of form.fields) {
       // A label would pass clicks on its text to the first button in it.
-      const label = made(["thing", "things", "box", "point", "numbers"].includes(field.kind) ? "div" : "label", undefined, "field");
+      const label = made([...CLICKED, "numbers", "model"].includes(field.kind) ? "div" : "label", undefined, "field");
       label.append(made("span", field.name.replaceAll("_", " ") + (field.needed ? "" : " (may be left out)")), widget(field));
       place.append(label);
     }
@@ -81,10 +90,11 @@ window.addEventListener("scenewright-ready", async function () {
     const row = made("div", undefined, "tools");
     row.append(send, stop);
     place.append(note, row);
+    preview();
     aim();
   }
   const ready = () => { const send = place.querySelector("[type=submit]"); if (send) send.disabled = !complete() || busy; };
-  const set = (field, value) => { values[field.name] = value; ready(); };
+  const set = (field, value) => { values[field.name] = value; preview(); ready(); };
 
   const WIDGETS = {
     thing: slot, things: slot,
@@ -111,7 +121,50 @@ window.addEventListener("scenewright-ready", async function () {
       input.addEventListener("change", () => set(field, field.choices.find((choice) => String(choice) === input.value) ?? null));
       return input;
     },
-    point: (field) => several(field, 3, "click where", values[field.name], (numbers) => set(field, numbers)),
+    point: (field) => clicked(field, "click where"),
+    points(field) {
+      const whole = clicked(field, `click ${values[field.name]?.length ? "another one" : "places on it"}`, false), given = values[field.name] || [];
+      if (given.length) {
+        const again = made("button", `${given.length} places ×`, "thing");
+        again.type = "button";
+        again.title = "begin again";
+        again.addEventListener("click", () => { values[field.name] = []; wanted = field; fill(); });
+        whole.append(again);
+      }
+      return whole;
+    },
+    place: (field) => clicked(field, "click what it is to stand on"),
+    direction(field) {
+      const row = made("div", undefined, "kinds"), whole = clicked(field, { normal: "click a surface: out of it", along: corners.length ? "and to where" : "click from where" }[way] || "");
+      for (const [word, given] of [["up", [0, 0, 1]], ["down", [0, 0, -1]], ["out of a surface", "normal"], ["along two clicks", "along"]]) {
+        const one = made("button", word);
+        one.type = "button";
+        one.addEventListener("click", () => { corners = []; if (typeof given === "string") { way = given; wanted = field; } else { way = ""; values[field.name] = given; following(); } fill(); });
+        row.append(one);
+      }
+      whole.prepend(row);
+      return whole;
+    },
+    joint(field) {
+      const input = made("select"), joints = known_()?.joints || [];
+      if (!joints.some((joint) => joint.name === values[field.name])) values[field.name] = joints.length === 1 ? joints[0].name : null;
+      input.append(made("option", joints.length ? "" : values.of ? "it has none" : "click a thing first"));
+      for (const joint of joints) { const option = made("option", `${joint.name} (${joint.says})`); option.value = joint.name; option.selected = values[field.name] === joint.name; input.append(option); }
+      input.addEventListener("change", () => set(field, joints.some((joint) => joint.name === input.value) ? input.value : null));
+      return input;
+    },
+    model(field) {
+      const whole = made("div"), row = made("div", undefined, "kinds"), input = line(field, "a model");
+      input.setAttribute("list", "models");
+      for (const word of [...field.choices, ...(known_()?.models || [])]) {
+        const one = made("button", word);
+        one.type = "button";
+        one.addEventListener("click", () => { input.value = word; set(field, word); });
+        row.append(one);
+      }
+      whole.append(input, row);
+      return whole;
+    },
     numbers: (field) => several(field, field.count, "", values[field.name], (numbers) => set(field, numbers)),
     box,
   };
@@ -136,6 +189,15 @@ window.addEventListener("scenewright-ready", async function () {
       inputs.push(input);
       whole.append(input);
     }
+    return whole;
+  }
+  let way = "";          // how the next clicks say a direction
+  function clicked(field, hint, numbers = true) {
+    const whole = made("div"), where = made("div", undefined, "slot");
+    if (wanted === field) where.classList.add("wanted");
+    where.append(made("span", wanted === field ? hint : "click to point at it", "hint"));
+    where.addEventListener("click", () => { wanted = field; corners = []; fill(); });
+    whole.append(...(hint ? [where] : []), ...(numbers ? [several(field, 3, "", values[field.name], (numbers) => set(field, numbers))] : []));
     return whole;
   }
   function slot(field) {
@@ -193,6 +255,12 @@ window.addEventListener("scenewright-ready", async function () {
     }
     draw();
   }
+  const drawMarks = (points) => drawBox(points.length ? { center: points[points.length - 1], size: [0.03, 0.03, 0.03] } : null);
+  function preview() {
+    const box = form?.fields.find((field) => field.kind === "box"), goes = form?.fields.find((field) => field.kind === "place"), at = known_()?.box;
+    if (goes && at) drawBox({ ...at, center: values[goes.name] || at.center, yaw_degrees: at.yaw_degrees + (values.turn_degrees || 0) });
+    else if (box) drawBox(values[box.name]);
+  }
   const round = (value) => Math.round(1000 * value) / 1000;
   function boxOf(a, b) {
     // Two clicks on surfaces: what lies between them, and a little more, so that flat things have a height.
@@ -202,8 +270,9 @@ window.addEventListener("scenewright-ready", async function () {
   }
 
   // ---- clicks --------------------------------------------------------------------------------------------------------
+  const POINTED = ["box", "point", "points", "place", "direction"];
   function aim() {
-    const picking = form && wanted && ["box", "point"].includes(wanted.kind);
+    const picking = form && wanted && POINTED.includes(wanted.kind);
     element("picture").classList.toggle("aiming", Boolean(picking));
     const chosen = form ? form.fields.flatMap((field) => (field.kind === "things" ? values[field.name] : field.kind === "thing" && values[field.name] ? [values[field.name]] : [])) : [];
     if (form) markNodes(chosen.length ? chosen : state.chosen ? [state.chosen] : []);
@@ -212,11 +281,19 @@ window.addEventListener("scenewright-ready", async function () {
     if (field.kind === "thing") values[field.name] = name;
     else values[field.name] = values[field.name].includes(name) ? values[field.name].filter((one) => one !== name) : [...values[field.name], name];
   }
-  on("point", (point) => {
-    if (!form || !wanted || !["box", "point"].includes(wanted.kind)) return false;
+  on("point", (point, normal) => {
+    if (!form || !wanted || !POINTED.includes(wanted.kind) || wanted.kind === "direction" && !way) return false;
     if (wanted.kind === "point") { values[wanted.name] = point.map(round); following(); return true; }
+    if (wanted.kind === "points") { values[wanted.name] = [...(values[wanted.name] || []), point.map(round)]; drawMarks(values[wanted.name]); fill(); return true; }
+    if (wanted.kind === "place") { values[wanted.name] = [point[0], point[1], point[2] + (known_()?.box.size[2] || 0) / 2].map(round); wanted = null; fill(); return true; }
+    if (way === "normal") { values[wanted.name] = normal.map(round); way = ""; following(); return true; }
     corners.push(point);
-    if (corners.length === 2) {
+    if (corners.length === 2 && way === "along") {
+      const across = corners[1].map((value, k) => value - corners[0][k]), length = Math.hypot(...across);
+      if (length > 1e-3) values[wanted.name] = across.map((value) => round(value / length));
+      way = ""; corners = [];
+      following();
+    } else if (corners.length === 2) {
       values[wanted.name] = boxOf(...corners);
       drawBox(values[wanted.name]);
       corners = [];
@@ -224,12 +301,14 @@ window.addEventListener("scenewright-ready", async function () {
     } else fill();
     return true;
   });
-  function following() { wanted = form.fields.find((field) => field.needed && empty(field)) || null; fill(); }
+  function following() { wanted = form.fields.find((field) => CLICKED.includes(field.kind) && field.needed && empty(field)) || null; fill(); }
   on("chosen", (name) => {
     if (!form || !name) return;
-    const field = wanted && ["thing", "things"].includes(wanted.kind) ? wanted : form.fields.find((one) => one.kind === "things") || form.fields.find((one) => one.kind === "thing" && empty(one));
+    const field = wanted && ["thing", "things"].includes(wanted.kind) ? wanted : form.fields.find((one) => one.kind === "things") || form.fields.find((one) => one.kind === "thing" && empty(one)) || form.fields.find((one) => one.kind === "thing");
     if (!field) return;
     take(field, name);
+    const goes = form.fields.find((one) => one.kind === "place");
+    if (goes && field.name === "of") values[goes.name] = known_()?.box.center ?? null;
     if (field.kind === "thing") following(); else fill();
   });
 
@@ -245,9 +324,8 @@ window.addEventListener("scenewright-ready", async function () {
     busy = true; ready(); complain("");
     try {
       const told = await ask("do", { artifact: served.artifact, revision: known.revision, by: "", ...more });
-      const changed = told.revision !== known.revision;
       show(told);
-      if (changed && served.is_map) again();
+      if (outdated()) again();
       return true;
     } catch (error) {
       complain(error.message);
@@ -255,6 +333,8 @@ window.addEventListener("scenewright-ready", async function () {
       return false;
     } finally { busy = false; ready(); }
   }
+  // By what this page was made with, not by what was told last: of an answer and a look that cross, either may be the last.
+  const outdated = () => served.shows_edits && known.revision !== served.revision && !known.trouble;
   function again() {
     // The server draws the map as the edits leave it; the address keeps the view.
     state.chosen = "";
@@ -293,9 +373,8 @@ window.addEventListener("scenewright-ready", async function () {
     asking = true;
     try {
       const told = await ask("now");
-      const other = known && told.revision !== known.revision;
       show(told);
-      if (other && served.is_map && !form && !busy) again();
+      if (outdated() && !form && !busy) again();
     } catch (error) { complain(error.message); }
     asking = false;
   }

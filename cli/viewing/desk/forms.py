@@ -18,6 +18,8 @@ from schemas.hand_written import Point, UprightBox
 
 OF_ALL = frozenset({*edits.Edit.model_fields, "what"})
 """Fields that every edit has: who, when and why are asked for once."""
+WITHOUT = {"thing": "nothing", "model": "none"}
+"""Kind of a field -> the word for leaving it out, where that says something: who edits has to choose it."""
 Form = dict[str, Any]
 
 
@@ -32,7 +34,12 @@ def forms_of(kinds: Iterable[type[edits.Edit]]) -> list[Form]:
     """Return the forms of the kinds that can be asked for on a page, as JSON: `what`, `says`, and `fields`."""
     found = []
     for kind in kinds:
-        fields = [field_of(info.alias or name, info) for name, info in kind.model_fields.items() if name not in OF_ALL]
+        asked = {
+            info.alias or name: info
+            for name, info in kind.model_fields.items()
+            if name not in OF_ALL and edits.Asked.NOT not in info.metadata
+        }
+        fields = [field_of(name, info) for name, info in asked.items()]
         if all(field is not None for field in fields):
             (what,) = get_args(kind.model_fields["what"].annotation)
             found.append({"what": what, "says": (kind.__doc__ or "").split("\n")[0], "fields": fields})
@@ -47,6 +54,8 @@ def field_of(name: str, info: FieldInfo) -> Form | None:
     if asked is None:
         return None
     start = None if needed or not isinstance(info.default, str | int | float | bool) else info.default
+    if not needed and (word := WITHOUT.get(asked["kind"])) is not None:
+        needed, asked = True, {**asked, "choices": [*asked.get("choices", ()), word]}
     return {"name": name, "needed": needed, "start": start, **asked}
 
 
@@ -54,6 +63,9 @@ def _kind_of(annotation: Any, metadata: tuple[Any, ...]) -> Form | None:
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
         return _kind_of(inner, (*metadata, *more))
+    said = next((one for one in metadata if isinstance(one, edits.Asked)), None)
+    if said is not None:
+        return {"kind": said.value}
     if annotation == Point:
         return {"kind": "point"}
     if get_origin(annotation) in (Union, types.UnionType):
@@ -64,6 +76,8 @@ def _kind_of(annotation: Any, metadata: tuple[Any, ...]) -> Form | None:
         return _kind_of_tuple(get_args(annotation), metadata)
     if annotation is edits.Anchor:
         return {"kind": "thing"}
+    if annotation is edits.JointAnchor:
+        return {"kind": "joint"}
     if annotation is UprightBox:
         return {"kind": "box"}
     if annotation is bool:
@@ -91,6 +105,9 @@ def _kind_of_tuple(parts: tuple[Any, ...], metadata: tuple[Any, ...]) -> Form | 
     if parts == (edits.Anchor, ...):
         fewest = next((one.min_length for one in metadata if hasattr(one, "min_length")), 1)
         return {"kind": "things", "fewest": fewest}
+    if len(parts) == 2 and parts[0] == Point and parts[1] is Ellipsis:
+        fewest = next((one.min_length for one in metadata if hasattr(one, "min_length")), 1)
+        return {"kind": "points", "fewest": fewest}
     if Ellipsis not in parts and all(part is float or _is_number(part) for part in parts):
         return {"kind": "numbers", "count": len(parts)}
     return None

@@ -14,6 +14,7 @@ from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
 from stages.kit.drawing.palette import instance_color
 from stages.kit.formats.link_poses import link_poses
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
+from stages.kit.geometry.transforms import inverse, transform_from_quaternion
 from stages.kit.viewing.canvas import SHELL, Canvas, JointedLink, Trust
 from stages.kit.viewing.graphs import draw_graph
 from stages.kit.viewing.meshes import merged, shape_mesh
@@ -24,8 +25,8 @@ SHELL_CLASSES = ("wall", "ceiling")
 
 
 def draw_scene_with_graph(scene: InteractiveScene, cad_scene: CadSceneFile | None, canvas: Canvas) -> None:
-    """Draw the links, the boxes and the contact graph, and what is known of models and joints."""
-    draw_scene_folder(scene.root, canvas)
+    """Draw the links, how they settle, the boxes and the contact graph, and what is known of models and joints."""
+    draw_settling(scene, canvas)
     draw_graph(scene.graph, canvas, trusted=trust_of_models(cad_scene) if cad_scene is not None else None)
 
 
@@ -50,8 +51,10 @@ def trust_of_models(cad_scene: CadSceneFile) -> dict[str, Trust]:
     return found
 
 
-def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene", *, animated: bool = False) -> tuple[str, ...]:
-    """Draw the links of an interactive scene's folder under `prefix`, and return their names.
+def draw_scene_folder(
+    root: Path, canvas: Canvas, prefix: str = "scene", *, animated: bool = False
+) -> dict[str, np.ndarray]:
+    """Draw the links of an interactive scene's folder under `prefix`; return link -> (4, 4) world_from_link.
 
     `animated`: the poses hold from time 0 on, until others are drawn (in Rerun what is always there never changes).
     """
@@ -60,7 +63,7 @@ def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene", *, anim
     values = {name: value for body in description.bodies for name, value in body.joint_values.items()}
     poses = link_poses(urdf, values)
     shell = {body.name for body in description.bodies if body.class_name in SHELL_CLASSES}
-    drawn = []
+    drawn = {}
     for number, link in enumerate(urdf.links):
         shapes = link.visuals or link.collisions
         if not shapes:
@@ -74,9 +77,37 @@ def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene", *, anim
         canvas.transform(path, poses[link.name])
         canvas.always()
         canvas.mesh(path, mesh, colors if plain else None)
-        drawn.append(link.name)
+        drawn[link.name] = poses[link.name]
     canvas.joints(jointed_links(urdf, values, {name: _path(name, shell, prefix) for name in drawn}))
-    return tuple(drawn)
+    return drawn
+
+
+def draw_settling(scene: InteractiveScene, canvas: Canvas, prefix: str = "scene") -> None:
+    """Draw the links of a scene, and the settle test, where one was made: bodies as they went when they were let go,
+    what left its place and when, and what else is wrong."""
+    settling = scene.settling
+    drawn = draw_scene_folder(scene.root, canvas, prefix, animated=settling is not None)
+    if settling is None:
+        return
+    begun = {body.name: np.array(body.world_from_body) for body in scene.info.bodies}
+    shell = {body.name for body in scene.info.bodies if body.class_name in SHELL_CLASSES}
+    for body in settling.bodies:
+        links = [name for name in drawn if name.split("__")[0] == body.name]
+        for time, row in zip(settling.times, body.poses, strict=False):
+            moved = transform_from_quaternion(np.array(row[3:]), np.array(row[:3])) @ inverse(begun[body.name])
+            canvas.time(time)
+            for link in links:
+                canvas.transform(_path(link, shell, prefix), moved @ drawn[link])
+        if body.leaves is not None:
+            fate = "falls through the floor" if body.fell_through else "does not stay"
+            said = f"{body.name} {fate}: {1000 * body.moved:.0f} mm, {np.degrees(body.turned):.0f} degrees in the end"
+            canvas.moment(body.leaves, said, bad=True)
+    canvas.always()
+    canvas.moment(0.0, "let go")
+    for trouble in settling.troubles:
+        canvas.moment(0.0, trouble, bad=True)
+    if settling.times:
+        canvas.moment(settling.times[-1], settling.reason, bad=settling.verdict != "ok")
 
 
 def _path(link: str, shell: set[str], prefix: str) -> str:

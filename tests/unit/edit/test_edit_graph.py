@@ -11,8 +11,9 @@ from cli.main import run as scenewright
 from schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile
 from schemas.edits import AppliedEdit, GraphEdit
 from stages.edit.anchoring import Fitting, anchor_of_node
+from stages.edit.applying import apply_edits
 from stages.edit.edits_file import read_edits
-from stages.edit.graph_edits import GraphState, apply_graph_edits
+from stages.edit.graph_edits import GRAPH_EDITS, GraphState
 from stages.edit.parameters import EditMapParameters
 from tests.unit.edit.maps import room_map
 
@@ -53,7 +54,7 @@ def mark(graph: ContactGraph, name: str, as_: str) -> GraphEdit:
 
 def applied(graph: ContactGraph, *edits: GraphEdit) -> tuple[ContactGraphFile, list[AppliedEdit]]:
     state = GraphState(graph.info)
-    records = apply_graph_edits(state, edits, FITTING)
+    records = apply_edits(state, edits, FITTING, GRAPH_EDITS)
     state.graph.check_read()
     return state.graph, records
 
@@ -90,7 +91,7 @@ def test_what_is_pinned_inside_lies_on_a_plane_that_nobody_saw(graph: ContactGra
     state.graph = state.graph.model_copy(
         update={"links": tuple(k.model_copy(update={"plane": None}) for k in state.graph.links)}
     )
-    apply_graph_edits(state, [support(graph, "cup_3", None), support(graph, "cup_3", "table_2")], FITTING)
+    apply_edits(state, [support(graph, "cup_3", None), support(graph, "cup_3", "table_2")], FITTING, GRAPH_EDITS)
     link, table = state.graph.parent_link("cup_3"), state.graph.node("table_2")
     assert link is not None and link.plane == 0 and link.gap == 0.0 and table.planes[0].hidden
     assert table.planes[0].center[2] == pytest.approx(0.75, abs=0.01)

@@ -9,19 +9,24 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from cli.main import run as scenewright
 from schemas.edits import AppliedEdit, MapEdit
 from schemas.errors import BadInput
 from schemas.panoptic_map import PanopticMap
 from stages.edit.anchoring import Fitting, anchor_of
-from stages.edit.applying import apply_edits, box_surface
+from stages.edit.applying import apply_edits
 from stages.edit.edits_file import append_edits, line_of, read_edits
+from stages.edit.map_edits import MAP_EDITS, box_surface
 from stages.edit.map_state import MapState, read_state
 from stages.edit.parameters import EditMapParameters
 from stages.kit.formats.entity_meshes import load_entity_mesh
 from stages.kit.geometry.boxes import gravity_aligned_box
+from stages.kit.geometry.transforms import transform_from
 from tests.unit.edit.maps import room_map
+from tests.unit.viewing.artifacts import seal
 
 FITTING = Fitting(**EditMapParameters().model_dump())
 CUP, TWIN, TABLE, CABINET = 3, 4, 2, 5
@@ -43,7 +48,7 @@ def edit(what: str, seen: PanopticMap, *instances: int, **values: Any) -> MapEdi
 
 def applied(panoptic_map: PanopticMap, *edits: MapEdit) -> tuple[MapState, list[AppliedEdit]]:
     state, _ = read_state(panoptic_map)
-    records = apply_edits(state, edits, FITTING)
+    records = apply_edits(state, edits, FITTING, MAP_EDITS)
     state.finished()
     return state, records
 
@@ -96,7 +101,7 @@ def test_two_things_that_fit_alike_are_a_conflict(seen: PanopticMap, tmp_path: P
     own = state.instance == CUP
     vertices, faces = box_surface(gravity_aligned_box((0.24, 0.04, 0.80), (0.09, 0.09, 0.11), 0.0), 0.02)
     state.add_surface(vertices, faces, state.new_entity("cup", 3))
-    (record,) = apply_edits(state, [asked], FITTING)
+    (record,) = apply_edits(state, [asked], FITTING, MAP_EDITS)
     assert record.status == "conflict" and "more than one" in record.reason and "cup_3" in record.reason
     assert (state.instance[: len(own)] == CUP).sum() == own.sum()
 
@@ -169,7 +174,7 @@ def test_a_thing_of_which_less_was_seen_fits_unless_it_is_a_piece(seen: Panoptic
         if rest:
             assert state.new_entity("cabinet", 3) == rest
         state.relabel((state.instance == CABINET) & ~near, rest)
-        (record,) = apply_edits(state, [asked], FITTING)
+        (record,) = apply_edits(state, [asked], FITTING, MAP_EDITS)
         assert record.status == status, record
 
 
@@ -264,3 +269,74 @@ def test_commands_refuse_what_is_not_there(seen: PanopticMap, tmp_path: Path, ca
     )
     assert scenewright(["edit", "delete", str(tmp_path / "no" / "edits.toml"), "3", *where]) == 3
     assert list(tmp_path.iterdir()) == []
+
+
+def test_gravity_turns_the_whole_map_and_what_follows_it(tmp_path: Path) -> None:
+    """A room that leans by 4 degrees stands upright after three clicks on its table; made anew it is told so again."""
+    leaning = np.array(Rotation.from_euler("x", 4.0, degrees=True).as_matrix())
+    seen = room_map(tmp_path / "map")
+    upright, _ = read_state(seen)
+    state, _ = read_state(seen)
+    state.turn(transform_from(leaning, np.zeros(3)))
+    places = [(0.5, -0.3, 0.75), (-0.5, -0.3, 0.75), (0.0, 0.3, 0.75)]
+    leant = [tuple(np.round(leaning @ place, 3).tolist()) for place in places]
+    asked = TypeAdapter(MapEdit).validate_python({"what": "gravity", "level": leant})
+    (record,) = apply_edits(state, [asked], FITTING, MAP_EDITS)
+    assert record.status == "applied" and "4.0 degrees" in record.reason
+    table = next(thing for thing in state.things() if thing.instance == TABLE)
+    before = next(thing for thing in upright.things() if thing.instance == TABLE)
+    assert np.allclose(table.box.size, before.box.size, atol=5e-3)
+    (record,) = apply_edits(
+        state, [asked.model_copy(update={"level": places_now(state, places, upright)})], FITTING, MAP_EDITS
+    )
+    assert record.status == "already"
+    for level, words in (
+        ([(9.0, 9.0, 9.0), *leant[:2]], "no surface"),
+        ([places_now(state, places, upright)[0]] * 3, "on one line"),
+    ):
+        (record,) = apply_edits(state, [asked.model_copy(update={"level": tuple(level)})], FITTING, MAP_EDITS)
+        assert record.status == "conflict" and words in record.reason
+
+
+def places_now(
+    state: MapState, places: list[tuple[float, float, float]], upright: MapState
+) -> tuple[tuple[float, float, float], ...]:
+    """Where places of the upright map are now."""
+    _, near = cKDTree(upright.surface.vertices).query(places)
+    return tuple(tuple(float(value) for value in state.surface.vertices[k]) for k in near)  # type: ignore[return-value]
+
+
+def test_a_turned_map_has_no_volume_and_says_how(tmp_path: Path) -> None:
+    seen, edits, out = room_map(tmp_path / "map"), tmp_path / "edits.toml", tmp_path / "edited"
+    (seen.root / "manifest.json").unlink()
+    np.savez(seen.root / "volume.npz", tsdf=np.zeros(1))
+    seal(seen.root, "panoptic_map")
+    slope = [(0.5, -0.3, 0.75), (-0.5, -0.3, 0.75), (0.24, 0.04, 0.85)]  # no plane of the room: two of the table, a cup
+    named = zip(("--first", "--second", "--third"), slope, strict=True)
+    words = [word for name, place in named for word in (name, *map(str, place))]
+    assert scenewright(["edit", "gravity", str(edits), *words]) == 0
+    assert scenewright(["edit", "floor", str(edits), "--at", "0", "0", "0.1"]) == 0
+    apply = ["edit", "map", "--panoptic-map", str(seen.root), "--edits", str(edits), "--out", str(out)]
+    assert scenewright(apply) == 0
+    made = PanopticMap(out)
+    assert made.info.world_from_sequence is not None and not made.path("volume.npz").exists()
+    entity = next(entity for entity in made.info.entities if entity.class_name == "floor")
+    assert entity.box_maximum[2] >= 0.1 - 1e-3
+    turned, plain = np.array(made.info.world_from_sequence), read_state(seen)[0].surface.vertices
+    count = len(plain)
+    assert np.allclose(
+        read_state(made)[0].surface.vertices[:count], plain @ turned[:3, :3].T + turned[:3, 3], atol=1e-3
+    )
+
+
+def test_the_floor_is_where_a_person_says(tmp_path: Path) -> None:
+    """The floor that was seen is 30 cm too high; without any the graph has one to stand things on."""
+    state, _ = read_state(room_map(tmp_path / "map"))
+    asked = TypeAdapter(MapEdit).validate_python({"what": "floor", "at": (0.3, 0.3, -0.3)})
+    (record,) = apply_edits(state, [asked], FITTING, MAP_EDITS)
+    assert record.status == "applied" and record.reason == "in place of floor_1"
+    (floor,) = [thing for thing in state.things() if thing.class_name == "floor"]
+    assert floor.box.center[2] + floor.box.size[2] / 2 == pytest.approx(-0.3, abs=1e-3)
+    assert (state.instance == 0).any()  # what was called floor before
+    (record,) = apply_edits(state, [asked], FITTING, MAP_EDITS)
+    assert record.status == "already"

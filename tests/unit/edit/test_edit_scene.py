@@ -10,71 +10,19 @@ import numpy as np
 import pytest
 
 from cli.main import run as scenewright
-from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from stages.cad.parameters import CadParameters
-from stages.cad.stage import run as run_cad
 from stages.edit.edits_file import read_edits
 from stages.edit.scene_edits import joint_anchors
 from stages.edit.scene_state import SceneState
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run as run_graph
-from stages.kit.formats.cad_models import load_collision_parts, read_model
+from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.model_writer import PartGeometry, write_model_folder
-from stages.kit.geometry.solids import hull, mass_properties
-from tests.panoptic_maps import box_mesh, floor_mesh, seen_surface, write_map
-from tests.unit.cad.conftest import context
-from tests.unit.cad.models import block, chair, fridge, table, write_library
-from tests.unit.cad.test_cad_stage import EYES, mesh_of
-from tests.unit.viewing.artifacts import seal
-
-
-def write_urdf_of(folder: Path) -> None:
-    """Write a model folder again, with the URDF that the scene's tree is made of."""
-    parts = []
-    for name, pieces in load_collision_parts(folder).items():
-        solids = [hull(np.asarray(piece.vertices)) for piece in pieces]
-        grey = [(150, 150, 150)] * len(solids)
-        parts.append(PartGeometry(name, solids, grey, mass_properties(solids, [300.0] * len(solids))))
-    model = read_model(folder)
-    write_model_folder(folder, model, sorted(parts, key=lambda part: model.parts.index(part.name)))
+from tests.unit.edit.scenes import scene_room
 
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A table with a box on it, a fridge, and a cabinet that no model fits: library, map and CAD scene."""
-    root = tmp_path_factory.mktemp("room")
-    library = write_library(
-        root / "library",
-        {
-            "chair_low": chair(0.44, 0.45, 0.90),
-            "table_long": table(1.4, 0.7, 0.74),
-            "table_square": table(0.8, 0.8, 0.74),
-            "fridge_tall": fridge(0.6, 0.65, 1.6, (0.4, 0.8, 1.2)),
-            "box_cube": block("box", 0.2, 0.2, 0.2),
-        },
-    )
-    for model in library.info.models:
-        write_urdf_of(root / "library" / "models" / model.id)
-    meshes = {
-        1: floor_mesh((-1.6, -1.4), (1.6, 1.6)),
-        2: mesh_of(library, "table_long", (-0.5, 0.6, 0), 0.2),
-        3: mesh_of(library, "fridge_tall", (1.0, 1.0, 0), 0.0),
-        4: mesh_of(library, "box_cube", (-0.7, 0.6, 0.74), 0.5),
-        5: box_mesh((-1.2, -1.2, 0.0), (-0.4, -0.8, 0.9)),
-    }
-    classes = {1: "floor", 2: "table", 3: "fridge", 4: "box", 5: "cabinet"}
-    made = write_map(root / "map", seen_surface(meshes, [*EYES, (0.9, -0.6, 1.2)], noise=0.003), classes)
-    graph = run_graph(made, parameters=GraphParameters(), context=context(root / "graph"))
-    run_cad(graph, made, library, parameters=CadParameters(), context=context(root / "cad"))
-    for name, kind in (("library", "cad_library"), ("map", "panoptic_map"), ("cad", "cad_scene")):
-        if not (root / name / "manifest.json").exists():
-            seal(root / name, kind)
-    assert isinstance(PanopticMap(root / "map"), PanopticMap) and isinstance(CadLibrary(root / "library"), CadLibrary)
-    return {name: root / name for name in ("library", "map", "cad")}
+    return scene_room(tmp_path_factory.mktemp("room"))
 
 
 def edited(

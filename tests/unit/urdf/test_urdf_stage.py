@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from schemas.cad_scene import CadScene, CadSceneFile
 from schemas.errors import BadInput, UsageError
 from stages.kit.formats.cad_models import model_folder
 from stages.kit.formats.urdf_file import parse_urdf
+from stages.kit.viewing.page.page_canvas import PageCanvas
+from stages.kit.viewing.scenes import draw_settling
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.stage import run
 from tests.unit.urdf.small_room import context, graph_of, placed, room
@@ -60,6 +63,30 @@ def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
     pose = np.array(monitor.world_from_body)
     visual = trimesh.load(made.root / "meshes/monitor_8/visual.obj", force="mesh", process=False)
     assert (visual.bounds + pose[:3, 3])[0] == pytest.approx([-0.1, -0.3, 0.7], abs=0.01)
+
+
+def test_how_things_settle_is_kept_and_played(cad_scene, tmp_path):
+    """The cup that hangs in the air is seen falling, the one on the table standing still; what fails is said when."""
+    made = run(cad_scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    settling = made.settling
+    assert settling is not None and settling.verdict == "unsettled" and settling.times[-1] == pytest.approx(3.0)
+    bodies = {body.name: body for body in settling.bodies}
+    falling = bodies["cup_7"]
+    heights = [pose[2] for pose in falling.poses]
+    assert len(heights) == len(settling.times) and heights[0] - heights[-1] == pytest.approx(0.994, abs=0.005)
+    assert falling.leaves == pytest.approx(0.05) and bodies["cup_5"].leaves is None and bodies["cup_5"].poses == ()
+    canvas = PageCanvas("settling")
+    draw_settling(made, canvas)
+    page = canvas.page().decode()
+    drawn = json.loads(page.split('<script id="document" type="application/json">')[1].split("</script>")[0])
+    places = [(item["time"], item["rows"][11]) for item in drawn["transforms"] if item["path"] == "scene/cup_7"]
+    assert places[0] == (0.0, pytest.approx(heights[0], abs=1e-3))
+    assert places[-1] == (pytest.approx(3.0), pytest.approx(heights[-1], abs=1e-3))
+    bad = [moment for moment in drawn["moments"] if moment["bad"]]
+    assert [moment["time"] for moment in bad] == [pytest.approx(0.05), pytest.approx(3.0)]
+    assert "cup_7 does not stay: 994 mm" in bad[0]["text"]
+    quiet = run(cad_scene, parameters=UrdfParameters(settle_seconds=0), context=context(tmp_path / "quiet"))
+    assert quiet.settling is None
 
 
 def test_what_has_no_name_is_a_static_body(cad_scene, tmp_path):

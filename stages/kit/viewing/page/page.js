@@ -351,7 +351,9 @@
       } else say("and to where?");
       return;
     }
-    if (listeners.get("point").some((listener) => listener(point))) return;
+    const normal = hit.face.normal.clone().transformDirection(hit.object.matrixWorld);
+    if (normal.dot(ray.ray.direction) > 0) normal.negate();
+    if (listeners.get("point").some((listener) => listener(point, normal.toArray()))) return;
     const [name, path] = whatAt(hit, point);
     choose(name, false);
     say(`${name || path} at ${place} m`);

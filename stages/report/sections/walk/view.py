@@ -12,7 +12,7 @@ from stages.kit.viewing.canvas import SHELL
 from stages.kit.viewing.graphs import DRAWN, draw_graph
 from stages.kit.viewing.maps import LAYERS, draw_panoptic_map
 from stages.kit.viewing.page.page_canvas import PageCanvas, script_digests
-from stages.kit.viewing.scenes import draw_scene_folder, trust_of_models
+from stages.kit.viewing.scenes import draw_settling, trust_of_models
 from stages.report.page import Page
 
 LARGEST = 9_000_000
@@ -36,7 +36,7 @@ def view(page: Page) -> dict[str, Any] | None:
         draw_panoptic_map(panoptic_map, canvas, *of_scene)
     file = scene.graph if scene is not None else graph.info if graph is not None else None
     if scene is not None:
-        draw_scene_folder(scene.root, canvas, SCENE)
+        draw_settling(scene, canvas, SCENE)
     if file is not None:
         cad_scene = page.given("cad_scene", CadScene)
         trusted = trust_of_models(cad_scene.info) if cad_scene is not None else None
