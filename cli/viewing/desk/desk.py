@@ -15,12 +15,14 @@ from typing import Any
 import trimesh
 
 from cli.edit_command import asked_edit
+from cli.viewing.desk.asking import Asking
 from cli.viewing.desk.forms import forms_of, kinds_of
 from cli.viewing.inputs import input_artifact
 from cli.viewing.view import viewer_of
 from schemas.artifact import Artifact
 from schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile, MapEdit
 from schemas.errors import BadInput, ScenewrightError, UsageError
+from schemas.language_map import LanguageMap
 from schemas.panoptic_map import PanopticMap
 from schemas.plain_text import cleaned
 from schemas.vocabulary import load_vocabulary
@@ -34,7 +36,7 @@ from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.maps import ShownThing, draw_map
 from stages.kit.viewing.page.page_canvas import PageCanvas, ServedPage
 
-SCRIPT = Path(__file__).with_name("editing.js")
+SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("editing.js", "asking.js"))
 MOST_GENERATIONS = 20
 """Artifacts between one and the map that it was made from."""
 FITTING = Fitting(**EditMapParameters.model_validate({}).model_dump())
@@ -78,6 +80,7 @@ class Desk:
             seen, _ = read_state(origin)
             instances = {thing.name: thing.instance for thing in seen.things()}
         self._artifact, self._origin, self._seen, self._instances = artifact, origin, seen, instances
+        self._asking = Asking(artifact) if isinstance(artifact, LanguageMap) else None
         self._state: MapState | None = None
         self._applied: tuple[AnyEdit, ...] = ()
         self._records: list[AppliedEdit] = []
@@ -128,7 +131,8 @@ class Desk:
             if made_of != self._page_of:
                 canvas = PageCanvas(f"{self._artifact.kind} {self.path.resolve().name}")
                 self._draw(canvas)
-                self._page = canvas.page(ServedPage(SCRIPT.read_text(encoding="utf-8"), self._facts()))
+                script = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
+                self._page = canvas.page(ServedPage(script, self._facts()))
                 self._page_of = made_of
             return self._page
 
@@ -148,7 +152,8 @@ class Desk:
 
     def _facts(self) -> dict[str, Any]:
         if self.edits is None or self._origin is None:
-            return {"artifact": self.shown}
+            asks = {} if self._asking is None else {"asks": self._asking.facts()}
+            return {"artifact": self.shown, **asks}
         return {
             "artifact": self.shown,
             "read_only": self.read_only,
@@ -185,6 +190,14 @@ class Desk:
 
     def _pairs(self) -> Iterator[tuple[AppliedEdit, Edit]]:
         return ((record, self._applied[record.number - 1]) for record in self._records)
+
+    def ask(self, text: str) -> dict[str, Any]:
+        """Return where a text fits. Raises UsageError where there is nothing to ask, and for a text that asks for
+        nothing."""
+        with self._turn:
+            if self._asking is None:
+                raise UsageError("words are asked of a language map", hint="scenewright splat language")
+            return self._asking.answer(text)
 
     # ---- what the page asks for --------------------------------------------------------------------------------------
     def append(self, asked: Mapping[str, Any], *, artifact: str, revision: str, by: str, note: str) -> dict[str, Any]:
