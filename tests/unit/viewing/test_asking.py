@@ -49,16 +49,17 @@ def make_splat(run: Path) -> Splat:
 
 
 def make_language(run: Path) -> LanguageMap:
-    """The balls are places; their vectors are their colours."""
+    """The red ball, the blue one and the wall are places; vectors are colours. The green ball is none."""
     make_splat(run)
     root, made = run / "language", gaussians()
     root.mkdir()
-    owner = np.minimum(np.arange(len(made)) // 500, 3).astype(np.int32)
+    thing = np.minimum(np.arange(len(made)) // 500, 3)
+    owner = np.array([0, -1, 1, 2], np.int32)[thing]
     colors = np.array([*(COLORS[name] for name in BALLS), (1.0, 1.0, 1.0)])
-    field = np.repeat(unit(colors[owner])[:, None], 2, axis=1).astype(np.float32)
+    field = np.repeat(unit(colors[thing])[:, None], 2, axis=1).astype(np.float32)
     opacities = np.full(len(made), 0.9, np.float32)
-    write_vectors(root, Vectors(unit(colors).astype(np.float32), made.means, opacities, owner[None], field))
-    boxes = [minimum_box(made.means[owner == k].astype(float)) for k in range(4)]
+    write_vectors(root, Vectors(unit(colors[[0, 2, 3]]).astype(np.float32), made.means, opacities, owner[None], field))
+    boxes = [minimum_box(made.means[owner == k].astype(float)) for k in range(3)]
     LanguageMapFile(
         source="splat",
         encoder=ColorEncoder.label,
@@ -134,9 +135,13 @@ def test_a_word_shows_heat_and_boxes_and_time_brings_the_gaussians(tmp_path: Pat
         assert "of “red”" in window.wait_for("#answered", "of “red”")
         assert int(window.run("return document.body.dataset.warm")) >= 400
         assert window.run("return document.querySelectorAll('#desk li').length") >= 1
-        # What is not there is said.
-        window.run("document.getElementById('words').value = ''; document.getElementById('words').focus()")
-        window.keys("<b>purple\ue007")
-        assert "<b>purple" in window.wait_for("#answered", "The room has no")
+        # What was typed is shown as text, and what is not there is said.
+        empty = "document.getElementById('words').value = ''; document.getElementById('words').focus()"
+        window.run(empty)
+        window.keys("<b>x\ue007")
+        window.wait_for("#answered", "<b>x")
+        window.run(empty)
+        window.keys("green\ue007")
+        window.wait_for("#answered", "The room has no “green”.")
         assert window.run("return document.querySelectorAll('#desk li').length") == 0
         assert not window.complaints() and not window.run("return document.body.dataset.error")
