@@ -45,7 +45,7 @@ class Asking:
             encoder = open_encoder(EncoderParameters.model_validate({}), None)
             if encoder.label != self.language.info.encoder:
                 raise UsageError(
-                    f"this map was made with {self.language.info.encoder!r:.80}; a page asks the embedded encoder alone",
+                    f"this map was made with {self.language.info.encoder!r:.80}; a page asks our own encoder alone",
                     hint="scenewright splat query --encoder ...",
                 )
             self._finder = Finder(self.language, encoder)

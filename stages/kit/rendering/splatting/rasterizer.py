@@ -75,8 +75,10 @@ class Rasterizer(Protocol):
 
 
 def direction_limits(camera: Camera) -> tuple[float, float, float, float]:
-    """Return least and greatest x/z, then y/z, at which the Jacobian is taken. The edge of the picture lies half a pixel
-    beyond its outermost centres."""
+    """Return least and greatest x/z, then y/z, at which the Jacobian is taken.
+
+    The edge of the picture lies half a pixel beyond its outermost centres.
+    """
     cx, cy = camera.cx + 0.5, camera.cy + 0.5
     return (
         -cx / camera.fx - MARGIN * camera.width / camera.fx,
