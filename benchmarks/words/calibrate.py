@@ -20,7 +20,7 @@ from stages.kit.open_words.calibration import BUNDLED, SHORTEST, Calibration, fi
 from stages.kit.open_words.embedded import EmbeddedEncoder
 from stages.kit.open_words.finding import Finder
 
-ROOMS = ("kitchen-40",)
+ROOMS = ("kitchen-40", "office-41", "bedroom-42", "room-43")
 FIRST = 3
 RIDGE = 1e-3
 HEADER = """# Relevancies as probabilities (stages/kit/open_words/calibration.py), fitted on tuning rooms, for one

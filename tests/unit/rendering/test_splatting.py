@@ -166,7 +166,8 @@ def test_the_number_of_threads_changes_no_bit() -> None:
 
 def test_no_gaussians_show_the_background() -> None:
     nothing = scene(3, 0, scale=0.1).taken(np.zeros(3, bool))
-    for rasterizer in (CompiledRasterizer(), ReferenceRasterizer()):
+    on_gpu = [GpuRasterizer()] if torch.cuda.is_available() else []
+    for rasterizer in (CompiledRasterizer(), ReferenceRasterizer(), *on_gpu):
         drawn = rasterizer.draw(nothing, view_of(SMALL))
         assert np.allclose(drawn.picture.color, (0.2, 0.5, 0.7)) and not drawn.picture.alpha.any()
         assert drawn.backward(weights(SMALL, 2)).twist.tolist() == [0.0] * 6
