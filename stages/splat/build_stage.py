@@ -22,6 +22,7 @@ from stages.splat.methods.method import Method
 from stages.splat.parameters import BuildParameters
 from stages.splat.ply import write_gaussians
 from stages.splat.training import Trainer
+from stages.splat.triangulation import with_points
 from stages.splat.views import evenly, held_out, posed_frames, read_view
 
 CHECKPOINT_EVERY = 60.0
@@ -33,8 +34,8 @@ def run(
 ) -> Splat:
     """Learn Gaussians from the posed pictures of a sequence. The outcome is `ok`.
 
-    Raises BadInput without colour, without two posed frames, or where every picture that is learned from is dark, or
-    none has depth.
+    Where no picture has depth, points are triangulated out of what the pictures show. Raises BadInput without colour,
+    without two posed frames, or where every picture that is learned from is dark, or none has depth and none a point.
     """
     with FrameReader(sequence.path("frames.mcap")) as reader:
         posed = posed_frames(reader, sequence, trajectory)
@@ -53,10 +54,13 @@ def run(
                 f"{sequence.root}: all {len(learned_frames)} pictures are dark", hint="look at it: scenewright inspect"
             )
         if all(view.depth is None or not view.depth.any() for view in views):
-            raise BadInput(
-                f"{sequence.root}: no picture has depth, and Gaussians are set at pixels with depth",
-                hint="record depth, or a stereo pair (scenewright disparity)",
-            )
+            with context.progress.step("points"):
+                views = with_points(views, context.seed)
+            if not any(view.depth is not None and view.depth.any() for view in views):
+                raise BadInput(
+                    f"{sequence.root}: no picture has depth, and no feature is seen from two places",
+                    hint="record depth, or pictures that overlap; are the poses right? scenewright inspect",
+                )
         cameras = {view.camera_name: view.camera for view in views}
         trainer = Trainer(
             method_of(parameters.method),

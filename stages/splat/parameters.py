@@ -86,12 +86,12 @@ def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
 
 BUILD = Stage(
     name="splat build",
-    version=3,
+    version=4,
     summary="Learn a room as 3-D Gaussians from posed pictures that arrive one after another",
     parameters=BuildParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},
     writes=Splat,
-    libraries=LIBRARIES,
+    libraries=(*LIBRARIES, "pycolmap"),
     module="build_stage",
     example="scenewright splat build --sequence outputs/demo/sequence --hold-out-every 8 --out outputs/demo/splat",
 )
