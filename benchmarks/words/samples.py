@@ -92,6 +92,7 @@ def _unpacked(name: str, arrays: dict[str, np.ndarray]) -> np.ndarray:
     ends = np.cumsum(arrays[f"{name}_lengths"])
     found = []
     for start, end in zip(np.concatenate([[0], ends[:-1]]), ends, strict=True):
-        picture = cv2.imdecode(arrays[name][start:end], cv2.IMREAD_UNCHANGED)
+        picture: np.ndarray | None = cv2.imdecode(arrays[name][start:end], cv2.IMREAD_UNCHANGED)
+        assert picture is not None
         found.append(picture[..., ::-1] if picture.ndim == 3 else picture)
     return np.ascontiguousarray(np.stack(found))

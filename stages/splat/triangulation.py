@@ -32,11 +32,12 @@ def with_points(views: Sequence[PosedView], seed: int) -> list[PosedView]:
     points = _points(views, seed)
     found = []
     for number, view in enumerate(views):
-        depth = np.zeros(view.color.shape[:2], np.float32)
+        height, width = view.color.shape[:2]
+        depth = np.zeros((height, width), np.float32)
         if number in points:
             pixels, places = points[number]
-            columns = np.clip(np.rint(pixels[:, 0]).astype(int), 0, depth.shape[1] - 1)
-            rows = np.clip(np.rint(pixels[:, 1]).astype(int), 0, depth.shape[0] - 1)
+            columns = np.clip(np.rint(pixels[:, 0]).astype(int), 0, width - 1)
+            rows = np.clip(np.rint(pixels[:, 1]).astype(int), 0, height - 1)
             depth[rows, columns] = np.maximum(apply(view.camera_from_world, places)[:, 2], 0.0)
         found.append(replace(view, depth=depth))
     return found
@@ -118,8 +119,8 @@ def _match(database: Path, count: int, seed: int) -> None:
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = seed
     if count <= LONGEST_EXHAUSTIVE:
-        pairing = pycolmap.ExhaustivePairingOptions()
-        pycolmap.match_exhaustive(database, matching, pairing, verification, pycolmap.Device.cpu)
+        exhaustive = pycolmap.ExhaustivePairingOptions()
+        pycolmap.match_exhaustive(database, matching, exhaustive, verification, pycolmap.Device.cpu)
     else:
         pairing = pycolmap.SequentialPairingOptions(overlap=NEIGHBOURS, quadratic_overlap=True, num_threads=1)
         pycolmap.match_sequential(database, matching, pairing, verification, pycolmap.Device.cpu)
