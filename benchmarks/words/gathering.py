@@ -65,7 +65,14 @@ def gather(rooms: list[Furnished], libraries: list[CadLibrary], words: Lexicon, 
                 masks.append(shown)
     rows, held, styles = numbered(things, words)
     return Samples(
-        *(np.stack(part) for part in (frames, labels, sprites, masks)), np.array(numbers, np.int64), rows, held, styles
+        frames=np.stack(frames),
+        labels=np.stack(labels),
+        sprites=np.stack(sprites),
+        masks=np.stack(masks),
+        sprite_things=np.array(numbers, np.int64),
+        things=rows,
+        held=held,
+        held_style=styles,
     )
 
 
