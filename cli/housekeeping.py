@@ -286,6 +286,7 @@ GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str
 BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("cutting", record),
     ("suture", follow),
+    ("splat", view),
     *(("edit", command) for command in (*edit_command.COMMANDS, *edit_node_command.COMMANDS)),
 )
 """Commands of a group of steps that are no steps; they are there where the group's steps are."""

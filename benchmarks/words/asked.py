@@ -18,8 +18,8 @@ import numpy as np
 from benchmarks.generated_rooms import RoomFolder, make_room
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import made, opened, unrecorded
+from benchmarks.words.gathering import thing_of
 from benchmarks.words.lexicon import FALSE, TRUE, Phrase, Thing, lexicon, truth_of
-from benchmarks.words.samples import thing_of
 from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth, TrueObject
 from schemas.language_map import LanguageMap

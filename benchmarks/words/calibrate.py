@@ -20,7 +20,7 @@ from stages.kit.open_words.calibration import BUNDLED, SHORTEST, Calibration, fi
 from stages.kit.open_words.embedded import EmbeddedEncoder
 from stages.kit.open_words.finding import Finder
 
-ROOMS = ("kitchen-40",)
+ROOMS = {"splat": ("kitchen-40", "office-41"), "panoptic_map": ("kitchen-40", "office-41", "bedroom-42", "room-43")}
 FIRST = 3
 RIDGE = 1e-3
 HEADER = """# Relevancies as probabilities (stages/kit/open_words/calibration.py), fitted on tuning rooms, for one
@@ -85,10 +85,10 @@ class Options(Recipe):
 def main() -> None:
     """Fit both sources."""
     options = asked(Options)
-    names = ROOMS[: 1 if options.quick else None]
-    rooms = [AskedRoom(options.out / "rooms", name, options.frames, options.steps) for name in names]
     lines = []
-    for source in ("splat", "panoptic_map"):
+    for source, names in ROOMS.items():
+        some = names[: 1 if options.quick else None]
+        rooms = [AskedRoom(options.out / "rooms", name, options.frames, options.steps) for name in some]
         found = fit(rooms, source)
         values = {name: getattr(found, name) for name in ("bias", "looks", "field", "extent", "extent_squared")}
         entry = [f'source = "{source}"', f'encoder = "{EmbeddedEncoder().label}"']

@@ -2,64 +2,69 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
 
+import numpy as np
+import torch
+
+from benchmarks.words.batches import Crops, Drawer
 from benchmarks.words.lexicon import FALSE, TRUE, Lexicon, Phrase, truth_of
-from benchmarks.words.rooms import Furnished
-from benchmarks.words.samples import Crop, RoomCrops, composed, rendered_models
-from schemas.cad_library import CadLibrary
+from benchmarks.words.samples import Samples
 from stages.kit.open_words.encoder import Encoder
 
 CROPS = 1500
 DISTRACTORS = 15
 """Wrong phrases beside the right one: chance is 1 in 16."""
-VIEWS = 3
+AT_ONCE = 100
 
 
-def figures_of(
-    encoder: Encoder, rooms: list[Furnished], models: CadLibrary, words: Lexicon, seed: int = 7
-) -> dict[str, dict[str, float]]:
-    """Return name -> {"share": right one of 16 phrases is the nearest, "count"}. `rooms`: nothing held out; the others
-    are what the training never saw: combinations and styles in pictures, words in texts."""
-    random = np.random.default_rng(seed)
-    crops = RoomCrops(rooms, words, keep_held_out=True)
-    free, held = _kinds(crops, words)
-    rendered = [(each, words.row(each.thing)) for each in rendered_models([models], VIEWS, seed)]
-    plain = [composed(each, crops.frames, row, random) for each, row in rendered if not words.is_held_out(each.thing)]
-    styles = [
-        composed(each, crops.frames, row, random)
-        for each, row in rendered
-        if (each.thing.class_name, each.thing.style) in words.held_styles
-    ]
-    combined = [
-        composed(each, crops.frames, row, random)
-        for each, row in rendered
-        if any((c, each.thing.class_name) in words.held_combinations and share >= 0.5 for c, share in each.thing.colors)
-    ]
-    seen = _sampled(crops, free, random)
-    result = {
-        "rooms": _nearest(encoder, seen, words, random, lambda row: words.training_phrase(row, random)),
-        "models": _nearest(encoder, plain, words, random, lambda row: words.training_phrase(row, random)),
-        "held_out_styles": _nearest(encoder, styles, words, random, lambda row: _noun(row, words, random)),
-        "held_out_combinations": _nearest(encoder, combined, words, random, lambda row: _combination(row, words)),
-        "held_out_words": _nearest(encoder, [*seen, *plain], words, random, lambda row: _held_word(row, words)),
+def figures_of(encoder: Encoder, samples: Samples, words: Lexicon, seed: int = 7) -> dict[str, dict[str, float]]:
+    """Return name -> {"share": right one of 16 phrases is the nearest, "count"}. `rooms`, `models`: nothing held out;
+    the others are what the training never saw: combinations and styles in pictures, words in texts."""
+    random, drawer = np.random.default_rng(seed), Drawer(samples, len(words.classes), "cpu")
+    places, own = drawer.places, samples.things[samples.sprite_things]
+    held = samples.held[places.things]
+    combined = np.zeros(len(own), bool)
+    for color, name in words.held_combinations:
+        combined |= (own[:, words.number["color", color]] == TRUE) & (own[:, words.number["class", name]] == TRUE)
+    kinds = {
+        "rooms": drawn(drawer.of_rooms, random.permutation(np.flatnonzero(~held))[:CROPS], samples, random),
+        "rooms_held_out": drawn(drawer.of_rooms, random.permutation(np.flatnonzero(held))[:CROPS], samples, random),
     }
-    if held:
-        result["rooms_held_out"] = _nearest(
-            encoder, _sampled(crops, held, random), words, random, lambda row: _noun(row, words, random)
-        )
+    of_models = {
+        "models": ~samples.held[samples.sprite_things],
+        "held_out_styles": samples.held_style[samples.sprite_things],
+        "held_out_combinations": combined,
+    }
+    for name, mask in of_models.items():
+        kinds[name] = drawn(drawer.of_models, random.permutation(np.flatnonzero(mask))[:CROPS], samples, random)
+    plain = [np.concatenate(parts) for parts in zip(kinds["rooms"], kinds["models"], strict=True)]
+    asks: dict[str, Callable[[np.ndarray], Phrase | None]] = {
+        "rooms": lambda row: words.training_phrase(row, random),
+        "models": lambda row: words.training_phrase(row, random),
+        "held_out_styles": lambda row: _noun(row, words, random),
+        "held_out_combinations": lambda row: _combination(row, words),
+        "rooms_held_out": lambda row: _noun(row, words, random),
+    }
+    result = {name: nearest(encoder, *kinds[name], words, random, ask) for name, ask in asks.items()}
+    result["held_out_words"] = nearest(encoder, plain[0], plain[1], words, random, lambda row: _held_word(row, words))
     return result
 
 
-def _kinds(crops: RoomCrops, words: Lexicon) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    places = [place for name in crops.classes for place in crops.places[name]]
-    return [p for p in places if not crops.held[p[1]]], [p for p in places if crops.held[p[1]]]
-
-
-def _sampled(crops: RoomCrops, places: list[tuple[int, int]], random: np.random.Generator) -> list[Crop]:
-    chosen = random.permutation(len(places))[:CROPS]
-    found = (crops.about(*places[int(k)], random) for k in chosen)
-    return [crop for crop in found if crop is not None]
+def drawn(
+    draw: Callable[[np.ndarray, np.random.Generator], Crops],
+    which: np.ndarray,
+    samples: Samples,
+    random: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return crops (N, SIDE, SIDE, 3) uint8 and what is true of their main things (N, A)."""
+    pictures, rows = [], []
+    for start in range(0, len(which), AT_ONCE):
+        crops = draw(which[start : start + AT_ONCE], random)
+        valid = crops.valid
+        pictures.append((crops.pictures[valid].permute(0, 2, 3, 1) * 255 + 0.5).to(torch.uint8).numpy())
+        rows.append(samples.things[crops.main[valid].numpy()])
+    return np.concatenate(pictures), np.concatenate(rows)
 
 
 def _noun(row: np.ndarray, words: Lexicon, random: np.random.Generator) -> Phrase:
@@ -86,24 +91,31 @@ def _held_word(row: np.ndarray, words: Lexicon) -> Phrase | None:
     return None
 
 
-def _nearest(encoder, crops, words, random, ask) -> dict[str, float]:  # type: ignore[no-untyped-def]
+def nearest(
+    encoder: Encoder,
+    pictures: np.ndarray,
+    rows: np.ndarray,
+    words: Lexicon,
+    random: np.random.Generator,
+    ask: Callable[[np.ndarray], Phrase | None],
+) -> dict[str, float]:
     """Return how often the right phrase is nearest among DISTRACTORS wrong ones of the same making."""
-    asked = [(crop, phrase) for crop in crops if (phrase := ask(crop.main)) is not None]
+    asked = [(k, phrase) for k, row in enumerate(rows) if (phrase := ask(row)) is not None]
     if not asked:
         return {"share": 0.0, "count": 0}
-    pool = [words.training_phrase(crop.main, random) for crop in crops for _ in range(2)]
+    pool = [words.phrase(row, random) for row in rows for _ in range(2)]
+    pool = [phrase for phrase in pool if not words.is_held_phrase(phrase)]
     pool = list({phrase.text: phrase for phrase in [*pool, *(phrase for _, phrase in asked)]}.values())
     texts = {phrase.text: k for k, phrase in enumerate(pool)}
     vectors = encoder.texts([phrase.text for phrase in pool])
-    pictures = encoder.pictures(np.stack([crop.picture for crop, _ in asked]))
-    truth = truth_of(np.stack([crop.main for crop, _ in asked]), pool)
+    found = encoder.pictures(pictures)
+    truth = truth_of(rows, pool)
     right, count = 0, 0
-    for k, (_, phrase) in enumerate(asked):
+    for k, phrase in asked:
         wrong = np.flatnonzero(truth[k] == FALSE)
         if len(wrong) < DISTRACTORS:
             continue
         chosen = random.choice(wrong, DISTRACTORS, replace=False)
-        fits = vectors[chosen] @ pictures[k]
-        right += bool(vectors[texts[phrase.text]] @ pictures[k] > fits.max())
+        right += bool(vectors[texts[phrase.text]] @ found[k] > (vectors[chosen] @ found[k]).max())
         count += 1
     return {"share": round(right / max(count, 1), 4), "count": count}

@@ -1,6 +1,6 @@
 """The rooms and libraries that the embedded encoder is trained on: none of them is ever reported on.
 
-Two libraries of other seeds than the experiments' (other sizes and colours of the same families), rooms of the recipes'
+Libraries of other seeds than the experiments' (other sizes and colours of the same families), rooms of the recipes'
 tuning range. Validation rooms are furnished from the experiments' library, so that no model in them was trained on.
 """
 
@@ -14,13 +14,16 @@ from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth
 
 RECIPES = ("kitchen", "office", "bedroom", "room", "household", "studio")
-LIBRARIES = (11, 12)
+LIBRARIES = (11, 12, 13)
 VALIDATION_LIBRARY = 1
 SIZE = (320, 240)
 FRAMES = 24
-ROOMS = tuple(f"{RECIPES[k % 6]}-{60 + k}" for k in range(14))
+WITHOUT = ("studio-55", "studio-61", "studio-73")
+"""For these seeds no room is found."""
+NAMES = tuple(f"{RECIPES[k % 6]}-{50 + k}" for k in range(28))
+ROOMS = tuple(name for name in NAMES if name not in WITHOUT)
 VALIDATION = ("kitchen-90", "office-91", "room-92")
-LIBRARY_OF_ROOM = {name: LIBRARIES[k % len(LIBRARIES)] for k, name in enumerate(ROOMS)}
+LIBRARY_OF_ROOM = {name: LIBRARIES[(k + k // 6) % len(LIBRARIES)] for k, name in enumerate(NAMES)}
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cli.viewing.inputs import input_artifact
+from cli.viewing.splat_view import draw_splat
 from schemas.language_map import Answer, Answers, LanguageMap
+from schemas.splat import Splat
 from stages.kit.drawing.palette import instance_color
 from stages.kit.open_words.vectors import read_vectors
 from stages.kit.viewing.canvas import Canvas
@@ -15,8 +18,14 @@ MOST_BOXES = 300
 
 
 def draw_language_map(language: LanguageMap, canvas: Canvas) -> None:
-    """Draw every Gaussian in the colour of its coarsest piece, and the boxes of what was looked at."""
+    """Draw the splat that it was made of, where that is still there; every Gaussian in the colour of its coarsest
+    piece; and the boxes of what was looked at."""
     info = language.info
+    splat = input_artifact(language, Splat) if info.source == "splat" else None
+    if splat is not None:
+        draw_splat(splat, canvas)
+        canvas.view("colours", "pieces", "places")
+        canvas.view("pieces", "gaussians", "camera")
     canvas.document(
         "language", f"{len(info.regions)} places of a {info.source.replace('_', ' ')}, encoder: {info.encoder}"
     )

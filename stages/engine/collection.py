@@ -1,6 +1,7 @@
 """`scenewright gc`: what can go, and how much it frees. Nothing goes that is locked, not ours, or somebody's result.
 
-leftover      what a killed run left beside its target: partial folders, replaced artifacts, journals
+leftover      what a killed run left beside its target: partial folders, replaced artifacts, journals, the state of a
+              long step from which it would go on
 superseded    made from an input that has been made again since, with another result
 intermediate  read by other artifacts, and remade to the same key by its step from inputs that are all there
 result        everything else that a step wrote: never deleted
@@ -31,7 +32,8 @@ from stages.engine.reading import input_place, read_manifest
 from stages.kit.digests import external_digest
 
 Category = Literal["leftover", "superseded", "intermediate", "result"]
-LEFTOVER = re.compile(r"\.(?P<target>.+)\.(?:partial-\d+-[0-9a-f]{8}|old-[0-9a-f]{8}|journal)")
+_SUFFIX = r"(?:partial-\d+-[0-9a-f]{8}|old-[0-9a-f]{8}|kept-[0-9a-f]{16}|journal)"
+LEFTOVER = re.compile(rf"\.(?P<target>.+)\.{_SUFFIX}")
 """Names that `store` gives to what must not outlive a run."""
 
 LONGEST_REASON = 300
@@ -137,7 +139,7 @@ def _find(roots: Iterable[Path]) -> tuple[dict[Path, list[Path]], set[Path]]:
                     waiting.append(Path(entry.path))
     for root in roots:  # a root that is an artifact itself: what lies beside it is part of the question
         if root in artifacts:
-            pattern = re.compile(re.escape(f".{root.name}.") + r"(?:partial-\d+-[0-9a-f]{8}|old-[0-9a-f]{8}|journal)")
+            pattern = re.compile(re.escape(f".{root.name}.") + _SUFFIX)
             beside = [Path(e.path) for e in os.scandir(root.parent) if pattern.fullmatch(e.name)]
             if beside and (root.parent / f".{root.name}.lock").exists():
                 leftovers[root] = sorted(beside)

@@ -303,7 +303,8 @@ def run_stage(
         started = datetime.now(UTC)
         progress = progress or SilentProgress()
         with store.partial_folder(out) as partial:
-            context = Context(output=partial, seed=seed, device=device, progress=progress, force=force)
+            kept = store.kept_folder(out, key, fresh=force)
+            context = Context(output=partial, seed=seed, device=device, progress=progress, force=force, kept=kept)
             with interruption.insisting(), _inputs_stay(opened), memory_limit.limited(max_memory, out):
                 made = _work(stage, opened, parameters, context)
             _check_payload(stage, made, partial)
@@ -334,6 +335,7 @@ def run_stage(
             manifest.write(partial / MANIFEST_NAME)
             interruption.raise_if_requested()
             store.take_place(partial, out)
+            store.forget_kept(out)
         if shared is not None:
             shared_artifacts.keep(shared, stage, key, out)
     nondeterministic = (

@@ -195,6 +195,22 @@ def partial_folder(target: Path) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
+def kept_folder(target: Path, key: str, *, fresh: bool) -> Path:
+    """Return the folder beside `target` in which a run of this key keeps its state (lock held by the caller). What runs
+    of other keys left is removed, and with `fresh` what this one left."""
+    folder = _beside(target, f"kept-{key[:16]}")
+    forget_kept(target, None if fresh else folder)
+    return folder
+
+
+def forget_kept(target: Path, but: Path | None = None) -> None:
+    """Remove what runs of `target` kept, but one folder."""
+    pattern = re.compile(re.escape(f".{target.name}.") + r"kept-[0-9a-f]{16}")
+    for entry in target.parent.iterdir():
+        if pattern.fullmatch(entry.name) and entry != but:
+            shutil.rmtree(entry, ignore_errors=True)
+
+
 def take_place(partial: Path, target: Path) -> None:
     """Make the finished partial folder stand at `target`, in one step."""
     sync_tree(partial)

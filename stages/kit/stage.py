@@ -110,6 +110,9 @@ class Context:
     logger: logging.Logger = field(default_factory=lambda: logging.getLogger("scenewright"))
     force: bool = False
     """`--force`: what a step keeps of earlier runs is not to be used."""
+    kept: Path | None = None
+    """Folder, made by the step when it first needs one, in which a long step may keep its state: a run of the same key
+    finds it when this one was killed, and it is gone when the artifact stands. None: nothing can be kept."""
 
     def random(self, *stream: int) -> np.random.Generator:
         """Return a generator seeded by the run's seed and the given stream numbers."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 
 import numpy as np
@@ -16,11 +17,16 @@ from stages.kit.formats.trajectories import write_tum
 from stages.kit.rendering.splatting.rasterizer import Rasterizer
 from stages.kit.stage import Context
 from stages.splat.building import LAST, Arrival, arrivals, carried_poses, train
+from stages.splat.checkpoints import read_checkpoint, write_checkpoint
 from stages.splat.methods.method import Method
 from stages.splat.parameters import BuildParameters
 from stages.splat.ply import write_gaussians
 from stages.splat.training import Trainer
+from stages.splat.triangulation import with_points
 from stages.splat.views import evenly, held_out, posed_frames, read_view
+
+CHECKPOINT_EVERY = 60.0
+"""Of a training that may be killed [s]."""
 
 
 def run(
@@ -28,8 +34,8 @@ def run(
 ) -> Splat:
     """Learn Gaussians from the posed pictures of a sequence. The outcome is `ok`.
 
-    Raises BadInput without colour, without two posed frames, or where every picture that is learned from is dark, or
-    none has depth.
+    Where no picture has depth, points are triangulated out of what the pictures show. Raises BadInput without colour,
+    without two posed frames, or where every picture that is learned from is dark, or none has depth and none a point.
     """
     with FrameReader(sequence.path("frames.mcap")) as reader:
         posed = posed_frames(reader, sequence, trajectory)
@@ -48,10 +54,13 @@ def run(
                 f"{sequence.root}: all {len(learned_frames)} pictures are dark", hint="look at it: scenewright inspect"
             )
         if all(view.depth is None or not view.depth.any() for view in views):
-            raise BadInput(
-                f"{sequence.root}: no picture has depth, and Gaussians are set at pixels with depth",
-                hint="record depth, or a stereo pair (scenewright disparity)",
-            )
+            with context.progress.step("points"):
+                views = with_points(views, context.seed)
+            if not any(view.depth is not None and view.depth.any() for view in views):
+                raise BadInput(
+                    f"{sequence.root}: no picture has depth, and no feature is seen from two places",
+                    hint="record depth, or pictures that overlap; are the poses right? scenewright inspect",
+                )
         cameras = {view.camera_name: view.camera for view in views}
         trainer = Trainer(
             method_of(parameters.method),
@@ -62,11 +71,17 @@ def run(
         )
         arriving = arrivals(views, parameters.steps_per_second)
         losses: deque[float] = deque(maxlen=LAST)
-        total = arriving[-1].step + parameters.steps
+        if context.kept is not None and (before := read_checkpoint(context.kept, trainer, arriving)) is not None:
+            context.logger.info("going on from step %d of a build that was stopped", trainer.steps)
+            losses.extend(before)
+        total, written = arriving[-1].step + parameters.steps - trainer.steps, time.monotonic()
         for loss in context.progress.track(
             train(trainer, arriving, parameters.steps), total=total, description="steps"
         ):
             losses.append(loss)
+            if context.kept is not None and time.monotonic() - written > CHECKPOINT_EVERY:
+                write_checkpoint(context.kept, trainer, losses)
+                written = time.monotonic()
         if not len(trainer.gaussians):
             raise BadInput(f"{sequence.root}: no Gaussian is left after {trainer.steps} steps", hint="--method ours")
         times = reader.times

@@ -29,9 +29,10 @@ def arrivals(views: Sequence[PosedView], steps_per_second: float) -> list[Arriva
 
 
 def train(trainer: Trainer, arriving: Sequence[Arrival], steps: int) -> Iterator[float]:
-    """Train while views arrive and `steps` steps after the last; yield the loss of every step."""
-    waiting = list(arriving)
-    end = (waiting[-1].step if waiting else 0) + steps
+    """Train while views arrive and `steps` steps after the last; yield the loss of every step. A trainer that has views
+    goes on with those that follow."""
+    waiting = list(arriving[len(trainer.views) :])
+    end = (arriving[-1].step if arriving else 0) + steps
     while trainer.steps < end or waiting:
         while waiting and waiting[0].step <= trainer.steps:
             trainer.add_view(waiting.pop(0).view)

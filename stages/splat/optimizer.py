@@ -18,25 +18,25 @@ class RowAdam:
 
     def __init__(self) -> None:
         self.steps = np.zeros(0, np.int64)
-        self._moments: dict[str, np.ndarray] = {}
+        self.moments: dict[str, np.ndarray] = {}
 
     def extend(self, gaussians: Gaussians) -> None:
         """Make room for Gaussians, and for coefficients of their colours, that were added at the end."""
         for name, array in gaussians.arrays().items():
             moments = np.zeros((len(array), 2, int(np.prod(array.shape[1:]))), np.float32)
-            old = self._moments.get(name, moments[:0])
+            old = self.moments.get(name, moments[:0])
             moments[: len(old), :, : old.shape[2]] = old
-            self._moments[name] = moments
+            self.moments[name] = moments
         self.steps = np.concatenate([self.steps, np.zeros(len(gaussians) - len(self.steps), np.int64)])
 
     def keep(self, rows: np.ndarray) -> None:
         """Keep the rows where a mask (N,) is true."""
-        self._moments = {name: moments[rows] for name, moments in self._moments.items()}
+        self.moments = {name: moments[rows] for name, moments in self.moments.items()}
         self.steps = self.steps[rows]
 
     def forget(self, name: str) -> None:
         """Set the moments of a parameter to zero."""
-        self._moments[name][:] = 0
+        self.moments[name][:] = 0
 
     def step(
         self, gaussians: Gaussians, gradients: GaussianGradients, rates: dict[str, float], moved: np.ndarray
@@ -51,7 +51,7 @@ class RowAdam:
             if name == "harmonics":
                 columns[3:] /= HIGHER
             if gradient.size:
-                _step(array.reshape(len(array), -1), gradient, self._moments[name], self.steps, moved, columns)
+                _step(array.reshape(len(array), -1), gradient, self.moments[name], self.steps, moved, columns)
 
 
 @numba.njit(cache=True, parallel=True)

@@ -86,18 +86,18 @@ def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
 
 BUILD = Stage(
     name="splat build",
-    version=2,
+    version=4,
     summary="Learn a room as 3-D Gaussians from posed pictures that arrive one after another",
     parameters=BuildParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},
     writes=Splat,
-    libraries=LIBRARIES,
+    libraries=(*LIBRARIES, "pycolmap"),
     module="build_stage",
     example="scenewright splat build --sequence outputs/demo/sequence --hold-out-every 8 --out outputs/demo/splat",
 )
 RENDER = Stage(
     name="splat render",
-    version=1,
+    version=2,
     summary="Show what a splat shows where the camera stood, beside what the camera saw",
     parameters=RenderParameters,
     reads={"splat": Splat, "sequence": Sequence},
@@ -108,7 +108,7 @@ RENDER = Stage(
 )
 LANGUAGE = Stage(
     name="splat language",
-    version=1,
+    version=2,
     summary="Keep in a splat what its pictures say, so that words find places",
     parameters=LanguageParameters,
     reads={"splat": Splat, "sequence": Sequence, "weights": WEIGHTS},
@@ -122,7 +122,7 @@ LANGUAGE = Stage(
 )
 LABEL = Stage(
     name="splat label",
-    version=1,
+    version=2,
     summary="Keep what pictures show of every entity of a panoptic map, so that words find it",
     parameters=LabelParameters,
     reads={"panoptic_map": PanopticMap, "sequence": Sequence, "trajectory": Optionally(Trajectory), "weights": WEIGHTS},
@@ -136,7 +136,7 @@ LABEL = Stage(
 )
 QUERY = Stage(
     name="splat query",
-    version=1,
+    version=2,
     summary="Find what words ask for, with probabilities, or say that the room has none",
     parameters=QueryParameters,
     reads={"language": LanguageMap, "contact_graph": Optionally(ContactGraph), "weights": WEIGHTS},

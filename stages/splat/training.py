@@ -19,6 +19,20 @@ from stages.splat.views import PosedView
 MOMENTS = (0.9, 0.999)
 
 
+@dataclass(frozen=True)
+class TrainerState:
+    """What a trainer holds beside Gaussians and views."""
+
+    moments: dict[str, np.ndarray]
+    moved: np.ndarray
+    """(N,) how often each Gaussian was moved."""
+    pull: np.ndarray
+    """(2, N) sums and counts."""
+    steps: int
+    rounds: int
+    was_reset: bool
+
+
 @dataclass
 class Learned:
     """A view in training: its pose moves where poses are refined."""
@@ -53,6 +67,18 @@ class Trainer:
         self.steps = 0
         self._adam, self._pull = RowAdam(), Pull(0)
         self._rounds, self._was_reset = 0, False
+
+    def state(self) -> TrainerState:
+        """Return what a checkpoint holds of it."""
+        pull = np.stack([self._pull.sums, self._pull.seen])
+        return TrainerState(self._adam.moments, self._adam.steps, pull, self.steps, self._rounds, self._was_reset)
+
+    def go_on(self, gaussians: Gaussians, views: list[Learned], state: TrainerState) -> None:
+        """Go on from where another trainer was."""
+        self.gaussians, self.views, self.steps = gaussians, views, state.steps
+        self._adam.moments, self._adam.steps = state.moments, state.moved
+        self._pull.sums, self._pull.seen = state.pull
+        self._rounds, self._was_reset = state.rounds, state.was_reset
 
     def add_view(self, view: PosedView) -> None:
         """Take a new picture in: Gaussians are set where the method wants them."""

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from cli.edit_command import asked_edit
+from cli.viewing.desk.asking import Asking
 from cli.viewing.desk.forms import forms_of
 from cli.viewing.desk.subjects import subjects_of
 from cli.viewing.view import viewer_of
 from schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile
 from schemas.errors import BadInput, ScenewrightError, UsageError
+from schemas.language_map import LanguageMap
 from schemas.plain_text import cleaned
 from schemas.vocabulary import load_vocabulary
 from stages.edit.edits_file import UNWRITTEN, Changed, append_edits, read_edits, remove_edit, revision_of
@@ -21,7 +23,7 @@ from stages.engine.reading import open_artifact, read_manifest
 from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.page.page_canvas import PageCanvas, ServedPage
 
-SCRIPT = Path(__file__).with_name("editing.js")
+SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("editing.js", "asking.js"))
 EMPTY = EditsFile(format="scenewright-edits", version=1)
 
 
@@ -52,6 +54,7 @@ class Desk:
             raise BadInput(f"{self.path}: a {artifact.kind!r} artifact has no view", hint="open its files elsewhere")
         self.subjects = [] if self.edits is None else subjects_of(artifact, self.edits)
         self._artifact = artifact
+        self._asking = Asking(artifact) if isinstance(artifact, LanguageMap) else None
         self._applied: tuple[AnyEdit, ...] = ()
         self._records: list[AppliedEdit] = []
         self._revision: str | None = None
@@ -104,7 +107,8 @@ class Desk:
             if made_of != self._page_of:
                 canvas = PageCanvas(f"{self._artifact.kind} {self.path.resolve().name}")
                 self._draw(canvas)
-                self._page = canvas.page(ServedPage(SCRIPT.read_text(encoding="utf-8"), self._facts()))
+                script = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
+                self._page = canvas.page(ServedPage(script, self._facts()))
                 self._page_of = made_of
             return self._page
 
@@ -123,7 +127,8 @@ class Desk:
 
     def _facts(self) -> dict[str, Any]:
         if self.edits is None:
-            return {"artifact": self.shown}
+            asks = {} if self._asking is None else {"asks": self._asking.facts()}
+            return {"artifact": self.shown, **asks}
         return {
             "artifact": self.shown,
             "read_only": self.read_only,
@@ -159,6 +164,14 @@ class Desk:
 
     def _pairs(self) -> Iterator[tuple[AppliedEdit, Edit]]:
         return ((record, self._applied[record.number - 1]) for record in self._records)
+
+    def ask(self, text: str) -> dict[str, Any]:
+        """Return where a text fits. Raises UsageError where there is nothing to ask, and for a text that asks for
+        nothing."""
+        with self._turn:
+            if self._asking is None:
+                raise UsageError("words are asked of a language map", hint="scenewright splat language")
+            return self._asking.answer(text)
 
     # ---- what the page asks for --------------------------------------------------------------------------------------
     def append(self, asked: Mapping[str, Any], *, artifact: str, revision: str, by: str, note: str) -> dict[str, Any]:

@@ -42,6 +42,12 @@ class Asked(Model):
     note: Text = ""
 
 
+class Question(Model):
+    """Words that a page asks for."""
+
+    text: Text
+
+
 class DeskServer(BoundedServer):
     """Serves one desk. Raises MachineFailure when the port cannot be had."""
 
@@ -52,6 +58,7 @@ class DeskServer(BoundedServer):
             f"/{token}/": {"GET": _Handler.page},
             f"/{token}/now": {"GET": _Handler.now},
             f"/{token}/do": {"POST": _Handler.do},
+            f"/{token}/ask": {"POST": _Handler.ask},
         }
         super().__init__(HOST, port, type("_Here", (_Handler,), {"routes": routes}))
         self.page_address = f"{self.address}/{token}/"
@@ -74,6 +81,12 @@ class _Handler(BoundedHandler):
         self.answer(200, json.dumps(self.server.desk.now()).encode(), HEADERS)
 
     def do(self) -> None:
+        self._answered(lambda body: self._done(Asked.model_validate_json(body)))
+
+    def ask(self) -> None:
+        self._answered(lambda body: self.server.desk.ask(Question.model_validate_json(body).text))
+
+    def _answered(self, answer: Callable[[bytes], dict[str, Any]]) -> None:
         body = self.body()
         if body is None:
             return
@@ -81,7 +94,7 @@ class _Handler(BoundedHandler):
             if self.headers.get_content_type() != "application/json":
                 self.refuse(415, "this takes application/json")
                 return
-            self.answer(200, json.dumps(self._done(Asked.model_validate_json(body))).encode(), HEADERS)
+            self.answer(200, json.dumps(answer(body)).encode(), HEADERS)
         except ValidationError:
             self.refuse(400, "this is nothing that the page asks for")
         except (Changed, Stale) as error:

@@ -31,6 +31,8 @@ class Fits:
     sizes: np.ndarray | None
     """(R,) index of the size that fits best."""
     probabilities: np.ndarray
+    gaussians: np.ndarray | None
+    """(N,) relevancy of every Gaussian at its best size; None without any."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def fits(
     """Return how well the text rows[0] fits, against the canonical phrases rows[1:]."""
     seen = np.array([region.looks > 0 for region in info.regions], bool)
     of_looks = np.where(seen, relevancy(margins(vectors.regions, rows)), 0.0)
-    field = sizes = None
+    field = sizes = at_best = None
     if len(vectors.means):
         apart = margins(vectors.vectors, rows)
         best = apart.argmax(axis=1)
@@ -93,7 +95,8 @@ def fits(
         weights = vectors.opacities
         field = index.sums(weights * at_best) / np.maximum(index.sums(weights), 1e-9)
         sizes = np.rint(index.sums(best.astype(float)) / np.maximum(np.diff(index.starts), 1)).astype(int)
-    return Fits(of_looks, field, sizes, calibration.probabilities(of_looks, field, index.extents))
+    probabilities = calibration.probabilities(of_looks, field, index.extents)
+    return Fits(of_looks, field, sizes, probabilities, at_best)
 
 
 def ranked(info: LanguageMapFile, index: RegionIndex, probabilities: np.ndarray, most: int = MOST_ANSWERS) -> list[int]:

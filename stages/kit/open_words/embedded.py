@@ -15,7 +15,7 @@ from stages.kit.formats.safetensors_file import read_safetensors
 from stages.kit.open_words.two_towers import SIDE, WIDTH, TwoTowers, tokens, words_of
 
 FORMAT = "scenewright two towers"
-VERSION = "1"
+VERSION = "2"
 FILE = "words/two_towers.safetensors"
 """Below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE

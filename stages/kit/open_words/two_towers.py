@@ -15,7 +15,7 @@ import torch
 from torch import nn
 
 WIDTH = 64
-SIDE = 32
+SIDE = 48
 """Crops are looked at in this size [px]."""
 MOST_WORDS = 8
 MOST_PARTS = 24
@@ -73,9 +73,12 @@ class PictureTower(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.body = nn.Sequential(
-            _halving(3, 32), _Residual(32), _halving(32, 64), _Residual(64), _halving(64, 128), _Residual(128)
+            *(_halving(3, 32), _Residual(32)),
+            *(_halving(32, 64), _Residual(64)),
+            *(_halving(64, 128), _Residual(128)),
+            *(_halving(128, 192), _Residual(192)),
         )
-        self.head = nn.Sequential(nn.Linear(128 * 16, 192), nn.ReLU(), nn.Linear(192, WIDTH))
+        self.head = nn.Sequential(nn.Linear(192 * (SIDE // 16) ** 2, 192), nn.ReLU(), nn.Linear(192, WIDTH))
 
     def forward(self, crops: torch.Tensor) -> torch.Tensor:
         """Return unit vectors."""

@@ -116,6 +116,29 @@ def test_the_compiled_rasterizer_agrees_with_the_reference(
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-4 * max(np.abs(expected).max(initial=0), 1e-9))
 
 
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="gsplat draws with CUDA")
+@pytest.mark.parametrize(
+    ("count", "scale", "basis_count", "features"), [(300, 0.1, 16, 3), (60, 0.6, 4, 0), (400, 0.01, 9, 7)]
+)
+def test_gsplat_agrees_with_the_reference(count: int, scale: float, basis_count: int, features: int) -> None:
+    """Pictures within 2e-4, gradients within 1e-3 of the greatest: gsplat computes with fast, inexact mathematics."""
+    pytest.importorskip("gsplat")
+    gaussians = scene(count, 3, scale=scale, basis_count=basis_count, features=features)
+    single = Gaussians(**{name: array.astype(np.float32) for name, array in gaussians.arrays().items()})
+    double = Gaussians(**{name: array.astype(np.float64) for name, array in single.arrays().items()})
+    view, by = view_of(ODD), weights(ODD, features)
+    ours, theirs = GpuRasterizer().draw(single, view), ReferenceRasterizer().draw(double, view)
+    assert not (theirs.visible & ~ours.visible).any() and ours.visible.sum() < count
+    for field in fields(Picture):
+        found, expected = getattr(ours.picture, field.name), getattr(theirs.picture, field.name)
+        np.testing.assert_allclose(found, expected, atol=2e-4, rtol=0)
+    back, expected_back = ours.backward(by), theirs.backward(by)
+    for field in fields(GaussianGradients):
+        found, expected = getattr(back, field.name), getattr(expected_back, field.name)
+        assert found.shape == expected.shape
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-3 * max(np.abs(expected).max(initial=0), 1e-9))
+
+
 def test_opaque_gaussians_hide_what_is_behind_them() -> None:
     gaussians = scene(2, 0, scale=0.5)
     gaussians.means[:] = [[0, 0, 1.0], [0, 0, 2.0]]
@@ -143,7 +166,8 @@ def test_the_number_of_threads_changes_no_bit() -> None:
 
 def test_no_gaussians_show_the_background() -> None:
     nothing = scene(3, 0, scale=0.1).taken(np.zeros(3, bool))
-    for rasterizer in (CompiledRasterizer(), ReferenceRasterizer()):
+    on_gpu = [GpuRasterizer()] if torch.cuda.is_available() else []
+    for rasterizer in (CompiledRasterizer(), ReferenceRasterizer(), *on_gpu):
         drawn = rasterizer.draw(nothing, view_of(SMALL))
         assert np.allclose(drawn.picture.color, (0.2, 0.5, 0.7)) and not drawn.picture.alpha.any()
         assert drawn.backward(weights(SMALL, 2)).twist.tolist() == [0.0] * 6

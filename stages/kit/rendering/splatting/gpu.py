@@ -1,4 +1,4 @@
-"""The rasteriser of gsplat (github.com/nerfstudio-project/gsplat, Apache-2.0), where CUDA is. Not run so far."""
+"""The rasteriser of gsplat (github.com/nerfstudio-project/gsplat, Apache-2.0), where CUDA is."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import torch
 
 from schemas.errors import MissingDependency
 from stages.kit.rendering.splatting import rasterizer
+from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
 from stages.kit.rendering.splatting.harmonics import view_basis
-from stages.kit.rendering.splatting.rasterizer import Picture, View
+from stages.kit.rendering.splatting.rasterizer import Drawn, Picture, View
 from stages.kit.rendering.splatting.reference import moved
 
 
@@ -29,8 +30,10 @@ class GpuRasterizer:
             raise MissingDependency(f"gsplat cannot be loaded ({error})", hint="pip install gsplat") from None
         self._draw = gsplat.rasterization
 
-    def draw(self, gaussians: Gaussians, view: View) -> GpuDrawn:
-        """Return what the view shows."""
+    def draw(self, gaussians: Gaussians, view: View) -> Drawn:
+        """Return what the view shows. Raises ValueError for a picture without pixels."""
+        if not len(gaussians):
+            return CompiledRasterizer().draw(gaussians, view)  # gsplat ends the process where there are none
         leaves = {
             name: torch.tensor(array, dtype=torch.float32, device="cuda", requires_grad=True)
             for name, array in gaussians.arrays().items()

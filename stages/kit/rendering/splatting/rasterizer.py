@@ -75,10 +75,14 @@ class Rasterizer(Protocol):
 
 
 def direction_limits(camera: Camera) -> tuple[float, float, float, float]:
-    """Return least and greatest x/z, then y/z, at which the Jacobian is taken."""
+    """Return least and greatest x/z, then y/z, at which the Jacobian is taken.
+
+    The edge of the picture lies half a pixel beyond its outermost centres.
+    """
+    cx, cy = camera.cx + 0.5, camera.cy + 0.5
     return (
-        -camera.cx / camera.fx - MARGIN * camera.width / camera.fx,
-        (camera.width - camera.cx) / camera.fx + MARGIN * camera.width / camera.fx,
-        -camera.cy / camera.fy - MARGIN * camera.height / camera.fy,
-        (camera.height - camera.cy) / camera.fy + MARGIN * camera.height / camera.fy,
+        -cx / camera.fx - MARGIN * camera.width / camera.fx,
+        (camera.width - cx) / camera.fx + MARGIN * camera.width / camera.fx,
+        -cy / camera.fy - MARGIN * camera.height / camera.fy,
+        (camera.height - cy) / camera.fy + MARGIN * camera.height / camera.fy,
     )

@@ -1,0 +1,126 @@
+"""Depth of single pixels out of pictures alone: features that several posed pictures show, triangulated (pycolmap).
+
+Poses are taken as they are. All pictures are matched before the training begins: without depth nothing arrives late.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from stages.kit.geometry.transforms import apply
+from stages.splat.views import PosedView
+
+FEATURES = 2000
+"""Of a picture, at most."""
+LONGEST_EXHAUSTIVE = 60
+"""So many pictures are matched each with each; of more, each with the NEIGHBOURS that follow."""
+NEIGHBOURS = 12
+LARGEST_ERROR = 2.0
+"""Of a point in the pictures that show it [px]."""
+LEAST_ANGLE = 2.0
+"""Between the rays of a point [degrees]."""
+
+
+def with_points(views: Sequence[PosedView], seed: int) -> list[PosedView]:
+    """Return the views with the z-depth [m] of the triangulated points that each shows, 0 everywhere else."""
+    points = _points(views, seed)
+    found = []
+    for number, view in enumerate(views):
+        height, width = view.color.shape[:2]
+        depth = np.zeros((height, width), np.float32)
+        if number in points:
+            pixels, places = points[number]
+            columns = np.clip(np.rint(pixels[:, 0]).astype(int), 0, width - 1)
+            rows = np.clip(np.rint(pixels[:, 1]).astype(int), 0, height - 1)
+            depth[rows, columns] = np.maximum(apply(view.camera_from_world, places)[:, 2], 0.0)
+        found.append(replace(view, depth=depth))
+    return found
+
+
+def _points(views: Sequence[PosedView], seed: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Return number of a view -> pixels (K, 2) and places (K, 3) [m, world] of the points that it shows."""
+    import pycolmap
+
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
+    pycolmap.set_random_seed(seed)
+    cameras = sorted({view.camera_name for view in views})
+    with tempfile.TemporaryDirectory(prefix="scenewright-points-") as scratch:
+        folder = Path(scratch)
+        model = pycolmap.Reconstruction()
+        for number, name in enumerate(cameras):
+            camera = next(view.camera for view in views if view.camera_name == name)
+            # Its pixel centres are at halves.
+            parameters = [camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]
+            own = [k for k, view in enumerate(views) if view.camera_name == name]
+            for k in own:
+                path = folder / "images" / f"{k:06d}.png"
+                path.parent.mkdir(exist_ok=True)
+                cv2.imwrite(str(path), np.round(255 * views[k].color[..., ::-1]).astype(np.uint8))
+            reading = pycolmap.ImageReaderOptions(
+                camera_model="PINHOLE", camera_params=",".join(repr(float(x)) for x in parameters)
+            )
+            extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
+            extraction.sift.max_num_features = FEATURES
+            pycolmap.extract_features(
+                folder / "database.db",
+                folder / "images",
+                [f"{k:06d}.png" for k in own],
+                pycolmap.CameraMode.SINGLE,
+                reading,
+                extraction,
+                pycolmap.Device.cpu,
+            )
+            model.add_camera_with_trivial_rig(
+                pycolmap.Camera(
+                    model="PINHOLE", width=camera.width, height=camera.height, params=parameters, camera_id=number + 1
+                )
+            )
+        _match(folder / "database.db", len(views), seed)
+        with pycolmap.Database.open(folder / "database.db") as database:
+            ids = {image.name: image.image_id for image in database.read_all_images()}
+        for k, view in enumerate(views):
+            image = pycolmap.Image(
+                name=f"{k:06d}.png", camera_id=cameras.index(view.camera_name) + 1, image_id=ids[f"{k:06d}.png"]
+            )
+            model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(view.camera_from_world[:3]))
+        options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
+        options.triangulation.random_seed = seed
+        options.triangulation.min_angle = LEAST_ANGLE
+        (folder / "model").mkdir()
+        model = pycolmap.triangulate_points(
+            model,
+            folder / "database.db",
+            folder / "images",
+            folder / "model",
+            clear_points=True,
+            options=options,
+            refine_intrinsics=False,
+        )
+        found = {}
+        for image in model.images.values():
+            seen = [(p.xy, model.points3D[p.point3D_id]) for p in image.points2D if p.has_point3D()]
+            good = [(xy, point.xyz) for xy, point in seen if point.error <= LARGEST_ERROR]
+            if good:
+                pixels, places = (np.array(part) for part in zip(*good, strict=True))
+                found[int(image.name.removesuffix(".png"))] = (pixels - 0.5, places)
+        return found
+
+
+def _match(database: Path, count: int, seed: int) -> None:
+    import pycolmap
+
+    matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = seed
+    if count <= LONGEST_EXHAUSTIVE:
+        exhaustive = pycolmap.ExhaustivePairingOptions()
+        pycolmap.match_exhaustive(database, matching, exhaustive, verification, pycolmap.Device.cpu)
+    else:
+        pairing = pycolmap.SequentialPairingOptions(overlap=NEIGHBOURS, quadratic_overlap=True, num_threads=1)
+        pycolmap.match_sequential(database, matching, pairing, verification, pycolmap.Device.cpu)
