@@ -46,10 +46,11 @@ def train(learner: OursLearner, domain: str, tasks: Sequence[Task], opened: Open
         reached = training.reached
         try:
             _episode(learner, domain, task, opened(task), training)
+            training.episodes += 1
+            if training.reached == reached:
+                learner.reconsider()
         except TeacherLeft:
             break
-        training.episodes += 1
-        learner.missed += training.reached == reached
     return training
 
 
@@ -98,12 +99,38 @@ def _next_action(
     tried = learner.explore(state)
     if curious or not learner.plans:
         return tried
-    planned = first_action(learner.memory.domain(domain), list(state.names), learner.memory.see(state), goal)
-    return planned or learner.doubtful(state) or tried
+    operators, held = learner.memory.domain(domain), learner.memory.see(state)
+    planned = first_action(operators, list(state.names), held, goal)
+    if planned is not None:
+        return planned
+    fresh = tried if learner.little_tried(state, tried) else None
+    return _towards_unknown(learner, operators, state, held) or fresh or learner.doubtful(state) or tried
+
+
+def _towards_unknown(
+    learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]
+) -> Atom | None:
+    """Return the first step of the shortest way to where an action that was never done can be tried; it may be what
+    the goal lacks."""
+    ways: list[tuple[int, Atom]] = []
+    for action, wanted in learner.never_done(state):
+        if wanted <= held:
+            return action
+        plan = _plan(operators, list(state.names), held, wanted, improvement=0)
+        if plan:
+            ways.append((len(plan), plan[0]))
+    return min(ways)[1] if ways else None
 
 
 def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:
     """Return the first action of a plan, None without one."""
+    plan = _plan(domain, objects, atoms, goal, SHORTENING)
+    return plan[0] if plan else None
+
+
+def _plan(
+    domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom], improvement: int
+) -> list[Atom]:
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
-    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=SHORTENING)
-    return action_atom(found.actions[0]) if found.actions else None
+    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=improvement)
+    return [action_atom(action) for action in found.actions or ()]
