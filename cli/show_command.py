@@ -16,7 +16,7 @@ def show(
     json_output: Annotated[bool, typer.Option("--json", help="domain.json as one JSON object.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
-    """Say what each predicate means and what it was learned of, the operators, goals, and what is no longer believed."""
+    """Say what each predicate means and was learned of, the operators, goals, and what is no longer believed."""
     from schemas.learned_domain import LearnedDomain
     from schemas.outside import LARGEST_SETTINGS, file_text
     from stages.engine.reading import open_artifact

@@ -107,9 +107,7 @@ def _next_action(
     return _towards_unknown(learner, operators, state, held) or fresh or learner.doubtful(state) or tried
 
 
-def _towards_unknown(
-    learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]
-) -> Atom | None:
+def _towards_unknown(learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]) -> Atom | None:
     """Return the first step of the shortest way to where an action that was never done can be tried; it may be what
     the goal lacks."""
     ways: list[tuple[int, Atom]] = []

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -26,7 +26,7 @@ MOST_QUESTIONS = 3
 """About one phrase, told apart from its rivals."""
 ASKED_AGAIN = 2.0
 """Weight of a sentence that was confirmed."""
-MOST_TRIES = 2
+MOST_TRIES = 3
 """Of an action in one situation, when nothing that was named speaks against it."""
 DOUBT_AFTER = 2
 """Episodes without their goal after which what was said once is tried."""
@@ -46,7 +46,7 @@ class OursLearner:
         self.random = np.random.default_rng([seed, 11])
         self._synthesiser = Synthesiser(self.memory.states, self.setting)
         self._tried: Counter[tuple[str, ...]] = Counter()
-        self._silent: set[tuple[str, ...]] = set()
+        self._refusals: list[tuple[tuple[str, ...], Atom, Perceived]] = []
         self._asked: Counter[Phrase] = Counter()
         self._facts: tuple[Perceived | None, bool, dict[str, tuple[str, ...]]] = (None, False, {})
         self.missed = 0
@@ -57,10 +57,8 @@ class OursLearner:
     def refused(self, state: Perceived, action: Atom, sentence: str) -> None:
         """Take in that an action was not allowed, and what was said about it."""
         situation = self._situation(state, action)
-        if not sentence and situation not in self._silent:
-            self._silent.add(situation)  # she said nothing: it is tried once more
-            return
         self._tried[situation] += 1
+        self._refusals.append((situation, action, state))
         if not sentence:
             return
         phrase, objects = self._heard(state, sentence, f"{' '.join(action)}")
@@ -241,6 +239,7 @@ class OursLearner:
         """Return the action in the situation that was tried least, of those that nothing is known against."""
         stated = self.memory.preconditions()
         held = self.memory.see(state)
+        unexplained = self._unexplained(stated)
         best: list[Atom] = []
         fewest = 10**9
         for name in self.actions:
@@ -250,7 +249,8 @@ class OursLearner:
                 wanted = {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())}
                 if not wanted <= held:
                     continue
-                count = self._tried[self._situation(state, action)]
+                situation = self._situation(state, action)
+                count = self._tried[situation] - unexplained[situation]
                 if count < fewest:
                     best, fewest = [], count
                 if count == fewest:
@@ -289,16 +289,16 @@ class OursLearner:
                 continue
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 against = [entry for entry in wanted if _bound(entry[0], objects) not in held]
-                action = (name, *objects)
+                tried = (name, *objects)
                 if not against:
                     continue
                 if self.missed >= DOUBT_AFTER:
                     fixed = sum(atom[0] in changing for atom, _ in against)
-                    weight = sum(count for _, count in against) + self._tried[self._situation(state, action)]
-                    found.append(((weight, fixed), action))
+                    weight = sum(count for _, count in against) + self._tried[self._situation(state, tried)]
+                    found.append(((weight, fixed), tried))
                 elif max(count for _, count in against) == 1:
-                    found.append(((len(against),), action))
-        fewest = [action for weight, action in found if weight == min(found)[0]]
+                    found.append(((len(against),), tried))
+        fewest = [tried for weight, tried in found if weight == min(found)[0]]
         return fewest[int(self.random.integers(len(fewest)))] if fewest else None
 
     def _changing(self) -> set[str]:
@@ -325,7 +325,22 @@ class OursLearner:
     def curious(self, state: Perceived) -> bool:
         """Whether there is an action that was never tried in such a situation."""
         action = self.explore(state)
-        return action is not None and self._tried[self._situation(state, action)] == 0
+        if action is None:
+            return False
+        situation = self._situation(state, action)
+        return self._tried[situation] <= self._unexplained(self.memory.preconditions())[situation]
+
+    def _unexplained(self, stated: Mapping[str, frozenset[Atom]]) -> Counter[tuple[str, ...]]:
+        """Return how often an action was refused in a situation though all that was named for it held: nothing was
+        said, or what is no longer believed. Such an action is tried again, until it was tried MOST_TRIES times."""
+        found: Counter[tuple[str, ...]] = Counter()
+        predicates = self.memory.predicates()
+        for situation, action, state in self._refusals:
+            evaluator = Evaluator(state, predicates)
+            wanted = (_bound(atom, action[1:]) for atom in stated.get(action[0], ()))
+            if self._tried[situation] < MOST_TRIES and all(map(evaluator.holds, wanted)):
+                found[situation] += 1
+        return found
 
     def little_tried(self, state: Perceived, action: Atom | None) -> bool:
         """Whether an action was tried less than MOST_TRIES times in such a situation."""

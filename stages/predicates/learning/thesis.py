@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic import Field
@@ -168,6 +168,10 @@ class ThesisLearner(OursLearner):
                 if {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())} <= held:
                     found.append((name, *objects))
         return found[int(self.random.integers(len(found)))] if found else None
+
+    def never_done(self, state: Perceived) -> Iterator[tuple[Atom, frozenset[Atom]]]:
+        """It seeks out nothing."""
+        return iter(())
 
     def doubtful(self, state: Perceived) -> Atom | None:
         """It doubts nothing."""
