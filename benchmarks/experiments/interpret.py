@@ -184,7 +184,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Reco
     known = Known()
     taught: dict[tuple[str, str], Taught] = {}
     judged: dict[tuple[str, str], tuple[Scores, Scores]] = {}
-    for trial in sorted(trials, key=lambda trial: (trial.seed, trial.arm)):
+    for trial in sorted(trials, key=lambda trial: (list(ARMS).index(trial.arm), trial.seed)):
         name, which = trial.case.split("/")
         tasks = tasks_of(name, which, bench.parameters.goals if which == "hundred_goals" else SET_TASKS, OF_TESTS)
         if which not in known.ceilings:
