@@ -6,6 +6,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 from pydantic import Field
 
@@ -110,16 +111,28 @@ class Known:
 
     replays: Replays = field(default_factory=dict)
     plans: dict[tuple[object, ...], tuple[TaskPlan, float]] = field(default_factory=dict)
-    ceilings: dict[str, int] = field(default_factory=dict)
+    by_oracle: dict[str, list[Attempt]] = field(default_factory=dict)
+    """Set of tasks -> what came of the teacher's own operators, which no seed changes."""
+    tried: dict[tuple[object, ...], Attempt] = field(default_factory=dict)
+    """What came of tasks, for learners that learned the same."""
     accuracies: dict[tuple[str, object], float] = field(default_factory=dict)
     done: list[Done] = field(default_factory=list)
     """What the oracle did on the combined sets: operators are judged on it."""
 
     seen: dict[tuple[object, int], frozenset[Atom]] = field(default_factory=dict)
 
+    def oracle(self, name: str, which: str, goals: int) -> list[Attempt]:
+        """Return what came of a set of tasks by the teacher's own operators."""
+        if which not in self.by_oracle:
+            planner = self.planner(true_domain(name))
+            self.by_oracle[which] = [
+                oracle(task, name, Replayed(task, self.replays), planner) for task in tests(name, which, goals)
+            ]
+        return self.by_oracle[which]
+
     def see(self, memory: Memory) -> Abstraction:
         """Return a memory's abstraction, which evaluates each of the states in `replays` once."""
-        key = tuple((each.name, text_of(each.means)) for each in memory.predicates().values()), tuple(memory.used())
+        key = seen_with(memory)
 
         def see(state: Perceived) -> frozenset[Atom]:
             if (key, id(state)) not in self.seen:
@@ -141,6 +154,17 @@ class Known:
             return self.plans[key]
 
         return plan
+
+
+def seen_with(memory: Memory) -> tuple[object, ...]:
+    """Return what a memory's abstraction depends on."""
+    return tuple((each.name, text_of(each.means)) for each in memory.predicates().values()), tuple(memory.used())
+
+
+@cache
+def tests(name: str, which: str, goals: int) -> tuple[Task, ...]:
+    """Return the tasks of a set."""
+    return tuple(tasks_of(name, which, goals if which == "hundred_goals" else SET_TASKS, OF_TESTS))
 
 
 @dataclass
@@ -186,16 +210,15 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Reco
     judged: dict[tuple[str, str], tuple[Scores, Scores]] = {}
     for trial in sorted(trials, key=lambda trial: (list(ARMS).index(trial.arm), trial.seed)):
         name, which = trial.case.split("/")
-        tasks = tasks_of(name, which, bench.parameters.goals if which == "hundred_goals" else SET_TASKS, OF_TESTS)
-        if which not in known.ceilings:
-            known.ceilings[which] = sum(each.success for each in _by_oracle(tasks, name, known))
+        goals = bench.parameters.goals
+        by_oracle = known.oracle(name, which, goals)
+        ceiling = sum(each.success for each in by_oracle)
         if not known.done:
-            combined = tasks_of(name, "combined", SET_TASKS, OF_TESTS)
-            known.done = list(_done(combined, _by_oracle(combined, name, known), known))
+            combined = known.oracle(name, "combined", goals)
+            known.done = list(_done(tests(name, "combined", goals), combined, known))
         if trial.arm == "oracle":
-            tried = _by_oracle(tasks, name, known)
             met = 100.0 * expected_share(true_domain(name), truth_of(name).atoms, known.done)
-            yield trial, _record(tried, known.ceilings[which], None, (100.0, 100.0), (100.0, met))
+            yield trial, _record(by_oracle, ceiling, None, (100.0, 100.0), (100.0, met))
             continue
         key = (trial.arm, trial.seed)
         if key not in taught:
@@ -205,13 +228,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Reco
                 _operators(learned, name, known),
             )
         learned = taught[key]
-        tried = [_tried(learned, name, task, known) for task in tasks]
-        yield trial, _record(tried, known.ceilings[which], learned, *judged[key])
-
-
-def _by_oracle(tasks: Sequence[Task], name: str, known: Known) -> list[Attempt]:
-    planner = known.planner(true_domain(name))
-    return [oracle(task, name, Replayed(task, known.replays), planner) for task in tasks]
+        tried = [_tried(learned, name, task, known) for task in tests(name, which, goals)]
+        yield trial, _record(tried, ceiling, learned, *judged[key])
 
 
 def _done(tasks: Sequence[Task], tried: Sequence[Attempt], known: Known) -> Iterator[Done]:
@@ -267,11 +285,12 @@ def _tried(learned: Taught, name: str, task: Task, known: Known) -> Attempt:
     wanted, unknown = learned.memory.goal_atoms(goal_phrases(task.sentence, task.objects))
     if unknown:
         return Attempt(unplanned=unknown[0])
-    world = Replayed(task, known.replays)
-    planner = known.planner(learned.domain)
-    see = known.see(learned.memory)
     replan = not isinstance(learned.memory, ThesisMemory)
-    return attempt(task, name, learned.domain, see, wanted, replan=replan, world=world, planner=planner)
+    key = (domain_text(learned.domain), seen_with(learned.memory), task.name, task.seed, wanted, replan)
+    if key not in known.tried:
+        see, planner, world = known.see(learned.memory), known.planner(learned.domain), Replayed(task, known.replays)
+        known.tried[key] = attempt(task, name, learned.domain, see, wanted, replan=replan, world=world, planner=planner)
+    return known.tried[key]
 
 
 def _accuracy(memory: Memory, name: str, states: int, known: Known) -> Scores:
