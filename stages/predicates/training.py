@@ -108,16 +108,15 @@ def _next_action(
 
 
 def _towards_unknown(learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]) -> Atom | None:
-    """Return the first step of the shortest way to where an action that was never done can be tried; it may be what
-    the goal lacks."""
-    ways: list[tuple[int, Atom]] = []
-    for action, wanted in learner.never_done(state):
-        if wanted <= held:
-            return action
-        plan = _plan(operators, list(state.names), held, wanted, improvement=0)
-        if plan:
-            ways.append((len(plan), plan[0]))
-    return min(ways)[1] if ways else None
+    """Return the first step of the best way to where an action can be tried that may be what the goal lacks."""
+    best: tuple[tuple[int, ...], Atom] | None = None
+    for order, action, wanted in sorted(learner.worth_trying(state), key=lambda entry: entry[:2]):
+        if best is not None and best[0][:-1] < order:
+            break
+        plan = [action] if wanted <= held else _plan(operators, list(state.names), held, wanted, improvement=0)
+        if plan and (best is None or (*order, len(plan)) < best[0]):
+            best = ((*order, len(plan)), plan[0])
+    return best[1] if best else None
 
 
 def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:

@@ -257,17 +257,38 @@ class OursLearner:
                     best.append(action)
         return best[int(self.random.integers(len(best)))] if best else None
 
-    def never_done(self, state: Perceived) -> Iterator[tuple[Atom, frozenset[Atom]]]:
-        """Yield the actions that were never allowed, with what was named for them; those left out that can be tried
-        here and were refused twice in such a situation."""
+    def worth_trying(self, state: Perceived) -> Iterator[tuple[tuple[int, ...], Atom, frozenset[Atom]]]:
+        """Yield actions that would tell most, with what has to hold first, and an order: smaller is better.
+
+        Those that were never allowed, with all that was named for them; and, once DOUBT_AFTER episodes went amiss, any
+        without one precondition that no action changes and that does not hold: it may be what the teacher was wrong
+        about. Left out is what can be tried here and was, MOST_TRIES times, in such a situation."""
         done = {transition.action[0] for transition in self.memory.transitions}
-        held, stated = self.memory.see(state), self.memory.preconditions()
+        held, changing = self.memory.see(state), self._changing()
+        said = self._said()
         for name in self.actions:
-            for objects in itertools.permutations(state.names, self.setting.arity[name]) if name not in done else ():
+            known = {atom: count for (action, atom), count in said.items() if action == name}
+            for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 action = (name, *objects)
-                wanted = frozenset(_bound(atom, objects) for atom in stated.get(name, ()))
-                if not wanted <= held or self.little_tried(state, action):
-                    yield action, wanted
+                wanted = {_bound(atom, objects): count for atom, count in known.items()}
+                lacking = {atom: wanted[atom] for atom in wanted if atom not in held}
+                doubted = [atom for atom in lacking if atom[0] not in changing]
+                if not lacking and not self.little_tried(state, action):
+                    continue
+                if name not in done and not doubted:
+                    yield (0, 0), action, frozenset(wanted)
+                elif self.missed >= DOUBT_AFTER and len(doubted) == 1:
+                    rest = frozenset(wanted) - set(doubted)
+                    if not rest <= held or self.little_tried(state, action):
+                        yield (1 + (name in done), lacking[doubted[0]]), action, rest
+
+    def _said(self) -> Counter[tuple[str, Atom]]:
+        """Return action and precondition -> how often it was named."""
+        names = self.memory.names()
+        said: Counter[tuple[str, Atom]] = Counter()
+        for (action, phrase, variables), count in self.memory.stated.items():
+            said[action, (names[phrase], *variables)] += count
+        return said
 
     def doubtful(self, state: Perceived) -> Atom | None:
         """Return an action to try against what was said, which may be wrong: the one with the least against it.
@@ -275,12 +296,8 @@ class OursLearner:
         Of an action that was never allowed, whose preconditions were never seen to hold together and were said but
         once; and, once DOUBT_AFTER episodes went amiss, of any: first those that speak against nothing but what no
         action changes, then those that were named least, and were tried least in such a situation."""
-        names, held = self.memory.names(), self.memory.see(state)
+        held, changing, said = self.memory.see(state), self._changing(), self._said()
         done = {transition.action[0] for transition in self.memory.transitions}
-        changing = self._changing()
-        said: Counter[tuple[str, Atom]] = Counter()
-        for (action, phrase, variables), count in self.memory.stated.items():
-            said[action, (names[phrase], *variables)] += count
         found: list[tuple[tuple[int, ...], Atom]] = []
         for name in self.actions:
             wanted = [(atom, count) for (action, atom), count in said.items() if action == name]

@@ -169,7 +169,7 @@ class ThesisLearner(OursLearner):
                     found.append((name, *objects))
         return found[int(self.random.integers(len(found)))] if found else None
 
-    def never_done(self, state: Perceived) -> Iterator[tuple[Atom, frozenset[Atom]]]:
+    def worth_trying(self, state: Perceived) -> Iterator[tuple[tuple[int, ...], Atom, frozenset[Atom]]]:
         """It seeks out nothing."""
         return iter(())
 
