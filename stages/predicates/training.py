@@ -58,6 +58,7 @@ def _episode(learner: OursLearner, domain: str, task: Task, world: World, traini
     memory = learner.memory
     parts = goal_phrases(task.sentence, task.objects)
     failures = 0
+    learner.sought = None
     for step in range(MOST_STEPS):
         if failures >= MOST_FAILURES:
             return
@@ -108,15 +109,37 @@ def _next_action(
 
 
 def _towards_unknown(learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]) -> Atom | None:
-    """Return the first step of the best way to where an action can be tried that may be what the goal lacks."""
-    best: tuple[tuple[int, ...], Atom] | None = None
+    """Return the next step of the best way to where an action can be tried that may be what the goal lacks. What was
+    chosen is kept to until it was tried or there is no way to it."""
+    if learner.sought is None:
+        learner.sought = _best_sought(learner, operators, state, held)
+    if learner.sought is None:
+        return None
+    action, wanted = learner.sought
+    if wanted <= held:
+        learner.sought = None
+        return action
+    plan = _plan(operators, list(state.names), held, wanted, improvement=0)
+    if not plan:
+        learner.sought = None
+        return None
+    return plan[0]
+
+
+def _best_sought(
+    learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]
+) -> tuple[Atom, frozenset[Atom]] | None:
+    best: tuple[tuple[int, ...], Atom, frozenset[Atom]] | None = None
     for order, action, wanted in sorted(learner.worth_trying(state), key=lambda entry: entry[:2]):
         if best is not None and best[0][:-1] < order:
             break
-        plan = [action] if wanted <= held else _plan(operators, list(state.names), held, wanted, improvement=0)
-        if plan and (best is None or (*order, len(plan)) < best[0]):
-            best = ((*order, len(plan)), plan[0])
-    return best[1] if best else None
+        far = 0 if wanted <= held else len(_plan(operators, list(state.names), held, wanted, improvement=0))
+        if (far or wanted <= held) and (best is None or (*order, far) < best[0]):
+            best = ((*order, far), action, wanted)
+    if best is None:
+        return None
+    learner.seeking[best[1:]] += 1
+    return best[1:]
 
 
 def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:

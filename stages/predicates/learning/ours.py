@@ -49,6 +49,10 @@ class OursLearner:
         self._refusals: list[tuple[tuple[str, ...], Atom, Perceived]] = []
         self._asked: Counter[Phrase] = Counter()
         self._facts: tuple[Perceived | None, bool, dict[str, tuple[str, ...]]] = (None, False, {})
+        self.sought: tuple[Atom, frozenset[Atom]] | None = None
+        """An action that is to be tried, and what has to hold first."""
+        self.seeking: Counter[tuple[Atom, frozenset[Atom]]] = Counter()
+        """How often each of these was sought: no more than MOST_TRIES times."""
         self.missed = 0
         """Episodes that ended without their goal."""
 
@@ -273,14 +277,13 @@ class OursLearner:
                 wanted = {_bound(atom, objects): count for atom, count in known.items()}
                 lacking = {atom: wanted[atom] for atom in wanted if atom not in held}
                 doubted = [atom for atom in lacking if atom[0] not in changing]
-                if not lacking and not self.little_tried(state, action):
+                rest = frozenset(wanted) - set(doubted)
+                if self.seeking[action, rest] >= MOST_TRIES or (rest <= held and not self.little_tried(state, action)):
                     continue
                 if name not in done and not doubted:
-                    yield (0, 0), action, frozenset(wanted)
+                    yield (0, 0), action, rest
                 elif self.missed >= DOUBT_AFTER and len(doubted) == 1:
-                    rest = frozenset(wanted) - set(doubted)
-                    if not rest <= held or self.little_tried(state, action):
-                        yield (1 + (name in done), lacking[doubted[0]]), action, rest
+                    yield (1 + (name in done), lacking[doubted[0]]), action, rest
 
     def _said(self) -> Counter[tuple[str, Atom]]:
         """Return action and precondition -> how often it was named."""
