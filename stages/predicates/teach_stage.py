@@ -109,7 +109,7 @@ def write_predicates(memory: Memory, output: Path) -> None:
     if memory.disbelieved:
         lines += ["", "No longer believed:", *(f"- {sentence}" for sentence in memory.disbelieved)]
     (output / "predicates.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    if memory.states:
+    if memory.states and memory.states[0].names:
         given = memory.setting.given
         learned = [each for name, each in predicates.items() if name not in given] or list(given.values())
         draw_predicates(learned, memory.states[0], predicates).save(output / "predicates.png")

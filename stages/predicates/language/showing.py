@@ -62,7 +62,7 @@ def _predicate_lines(file: LearnedDomainFile, predicate: LearnedPredicate) -> It
         yield "    given"
     for phrase in heard:
         holds = sum(example.holds for example in phrase.examples)
-        yield f"    heard: {phrase.text!r}; it held {holds} times, and did not {len(phrase.examples) - holds} times"
+        yield f"    heard: {phrase.text!r}; examples: {holds} for, {len(phrase.examples) - holds} against"
 
 
 def _operator_lines(schema: Schema) -> Iterator[str]:
