@@ -10,6 +10,7 @@ from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Domain, Problem, ground
 from stages.kit.tasks.task_planner import plan_task
 from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, SHORTENING, Live, World, action_atom
+from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.ours import OursLearner
 from stages.predicates.tasks import Task, open_kitchen
 from stages.predicates.teacher.simulated import TeacherLeft
@@ -37,6 +38,12 @@ class Training:
     refused: int = 0
     physics: list[str] = field(default_factory=list)
     """Actions that the teacher allowed and physics failed."""
+    course: list[tuple[int, int, int]] = field(default_factory=list)
+    """After each step: predicates that were learned, actions that were done, sentences that were heard."""
+
+    def note(self, memory: Memory) -> None:
+        """Keep how far learning has come."""
+        self.course.append((len(set(memory.names().values())), len(memory.transitions), memory.sentences))
 
 
 def train(learner: OursLearner, domain: str, tasks: Sequence[Task], opened: Opened = in_the_kitchen) -> Training:
@@ -46,6 +53,7 @@ def train(learner: OursLearner, domain: str, tasks: Sequence[Task], opened: Open
         reached = training.reached
         try:
             _episode(learner, domain, task, opened(task), training)
+            training.note(learner.memory)
             training.episodes += 1
             if training.reached == reached:
                 learner.reconsider()
@@ -62,6 +70,8 @@ def _episode(learner: OursLearner, domain: str, task: Task, world: World, traini
     for step in range(MOST_STEPS):
         if failures >= MOST_FAILURES:
             return
+        if step:
+            training.note(memory)
         state = world.state()
         goal, _ = memory.goal_atoms(parts)
         curious = step < MOST_STEPS - LEFT_FOR_THE_GOAL and learner.curious(state)

@@ -46,6 +46,7 @@ def view(page: Page) -> dict[str, Any] | None:
         "turns": file.dialogue[:MOST_TURNS] if file is not None else (),
         "hidden": max(0, len(file.dialogue) - MOST_TURNS) if file is not None else 0,
         "holding": _picture(learned, "predicates", "Where each predicate holds"),
+        "learning": _picture(learned, "learning", "Predicates and operators over the steps of training"),
         "plan": plan.info if plan is not None else None,
         "kitchen": _picture(plan, "kitchen", "The kitchen before and after"),
         "evaluation": evaluation.info if evaluation is not None else None,
