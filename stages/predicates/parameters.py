@@ -10,6 +10,7 @@ from pydantic import Field
 from schemas.errors import UsageError
 from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
 from schemas.learned_domain import LearnedDomain
+from stages.kit.known_names import check_names
 from stages.kit.language.options import LanguageParameters
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
@@ -66,9 +67,7 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
 
 def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for an unknown set."""
-    for name in parameters.sets:
-        if name not in SET_NAMES:
-            raise UsageError(f"--sets: there is no {name!r}", hint=f"choose of {', '.join(SET_NAMES)}")
+    check_names("--sets", parameters.sets, SET_NAMES)
 
 
 def kitchen_files(parameters: Any) -> tuple[str, ...]:
