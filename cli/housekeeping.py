@@ -19,6 +19,7 @@ from cli.output import out as _out
 from cli.output import say as _say
 from cli.record_command import record
 from cli.serve_command import serve
+from cli.show_command import show
 from cli.timeline_command import timeline
 from cli.urdf_check_command import urdf_check
 from cli.urdf_settle_command import urdf_settle
@@ -287,6 +288,7 @@ BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("cutting", record),
     ("suture", follow),
     ("splat", view),
+    ("predicates", show),
     *(("edit", command) for command in (*edit_command.COMMANDS, *edit_node_command.COMMANDS)),
 )
 """Commands of a group of steps that are no steps; they are there where the group's steps are."""

@@ -153,7 +153,7 @@ class LearnedDomainFile(Model):
 
 class LearnedDomain(Artifact):
     """`domain.json`, `domain.pddl` (the operators), `predicates.txt` and `predicates.png` (sentences, and where each
-    predicate holds)."""
+    predicate holds), `learning.png` (predicates, operators and sentences over the steps of training)."""
 
     kind: ClassVar[str] = "learned_domain"
     description: ClassVar[str] = "predicates and operators learned from corrections"

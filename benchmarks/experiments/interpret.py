@@ -6,6 +6,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 from pydantic import Field
 
@@ -20,7 +21,17 @@ from stages.kit.stage import Parameters
 from stages.kit.tasks.pddl import domain_text
 from stages.kit.tasks.strips import Atom, Domain
 from stages.kit.tasks.task_planner import TaskPlan
-from stages.predicates.execution import Abstraction, Attempt, Planner, Replayed, Replays, attempt, oracle, timed_plan
+from stages.predicates.execution import (
+    Abstraction,
+    Attempt,
+    Planner,
+    Replayed,
+    Replays,
+    World,
+    attempt,
+    oracle,
+    timed_plan,
+)
 from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.opening import STAND_IN
 from stages.predicates.learning.ours import OursLearner
@@ -29,6 +40,7 @@ from stages.predicates.learning.setting import KITCHEN_GIVEN
 from stages.predicates.learning.thesis import ThesisLearner, stand_in
 from stages.predicates.learning.thesis_memory import ThesisMemory
 from stages.predicates.measure.accuracy import balanced_accuracy, drawn_cases
+from stages.predicates.measure.operators import Done, allowed_accuracy, expected_share
 from stages.predicates.tasks import SETS, Task, tasks_of
 from stages.predicates.teacher.simulated import SimulatedTeacher, Wording
 from stages.predicates.training import Training, train
@@ -60,6 +72,9 @@ ARMS = {
 }
 
 
+Scores = tuple[float, float]
+
+
 class InterpretParameters(Parameters):
     """Sizes."""
 
@@ -82,6 +97,8 @@ class Record:
     language_calls: float
     accuracy: float
     worst_accuracy: float
+    allowed_accuracy: float
+    expected: float
     disbelieved: float
     physics: float
     train_seconds: float
@@ -94,14 +111,28 @@ class Known:
 
     replays: Replays = field(default_factory=dict)
     plans: dict[tuple[object, ...], tuple[TaskPlan, float]] = field(default_factory=dict)
-    ceilings: dict[str, int] = field(default_factory=dict)
+    by_oracle: dict[str, list[Attempt]] = field(default_factory=dict)
+    """Set of tasks -> what came of the teacher's own operators, which no seed changes."""
+    tried: dict[tuple[object, ...], Attempt] = field(default_factory=dict)
+    """What came of tasks, for learners that learned the same."""
     accuracies: dict[tuple[str, object], float] = field(default_factory=dict)
+    done: list[Done] = field(default_factory=list)
+    """What the oracle did on the combined sets: operators are judged on it."""
 
     seen: dict[tuple[object, int], frozenset[Atom]] = field(default_factory=dict)
 
+    def oracle(self, name: str, which: str, goals: int) -> list[Attempt]:
+        """Return what came of a set of tasks by the teacher's own operators."""
+        if which not in self.by_oracle:
+            planner = self.planner(true_domain(name))
+            self.by_oracle[which] = [
+                oracle(task, name, Replayed(task, self.replays), planner) for task in tests(name, which, goals)
+            ]
+        return self.by_oracle[which]
+
     def see(self, memory: Memory) -> Abstraction:
         """Return a memory's abstraction, which evaluates each of the states in `replays` once."""
-        key = tuple((each.name, text_of(each.means)) for each in memory.predicates().values()), tuple(memory.used())
+        key = seen_with(memory)
 
         def see(state: Perceived) -> frozenset[Atom]:
             if (key, id(state)) not in self.seen:
@@ -125,6 +156,39 @@ class Known:
         return plan
 
 
+def seen_with(memory: Memory) -> tuple[object, ...]:
+    """Return what a memory's abstraction depends on."""
+    return tuple((each.name, text_of(each.means)) for each in memory.predicates().values()), tuple(memory.used())
+
+
+@cache
+def tests(name: str, which: str, goals: int) -> tuple[Task, ...]:
+    """Return the tasks of a set."""
+    return tuple(tasks_of(name, which, goals if which == "hundred_goals" else SET_TASKS, OF_TESTS))
+
+
+@dataclass
+class Counted:
+    """A world of which the processor's seconds are counted apart: those of physics are not the learner's."""
+
+    world: World
+    clock: list[float]
+
+    def state(self) -> Perceived:
+        """What is perceived now."""
+        start = time.thread_time()
+        state = self.world.state()
+        self.clock[0] += time.thread_time() - start
+        return state
+
+    def do(self, action: Atom) -> str:
+        """Do an action."""
+        start = time.thread_time()
+        reason = self.world.do(action)
+        self.clock[0] += time.thread_time() - start
+        return reason
+
+
 @dataclass(frozen=True)
 class Taught:
     """A learner after training."""
@@ -135,6 +199,7 @@ class Taught:
     sentences: int
     questions: int
     seconds: float
+    """The processor's, physics left out."""
     calls: int
 
 
@@ -142,40 +207,62 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Reco
     """Yield the trials of one domain."""
     known = Known()
     taught: dict[tuple[str, str], Taught] = {}
-    for trial in sorted(trials, key=lambda trial: (trial.seed, trial.arm)):
+    judged: dict[tuple[str, str], tuple[Scores, Scores]] = {}
+    for trial in sorted(trials, key=lambda trial: (list(ARMS).index(trial.arm), trial.seed)):
         name, which = trial.case.split("/")
-        tasks = tasks_of(name, which, bench.parameters.goals if which == "hundred_goals" else SET_TASKS, OF_TESTS)
-        if which not in known.ceilings:
-            planner = known.planner(true_domain(name))
-            known.ceilings[which] = sum(
-                oracle(task, name, Replayed(task, known.replays), planner).success for task in tasks
-            )
+        goals = bench.parameters.goals
+        by_oracle = known.oracle(name, which, goals)
+        ceiling = sum(each.success for each in by_oracle)
+        if not known.done:
+            combined = known.oracle(name, "combined", goals)
+            known.done = list(_done(tests(name, "combined", goals), combined, known))
         if trial.arm == "oracle":
-            planner = known.planner(true_domain(name))
-            tried = [oracle(task, name, Replayed(task, known.replays), planner) for task in tasks]
-            yield trial, _record(tried, known.ceilings[which], None, (1.0, 1.0))
+            met = 100.0 * expected_share(true_domain(name), truth_of(name).atoms, known.done)
+            yield trial, _record(by_oracle, ceiling, None, (100.0, 100.0), (100.0, met))
             continue
         key = (trial.arm, trial.seed)
         if key not in taught:
-            taught[key] = teach(trial.arm, name, int(trial.seed))
+            taught[key] = learned = teach(trial.arm, name, int(trial.seed), known)
+            judged[key] = (
+                _accuracy(learned.memory, name, bench.parameters.states, known),
+                _operators(learned, name, known),
+            )
         learned = taught[key]
-        tried = [_tried(learned, name, task, known) for task in tasks]
-        accuracy = _accuracy(learned.memory, name, bench.parameters.states, known)
-        yield trial, _record(tried, known.ceilings[which], learned, accuracy)
+        tried = [_tried(learned, name, task, known) for task in tests(name, which, goals)]
+        yield trial, _record(tried, ceiling, learned, *judged[key])
 
 
-def teach(arm: str, name: str, seed: int) -> Taught:
+def _done(tasks: Sequence[Task], tried: Sequence[Attempt], known: Known) -> Iterator[Done]:
+    """Yield the actions that worked, with the states around them."""
+    for task, each in zip(tasks, tried, strict=True):
+        world = Replayed(task, known.replays)
+        for action, reason in each.steps:
+            before = world.state()
+            world.do(action)
+            if not reason:
+                yield before, action, world.state()
+
+
+def _operators(learned: Taught, name: str, known: Known) -> Scores:
+    """Return how right what its operators allow is, and how often what they expect comes, in percent."""
+    see, actions = known.see(learned.memory), kitchen_file().domains[name].actions
+    allowed = allowed_accuracy(learned.domain, see, actions, name, [before for before, _, _ in known.done])
+    return 100.0 * allowed, 100.0 * expected_share(learned.domain, see, known.done)
+
+
+def teach(arm: str, name: str, seed: int, known: Known) -> Taught:
     """Return what an arm learns of a domain under a training seed."""
     wording, wrong = TEACHERS[arm]
     memory = ThesisMemory() if arm == "thesis" else Memory()
     if arm == "ours_bootstrapped":
-        memory = teach("ours", BEFORE[name], seed).memory
+        memory = teach("ours", BEFORE[name], seed, known).memory
     before = (memory.sentences, memory.questions)
     teacher = SimulatedTeacher(name, seed, wording, wrong)
     learner, calls = _learner(arm, teacher, name, seed, memory)
-    start = time.perf_counter()
-    training = train(learner, name, tasks_of(name, "train", TRAINING_TASKS, OF_TRAINING + seed))
-    seconds = time.perf_counter() - start
+    clock, start = [0.0], time.thread_time()
+    tasks = tasks_of(name, "train", TRAINING_TASKS, OF_TRAINING + seed)
+    training = train(learner, name, tasks, lambda task: Counted(Replayed(task, known.replays), clock))
+    seconds = time.thread_time() - start - clock[0]
     domain = memory.domain(name)
     return Taught(
         memory, domain, training, memory.sentences - before[0], memory.questions - before[1], seconds, calls()
@@ -198,16 +285,17 @@ def _tried(learned: Taught, name: str, task: Task, known: Known) -> Attempt:
     wanted, unknown = learned.memory.goal_atoms(goal_phrases(task.sentence, task.objects))
     if unknown:
         return Attempt(unplanned=unknown[0])
-    world = Replayed(task, known.replays)
-    planner = known.planner(learned.domain)
-    see = known.see(learned.memory)
     replan = not isinstance(learned.memory, ThesisMemory)
-    return attempt(task, name, learned.domain, see, wanted, replan=replan, world=world, planner=planner)
+    key = (domain_text(learned.domain), seen_with(learned.memory), task.name, task.seed, wanted, replan)
+    if key not in known.tried:
+        see, planner, world = known.see(learned.memory), known.planner(learned.domain), Replayed(task, known.replays)
+        known.tried[key] = attempt(task, name, learned.domain, see, wanted, replan=replan, world=world, planner=planner)
+    return known.tried[key]
 
 
-def _accuracy(memory: Memory, name: str, states: int, known: Known) -> tuple[float, float]:
-    """Return mean and least balanced accuracy over the domain's predicates; one that was never heard of counts one
-    half, what a coin would get."""
+def _accuracy(memory: Memory, name: str, states: int, known: Known) -> Scores:
+    """Return mean and least balanced accuracy [%] over the domain's predicates; one that was never heard of counts
+    one half, what a coin would get."""
     found = dict.fromkeys((each for each in true_domain(name).predicates if each != "in_gripper"), 0.5)
     for phrase, means in memory.meanings.items():
         meant = truth_of(name).meant_by(phrase.text)
@@ -218,10 +306,12 @@ def _accuracy(memory: Memory, name: str, states: int, known: Known) -> tuple[flo
                     drawn_cases(meant, name, states, OF_TESTS), means, KITCHEN_GIVEN
                 )
             found[meant] = max(found[meant], known.accuracies[key])
-    return statistics.mean(found.values()), min(found.values())
+    return 100.0 * statistics.mean(found.values()), 100.0 * min(found.values())
 
 
-def _record(tried: list[Attempt], ceiling: int, learned: Taught | None, accuracy: tuple[float, float]) -> Record:
+def _record(
+    tried: list[Attempt], ceiling: int, learned: Taught | None, predicates: Scores, operators: Scores
+) -> Record:
     planning = [seconds for each in tried for seconds in each.planning]
     return Record(
         reached=sum(each.success for each in tried),
@@ -233,8 +323,10 @@ def _record(tried: list[Attempt], ceiling: int, learned: Taught | None, accuracy
         questions=float(learned.questions) if learned else 0.0,
         transitions=float(learned.training.actions) if learned else 0.0,
         language_calls=float(learned.calls) if learned else 0.0,
-        accuracy=100.0 * accuracy[0],
-        worst_accuracy=100.0 * accuracy[1],
+        accuracy=predicates[0],
+        worst_accuracy=predicates[1],
+        allowed_accuracy=operators[0],
+        expected=operators[1],
         disbelieved=float(len(learned.memory.disbelieved)) if learned else 0.0,
         physics=float(len(learned.training.physics)) if learned else 0.0,
         train_seconds=learned.seconds if learned else 0.0,
@@ -285,6 +377,8 @@ MEASURES = {
     "language_calls": mean("language_calls"),
     "predicate_accuracy": mean("accuracy", "%"),
     "worst_predicate_accuracy": mean("worst_accuracy", "%"),
+    "operator_accuracy": mean("allowed_accuracy", "%"),
+    "effects_expected": mean("expected", "%"),
     "disbelieved": mean("disbelieved"),
     "physics_failures": mean("physics"),
     "unplanned": Measure(share("unplanned", "tasks"), "%"),

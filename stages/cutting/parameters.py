@@ -12,6 +12,7 @@ from schemas.cutting_model import CuttingModel
 from schemas.cutting_plan import CuttingEvaluation, CuttingPlan, CuttingTrial
 from schemas.errors import UsageError
 from stages.cutting.words import read_words
+from stages.kit.known_names import check_names
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
 MethodName = Literal["ours", "thesis", "bc", "qnet"]
@@ -76,13 +77,13 @@ class EvaluateParameters(Parameters):
 
 def check_learn(parameters: LearnParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for an unknown method."""
-    _check_names("--methods", parameters.methods, METHODS)
+    check_names("--methods", parameters.methods, METHODS)
 
 
 def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for an unknown method or cell."""
-    _check_names("--methods", parameters.methods, ("scatter", *METHODS, "ours_perceived", "ours_together"))
-    _check_names("--cells", parameters.cells, CELL_NAMES)
+    check_names("--methods", parameters.methods, ("scatter", *METHODS, "ours_perceived", "ours_together"))
+    check_names("--cells", parameters.cells, CELL_NAMES)
 
 
 def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) -> None:
@@ -111,12 +112,6 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError(f"--together: {parameters.method} cuts one piece at a time", hint="--method ours")
     if "demonstrations" in given and inputs.get("mesh") is not None:
         raise UsageError("--mesh and --demonstrations both say what is cut", hint="give one of them")
-
-
-def _check_names(option: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
-    for name in names:
-        if name not in known:
-            raise UsageError(f"{option}: there is no {name!r}", hint=f"choose of {', '.join(known)}")
 
 
 DEMONSTRATE = Stage(

@@ -10,6 +10,7 @@ from pydantic import Field
 from schemas.errors import UsageError
 from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
 from schemas.learned_domain import LearnedDomain
+from stages.kit.known_names import check_names
 from stages.kit.language.options import LanguageParameters
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
@@ -44,6 +45,9 @@ class PlanParameters(Parameters):
     )
     which: SetName = Field("combined", description="Set of tasks that the kitchen is taken from")
     task: int = Field(1, ge=1, le=1000, description="Which of them")
+    planner: Literal["builtin", "fast-downward"] = Field(
+        "builtin", description="Task planner; fast-downward is a program of its own (extra planning-gpl)"
+    )
     image_width: int = Field(700, ge=200, le=2000, description="Width of the pictures [px]")
 
 
@@ -63,9 +67,7 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
 
 def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for an unknown set."""
-    for name in parameters.sets:
-        if name not in SET_NAMES:
-            raise UsageError(f"--sets: there is no {name!r}", hint=f"choose of {', '.join(SET_NAMES)}")
+    check_names("--sets", parameters.sets, SET_NAMES)
 
 
 def kitchen_files(parameters: Any) -> tuple[str, ...]:
@@ -83,7 +85,7 @@ def kitchen_files(parameters: Any) -> tuple[str, ...]:
 
 TEACH = Stage(
     name="predicates teach",
-    version=2,
+    version=3,
     summary="Learn predicates and operators from a simulated teacher's corrections in a planar kitchen",
     parameters=TeachParameters,
     reads={
@@ -100,7 +102,7 @@ TEACH = Stage(
 )
 PLAN = Stage(
     name="predicates plan",
-    version=2,
+    version=3,
     summary="Plan for a goal in words with what was learned, and try it in the kitchen",
     parameters=PlanParameters,
     reads={"learned": LearnedDomain},
@@ -113,7 +115,7 @@ PLAN = Stage(
 )
 EVALUATE = Stage(
     name="predicates evaluate",
-    version=2,
+    version=3,
     summary="Count what is reached of sets of tasks with what was learned, beside the teacher's own operators",
     parameters=EvaluateParameters,
     reads={"learned": LearnedDomain, "scene": Optionally(External("rooms to try in what was learned in rooms"))},

@@ -78,6 +78,37 @@ def draw_predicates(predicates: Sequence[Predicate], state: Perceived, vocabular
     return sheet
 
 
+def draw_learning(course: Sequence[tuple[int, int, int]]) -> Image.Image:
+    """Return a plot (thesis, figure 5.4) of predicates (red) and operators (blue) over steps, with bars (green) where
+    the teacher said something. `course`: after each step predicates, operators, and sentences so far."""
+    width, height, edge = 900, 280, 36
+    image = Image.new("RGB", (width, height), (255, 255, 255))
+    draw = ImageDraw.Draw(image)
+    most = max([1, *(max(step[:2]) for step in course)])
+    across = (width - 2 * edge) / max(1, len(course))
+
+    def y(value: float) -> float:
+        return height - edge - value / most * (height - 2 * edge)
+
+    before = 0
+    for place, (_, _, sentences) in enumerate(course):
+        if sentences > before:
+            left = edge + place * across
+            draw.rectangle((left, edge, left + max(1.0, across - 1), height - edge), fill=(205, 232, 205))
+        before = sentences
+    for value in range(0, most + 1, max(1, most // 6)):
+        draw.line((edge, y(value), width - edge, y(value)), fill=(225, 225, 225))
+        draw.text((8, y(value) - 6), str(value), fill=(60, 60, 60))
+    for which, color, name in ((0, (190, 60, 50), "predicates"), (1, (50, 90, 180), "operators")):
+        points = [(edge + (place + 0.5) * across, y(step[which])) for place, step in enumerate(course)]
+        if len(points) > 1:
+            draw.line(points, fill=color, width=2)
+        draw.text((edge + 110 * which, 10), name, fill=color)
+    draw.text((edge + 220, 10), "green: the teacher said something", fill=(70, 130, 70))
+    draw.text((width - edge - 60, height - 22), f"{len(course)} steps", fill=(60, 60, 60))
+    return image
+
+
 def _held(predicate: Predicate, state: Perceived, vocabulary: dict[str, Predicate]) -> np.ndarray:
     """Return (GRID, GRID) where the predicate holds, rows from above."""
     names = list(state.names)[: max(1, predicate.arguments)]

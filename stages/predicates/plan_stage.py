@@ -7,7 +7,7 @@ from schemas.kitchen_plan import KitchenPlan, KitchenPlanFile, KitchenStep
 from schemas.learned_domain import LearnedDomain
 from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.stage import Context
-from stages.predicates.execution import Attempt, Live, attempt
+from stages.predicates.execution import PLANNERS, Attempt, Live, attempt
 from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.records import memory_of
 from stages.predicates.parameters import PlanParameters
@@ -34,7 +34,8 @@ def run(learned: LearnedDomain, *, parameters: PlanParameters, context: Context)
     missing = "; ".join(f"nobody has said what {part!r} means" for part in unknown)
     if not missing:
         domain = memory.domain(name)
-        result = attempt(task, name, domain, memory.see, wanted, replan=True, world=Live(kitchen))
+        planner = PLANNERS[parameters.planner]
+        result = attempt(task, name, domain, memory.see, wanted, replan=True, world=Live(kitchen), planner=planner)
         missing = missing_of(memory, result)
     reached = not missing and wanted <= memory.see(kitchen.state())
     if not parameters.goal:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from schemas.errors import BadInput
 from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Problem, apply_action, ground
 from stages.predicates.truth import true_domain, truth_of
@@ -52,7 +53,7 @@ def tasks_of(domain: str, which: str, count: int, seed: int) -> list[Task]:
     """Return the tasks of a set: `train`, or one of SETS. The same seed gives the same tasks.
 
     Goals cycle through the groups of the domain, as in the thesis; a goal that holds at the beginning is drawn anew.
-    Raises ValueError when the objects don't fit on the table.
+    Raises BadInput when the objects don't fit on the table.
     """
     setup = kitchen_file().domains[domain]
     if which == "hundred_goals":
@@ -87,13 +88,13 @@ def _goal(setup: DomainSetup, which: str, number: int, random: np.random.Generat
 
 
 def layout(names: tuple[str, ...], random: np.random.Generator, stacked: float) -> dict[str, tuple[float, float]]:
-    """Return where objects stand, drawn up to LAYOUTS times until they fit. Raises ValueError when they never do."""
+    """Return where objects stand, drawn up to LAYOUTS times until they fit. Raises BadInput when they never do."""
     for _ in range(LAYOUTS):
         try:
             return _drawn_layout(names, random, stacked)
         except ValueError as error:
             reason = str(error)
-    raise ValueError(reason)
+    raise BadInput(f"{', '.join(names)}: {reason}", hint="fewer or smaller objects (data/kitchen/kitchen.toml)")
 
 
 def _drawn_layout(

@@ -17,7 +17,7 @@ from stages.predicates.learning.setting import KITCHEN, Setting
 from stages.predicates.learning.setting import ROOM as ROOM_SETTING
 from stages.predicates.learning.thesis_memory import ThesisMemory
 from stages.predicates.parameters import TeachParameters
-from stages.predicates.pictures import draw_predicates
+from stages.predicates.pictures import draw_learning, draw_predicates
 from stages.predicates.room.tasks import open_room, read_rooms, room_tasks
 from stages.predicates.tasks import Task, tasks_of
 from stages.predicates.teacher.opening import open_teacher
@@ -92,6 +92,10 @@ def run(
     document.write(context.output / "domain.json")
     (context.output / "domain.pddl").write_text(domain_text(domain), encoding="utf-8")
     write_predicates(memory, context.output)
+    operators = {done: len(memory.domain(course.domain, done).schemas) for _, done, _ in training.course}
+    draw_learning([(known, operators[done], said) for known, done, said in training.course]).save(
+        context.output / "learning.png"
+    )
     summary = {
         "predicates": len(memory.predicates()),
         "operators": len(domain.schemas),
@@ -109,7 +113,7 @@ def write_predicates(memory: Memory, output: Path) -> None:
     if memory.disbelieved:
         lines += ["", "No longer believed:", *(f"- {sentence}" for sentence in memory.disbelieved)]
     (output / "predicates.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    if memory.states:
+    if memory.states and memory.states[0].names:
         given = memory.setting.given
         learned = [each for name, each in predicates.items() if name not in given] or list(given.values())
         draw_predicates(learned, memory.states[0], predicates).save(output / "predicates.png")

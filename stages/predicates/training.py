@@ -10,6 +10,7 @@ from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Domain, Problem, ground
 from stages.kit.tasks.task_planner import plan_task
 from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, SHORTENING, Live, World, action_atom
+from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.ours import OursLearner
 from stages.predicates.tasks import Task, open_kitchen
 from stages.predicates.teacher.simulated import TeacherLeft
@@ -37,6 +38,12 @@ class Training:
     refused: int = 0
     physics: list[str] = field(default_factory=list)
     """Actions that the teacher allowed and physics failed."""
+    course: list[tuple[int, int, int]] = field(default_factory=list)
+    """After each step: predicates that were learned, actions that were done, sentences that were heard."""
+
+    def note(self, memory: Memory) -> None:
+        """Keep how far learning has come."""
+        self.course.append((len(set(memory.names().values())), len(memory.transitions), memory.sentences))
 
 
 def train(learner: OursLearner, domain: str, tasks: Sequence[Task], opened: Opened = in_the_kitchen) -> Training:
@@ -46,10 +53,12 @@ def train(learner: OursLearner, domain: str, tasks: Sequence[Task], opened: Open
         reached = training.reached
         try:
             _episode(learner, domain, task, opened(task), training)
+            training.note(learner.memory)
+            training.episodes += 1
+            if training.reached == reached:
+                learner.reconsider()
         except TeacherLeft:
             break
-        training.episodes += 1
-        learner.missed += training.reached == reached
     return training
 
 
@@ -57,9 +66,12 @@ def _episode(learner: OursLearner, domain: str, task: Task, world: World, traini
     memory = learner.memory
     parts = goal_phrases(task.sentence, task.objects)
     failures = 0
+    learner.sought = None
     for step in range(MOST_STEPS):
         if failures >= MOST_FAILURES:
             return
+        if step:
+            training.note(memory)
         state = world.state()
         goal, _ = memory.goal_atoms(parts)
         curious = step < MOST_STEPS - LEFT_FOR_THE_GOAL and learner.curious(state)
@@ -98,12 +110,57 @@ def _next_action(
     tried = learner.explore(state)
     if curious or not learner.plans:
         return tried
-    planned = first_action(learner.memory.domain(domain), list(state.names), learner.memory.see(state), goal)
-    return planned or learner.doubtful(state) or tried
+    operators, held = learner.memory.domain(domain), learner.memory.see(state)
+    planned = first_action(operators, list(state.names), held, goal)
+    if planned is not None:
+        return planned
+    fresh = tried if learner.little_tried(state, tried) else None
+    return _towards_unknown(learner, operators, state, held) or fresh or learner.doubtful(state) or tried
+
+
+def _towards_unknown(learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]) -> Atom | None:
+    """Return the next step of the best way to where an action can be tried that may be what the goal lacks. What was
+    chosen is kept to until it was tried or there is no way to it."""
+    if learner.sought is None:
+        learner.sought = _best_sought(learner, operators, state, held)
+    if learner.sought is None:
+        return None
+    action, wanted = learner.sought
+    if wanted <= held:
+        learner.sought = None
+        return action
+    plan = _plan(operators, list(state.names), held, wanted, improvement=0)
+    if not plan:
+        learner.sought = None
+        return None
+    return plan[0]
+
+
+def _best_sought(
+    learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]
+) -> tuple[Atom, frozenset[Atom]] | None:
+    best: tuple[tuple[int, ...], Atom, frozenset[Atom]] | None = None
+    for order, action, wanted in sorted(learner.worth_trying(state), key=lambda entry: entry[:2]):
+        if best is not None and best[0][:-1] < order:
+            break
+        far = 0 if wanted <= held else len(_plan(operators, list(state.names), held, wanted, improvement=0))
+        if (far or wanted <= held) and (best is None or (*order, far) < best[0]):
+            best = ((*order, far), action, wanted)
+    if best is None:
+        return None
+    learner.seeking[best[1:]] += 1
+    return best[1:]
 
 
 def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:
     """Return the first action of a plan, None without one."""
+    plan = _plan(domain, objects, atoms, goal, SHORTENING)
+    return plan[0] if plan else None
+
+
+def _plan(
+    domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom], improvement: int
+) -> list[Atom]:
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
-    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=SHORTENING)
-    return action_atom(found.actions[0]) if found.actions else None
+    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=improvement)
+    return [action_atom(action) for action in found.actions or ()]

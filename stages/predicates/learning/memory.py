@@ -95,17 +95,18 @@ class Memory:
                 found[action].add((names[phrase], *variables))
         return {action: frozenset(atoms) for action, atoms in found.items()}
 
-    def domain(self, name: str) -> Domain:
-        """Return the operators learned from scratch from all that was seen."""
+    def domain(self, name: str, actions: int | None = None) -> Domain:
+        """Return the operators learned from scratch from all that was seen, or from the first `actions` alone."""
         predicates, used = self.predicates(), self.used()
-        wanted = {each.before for each in self.transitions} | {each.after for each in self.transitions}
+        seen = self.transitions[:actions]
+        wanted = {each.before for each in seen} | {each.after for each in seen}
         nothing: frozenset[Atom] = frozenset()
         atoms = [
             Evaluator(state, predicates).atoms(used) if number in wanted else nothing
             for number, state in enumerate(self.states)
         ]
         apart = self.setting.tells_apart
-        return learn_operators(name, used, self.transitions, atoms, self.preconditions(), apart)
+        return learn_operators(name, used, seen, atoms, self.preconditions(), apart)
 
     def goal_atoms(self, parts: list[tuple[str, tuple[str, ...]]]) -> tuple[frozenset[Atom], tuple[str, ...]]:
         """Return what a goal sentence's parts want, and the parts that nobody has explained."""

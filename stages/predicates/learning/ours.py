@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -19,14 +19,16 @@ from stages.kit.tasks.strips import Atom
 from stages.predicates.learning.memory import Memory, Turn
 from stages.predicates.learning.operators import Transition
 from stages.predicates.learning.phrases import Phrase, phrase_of
-from stages.predicates.learning.synthesis import Label, Synthesiser
+from stages.predicates.learning.synthesis import FOLLOWED, Label, Synthesiser
 from stages.predicates.teacher.simulated import Teacher
 
 MOST_QUESTIONS = 3
 """About one phrase, told apart from its rivals."""
 ASKED_AGAIN = 2.0
 """Weight of a sentence that was confirmed."""
-DOUBT_AFTER = 3
+MOST_TRIES = 3
+"""Of an action in one situation, when nothing that was named speaks against it."""
+DOUBT_AFTER = 2
 """Episodes without their goal after which what was said once is tried."""
 
 
@@ -44,8 +46,13 @@ class OursLearner:
         self.random = np.random.default_rng([seed, 11])
         self._synthesiser = Synthesiser(self.memory.states, self.setting)
         self._tried: Counter[tuple[str, ...]] = Counter()
+        self._refusals: list[tuple[tuple[str, ...], Atom, Perceived]] = []
         self._asked: Counter[Phrase] = Counter()
         self._facts: tuple[Perceived | None, bool, dict[str, tuple[str, ...]]] = (None, False, {})
+        self.sought: tuple[Atom, frozenset[Atom]] | None = None
+        """An action that is to be tried, and what has to hold first."""
+        self.seeking: Counter[tuple[Atom, frozenset[Atom]]] = Counter()
+        """How often each of these was sought: no more than MOST_TRIES times."""
         self.missed = 0
         """Episodes that ended without their goal."""
 
@@ -53,7 +60,9 @@ class OursLearner:
 
     def refused(self, state: Perceived, action: Atom, sentence: str) -> None:
         """Take in that an action was not allowed, and what was said about it."""
-        self._tried[self._situation(state, action)] += 1
+        situation = self._situation(state, action)
+        self._tried[situation] += 1
+        self._refusals.append((situation, action, state))
         if not sentence:
             return
         phrase, objects = self._heard(state, sentence, f"{' '.join(action)}")
@@ -79,7 +88,7 @@ class OursLearner:
     def _follows(self, phrase: Phrase, variables: tuple[str, ...], transition: Transition) -> None:
         binding = dict(zip(("?a", "?b"), transition.action[1:], strict=False))
         objects = tuple(binding[variable] for variable in variables)
-        source = f"accepted {transition.action[0]} {' '.join(variables)}"
+        source = f"{FOLLOWED}{transition.action[0]} {' '.join(variables)}"
         self.memory.labels[phrase].append(Label(transition.before, objects, True, source, 1.0))
 
     def unmet(self, state: Perceived, parts: list[tuple[str, tuple[str, ...]]], sentence: str) -> None:
@@ -157,7 +166,7 @@ class OursLearner:
                     label.weight = ASKED_AGAIN
                 return
         for label in violated:
-            if label.source.startswith("accepted"):
+            if label.source.startswith(FOLLOWED):
                 _, action, *variables = label.source.split()
                 self.memory.stated.pop((action, phrase, tuple(variables)), None)
                 labels[:] = [each for each in labels if each.source != label.source]
@@ -168,10 +177,28 @@ class OursLearner:
                 labels.remove(label)
                 return
 
+    def reconsider(self) -> None:
+        """Take stock after an episode that missed its goal. Once DOUBT_AFTER did, ask again about what alone makes a
+        phrase mean what it does: sentences and answers without which it would mean something else."""
+        self.missed += 1
+        doubted = ASKED_AGAIN + self.missed - DOUBT_AFTER
+        for phrase, labels in list(self.memory.labels.items()) if self.missed >= DOUBT_AFTER else []:
+            for label in [each for each in labels if each.source in ("sentence", "answer") and each.weight < doubted]:
+                rest = [each for each in labels if each is not label]
+                if self._synthesiser.best(phrase, rest).means == self.memory.meanings[phrase]:
+                    continue
+                if self._question(phrase, label.objects, self.memory.states[label.state]) == label.holds:
+                    label.weight += 1.0
+                else:
+                    labels.remove(label)
+                    self._disbelieve(phrase, label)
+                    self._understand(phrase, self.memory.states[label.state])
+
     def _disbelieve(self, phrase: Phrase, label: Label) -> None:
         turn = self.memory.dialogue[label.turn]
         turn.believed = False
-        self.memory.disbelieved.append(turn.text)
+        asked = f"{self.memory.dialogue[label.turn - 1].text} " if label.source == "answer" else ""
+        self.memory.disbelieved.append(asked + turn.text)
         action, *objects = turn.about.split() or [""]
         variables = dict(zip(objects, ("?a", "?b"), strict=False))
         key = (action, phrase, tuple(variables.get(name, name) for name in label.objects))
@@ -216,6 +243,7 @@ class OursLearner:
         """Return the action in the situation that was tried least, of those that nothing is known against."""
         stated = self.memory.preconditions()
         held = self.memory.see(state)
+        unexplained = self._unexplained(stated)
         best: list[Atom] = []
         fewest = 10**9
         for name in self.actions:
@@ -225,26 +253,55 @@ class OursLearner:
                 wanted = {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())}
                 if not wanted <= held:
                     continue
-                count = self._tried[self._situation(state, action)]
+                situation = self._situation(state, action)
+                count = self._tried[situation] - unexplained[situation]
                 if count < fewest:
                     best, fewest = [], count
                 if count == fewest:
                     best.append(action)
         return best[int(self.random.integers(len(best)))] if best else None
 
-    def doubtful(self, state: Perceived) -> Atom | None:
-        """Return an action against which nothing speaks but what was said once, and which may be wrong.
+    def worth_trying(self, state: Perceived) -> Iterator[tuple[tuple[int, ...], Atom, frozenset[Atom]]]:
+        """Yield actions that would tell most, with what has to hold first, and an order: smaller is better.
 
-        Of an action that was never allowed, whose preconditions were never seen to hold together; and, once DOUBT_AFTER
-        episodes went amiss, of any where the one precondition against it is nothing that actions change. The one with
-        the fewest against it."""
-        names, held = self.memory.names(), self.memory.see(state)
+        Those that were never allowed, with all that was named for them; and, once DOUBT_AFTER episodes went amiss, any
+        without one precondition that no action changes and that does not hold: it may be what the teacher was wrong
+        about. Left out is what can be tried here and was, MOST_TRIES times, in such a situation."""
         done = {transition.action[0] for transition in self.memory.transitions}
-        changing = self._changing()
+        held, changing = self.memory.see(state), self._changing()
+        said = self._said()
+        for name in self.actions:
+            known = {atom: count for (action, atom), count in said.items() if action == name}
+            for objects in itertools.permutations(state.names, self.setting.arity[name]):
+                action = (name, *objects)
+                wanted = {_bound(atom, objects): count for atom, count in known.items()}
+                lacking = {atom: wanted[atom] for atom in wanted if atom not in held}
+                doubted = [atom for atom in lacking if atom[0] not in changing]
+                rest = frozenset(wanted) - set(doubted)
+                if self.seeking[action, rest] >= MOST_TRIES or (rest <= held and not self.little_tried(state, action)):
+                    continue
+                if name not in done and not doubted:
+                    yield (0, 0), action, rest
+                elif self.missed >= DOUBT_AFTER and len(doubted) == 1:
+                    yield (1 + (name in done), lacking[doubted[0]]), action, rest
+
+    def _said(self) -> Counter[tuple[str, Atom]]:
+        """Return action and precondition -> how often it was named."""
+        names = self.memory.names()
         said: Counter[tuple[str, Atom]] = Counter()
         for (action, phrase, variables), count in self.memory.stated.items():
             said[action, (names[phrase], *variables)] += count
-        found = []
+        return said
+
+    def doubtful(self, state: Perceived) -> Atom | None:
+        """Return an action to try against what was said, which may be wrong: the one with the least against it.
+
+        Of an action that was never allowed, whose preconditions were never seen to hold together and were said but
+        once; and, once DOUBT_AFTER episodes went amiss, of any: first those that speak against nothing but what no
+        action changes, then those that were named least, and were tried least in such a situation."""
+        held, changing, said = self.memory.see(state), self._changing(), self._said()
+        done = {transition.action[0] for transition in self.memory.transitions}
+        found: list[tuple[tuple[int, ...], Atom]] = []
         for name in self.actions:
             wanted = [(atom, count) for (action, atom), count in said.items() if action == name]
             never = name not in done and not self._seen_together(name, [atom for atom, _ in wanted])
@@ -252,10 +309,16 @@ class OursLearner:
                 continue
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 against = [entry for entry in wanted if _bound(entry[0], objects) not in held]
-                single = len(against) == 1 and against[0][0][0] not in changing
-                if against and max(count for _, count in against) == 1 and (never or single):
-                    found.append((len(against), (name, *objects)))
-        fewest = [action for count, action in found if count == min(found)[0]]
+                tried = (name, *objects)
+                if not against:
+                    continue
+                if self.missed >= DOUBT_AFTER:
+                    fixed = sum(atom[0] in changing for atom, _ in against)
+                    weight = sum(count for _, count in against) + self._tried[self._situation(state, tried)]
+                    found.append(((weight, fixed), tried))
+                elif max(count for _, count in against) == 1:
+                    found.append(((len(against),), tried))
+        fewest = [tried for weight, tried in found if weight == min(found)[0]]
         return fewest[int(self.random.integers(len(fewest)))] if fewest else None
 
     def _changing(self) -> set[str]:
@@ -282,7 +345,26 @@ class OursLearner:
     def curious(self, state: Perceived) -> bool:
         """Whether there is an action that was never tried in such a situation."""
         action = self.explore(state)
-        return action is not None and self._tried[self._situation(state, action)] == 0
+        if action is None:
+            return False
+        situation = self._situation(state, action)
+        return self._tried[situation] <= self._unexplained(self.memory.preconditions())[situation]
+
+    def _unexplained(self, stated: Mapping[str, frozenset[Atom]]) -> Counter[tuple[str, ...]]:
+        """Return how often an action was refused in a situation though all that was named for it held: nothing was
+        said, or what is no longer believed. Such an action is tried again, until it was tried MOST_TRIES times."""
+        found: Counter[tuple[str, ...]] = Counter()
+        predicates = self.memory.predicates()
+        for situation, action, state in self._refusals:
+            evaluator = Evaluator(state, predicates)
+            wanted = (_bound(atom, action[1:]) for atom in stated.get(action[0], ()))
+            if self._tried[situation] < MOST_TRIES and all(map(evaluator.holds, wanted)):
+                found[situation] += 1
+        return found
+
+    def little_tried(self, state: Perceived, action: Atom | None) -> bool:
+        """Whether an action was tried less than MOST_TRIES times in such a situation."""
+        return action is not None and self._tried[self._situation(state, action)] < MOST_TRIES
 
     def _situation(self, state: Perceived, action: Atom) -> tuple[str, ...]:
         """Return what matters of a state for an action, as far as one can see: what kind of things they are, whether

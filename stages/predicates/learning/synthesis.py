@@ -16,6 +16,8 @@ VIOLATION = 6.0
 RIVAL = 0.5
 """Meanings within this of the cheapest are its rivals."""
 MOST_TRIED = 400
+FOLLOWED = "accepted "
+"""How the source of a label begins that followed from an action which was allowed."""
 
 
 @dataclass
@@ -41,6 +43,19 @@ class Meaning:
     violated: tuple[int, ...]
     """Places, among the labels, of those that it contradicts."""
     rivals: tuple[Tree, ...]
+
+
+def _against(violated: list[Label]) -> float:
+    """Return the weight of contradicted labels. What followed from one precondition stands or falls together: when the
+    teacher was wrong about it all of those labels are, so that they weigh as one."""
+    claims: dict[str, float] = {}
+    weight = 0.0
+    for label in violated:
+        if label.source.startswith(FOLLOWED):
+            claims[label.source] = max(label.weight, claims.get(label.source, 0.0))
+        else:
+            weight += label.weight
+    return weight + sum(claims.values())
 
 
 class Synthesiser:
@@ -74,7 +89,7 @@ class Synthesiser:
                 for place, label in enumerate(labels)
                 if self.truth(tree, label.state, label.objects) != label.holds
             )
-            whole = cost + VIOLATION * sum(labels[place].weight for place in violated)
+            whole = cost + VIOLATION * _against([labels[place] for place in violated])
             least = min(least, whole)
             found.append((whole, tree, violated))
         found.sort(key=lambda entry: (entry[0], str(entry[1])))

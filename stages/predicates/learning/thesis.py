@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic import Field
@@ -102,6 +102,9 @@ class ThesisLearner(OursLearner):
             means = better
         self.memory.meanings[phrase] = means
 
+    def reconsider(self) -> None:
+        """The thesis's learner asks nothing again."""
+
     def _written(self, who: str, task: str, phrase: Phrase, given: dict[str, Any]) -> Tree | None:
         """Return an expression that passes every check, None when none came in ROUNDS tries."""
         for _ in range(ROUNDS):
@@ -165,6 +168,10 @@ class ThesisLearner(OursLearner):
                 if {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())} <= held:
                     found.append((name, *objects))
         return found[int(self.random.integers(len(found)))] if found else None
+
+    def worth_trying(self, state: Perceived) -> Iterator[tuple[tuple[int, ...], Atom, frozenset[Atom]]]:
+        """It seeks out nothing."""
+        return iter(())
 
     def doubtful(self, state: Perceived) -> Atom | None:
         """It doubts nothing."""

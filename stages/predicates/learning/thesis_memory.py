@@ -31,7 +31,7 @@ class ThesisMemory(Memory):
         learned = {self.names()[phrase] for phrase in self.meanings}
         return plain | {f"no-{name}": count for name, count in plain.items() if name in learned}
 
-    def domain(self, name: str) -> Domain:
+    def domain(self, name: str, actions: int | None = None) -> Domain:
         """Return the operators, searched for from scratch."""
         atoms = [self.see(state) for state in self.states]
-        return search_operators(name, self.used(), self.transitions, atoms, self.preconditions())
+        return search_operators(name, self.used(), self.transitions[:actions], atoms, self.preconditions())

@@ -30,24 +30,27 @@ Case = tuple[State, tuple[str, ...], bool]
 def drawn_state(setup: DomainSetup, random: np.random.Generator) -> State:
     """Return a state of a domain's objects, things on, in and beside each other more often than chance would have."""
     kinds = kitchen_file().objects
+
+    def either(usual: float, low: float, high: float) -> float:
+        return usual if random.random() < 0.5 else low + (high - low) * random.random()
+
     objects: dict[str, Seen] = {}
     for name in (*setup.objects, *setup.more):
         kind = kinds[name]
-        stretch = float(random.choice([1.0, random.uniform(0.3, 4.0)]))
-        width, height = kind.width * stretch, kind.height * float(random.choice([1.0, random.uniform(0.2, 2.0)]))
-        x, y = float(random.uniform(-45.0, 30.0)), float(random.choice([0.0, random.uniform(-1.0, 25.0)]))
+        width, height = kind.width * either(1.0, 0.3, 4.0), kind.height * either(1.0, 0.2, 2.0)
+        x, y = -45.0 + 75.0 * random.random(), either(0.0, -1.0, 25.0)
         others = list(objects.values())
         if others and random.random() < 0.5:
-            under = others[int(random.integers(len(others)))]
-            x = under.x + float(random.uniform(-0.7, 0.7)) * under.width
-            y = under.y + (under.height if random.random() < 0.6 else float(random.uniform(0.0, 1.0)))
-        water = float(random.choice([0.0, random.uniform(0.0, 1.0)])) if kind.shape == "container" else 0.0
+            under = others[int(random.random() * len(others))]
+            x = under.x + (1.4 * random.random() - 0.7) * under.width
+            y = under.y + (under.height if random.random() < 0.6 else random.random())
+        water = either(0.0, 0.0, 1.0) if kind.shape == "container" else 0.0
         objects[name] = Seen(x, y, width, height, kind.category, water)
     if random.random() < 0.5:
-        return State(objects, float(random.uniform(-40, 30)), 25.0, float(random.uniform(0, 5)), 0.0)
-    held = objects[list(objects)[int(random.integers(len(objects)))]]
+        return State(objects, -40.0 + 70.0 * random.random(), 25.0, 5.0 * random.random(), 0.0)
+    held = objects[list(objects)[int(random.random() * len(objects))]]
     tips = held.y + held.height - min(2.0, held.height)
-    return State(objects, held.x, tips, held.width, float(random.uniform(0.1, 1.0)))
+    return State(objects, held.x, tips, held.width, 0.1 + 0.9 * random.random())
 
 
 def between(one: State, two: State, share: float) -> State:
@@ -76,18 +79,26 @@ def between(one: State, two: State, share: float) -> State:
     )
 
 
-def cases_of(name: str, setup: DomainSetup, count: int, seed: int) -> list[Case]:
-    """Return `count` cases of a predicate of the teacher, every second one near its boundary where it has one."""
+@cache
+def drawn_states(domain: str, count: int, seed: int) -> tuple[State, ...]:
+    """Return states of a domain, drawn once: all of its predicates are judged on them."""
+    random = np.random.default_rng([seed, 3])
+    return tuple(drawn_state(kitchen_file().domains[domain], random) for _ in range(count))
+
+
+def cases_of(name: str, domain: str, count: int, seed: int) -> list[Case]:
+    """Return `count` cases of a predicate of the teacher, every second one near its boundary where it has one: on the
+    way from a drawn state to another in which it is otherwise."""
     random = np.random.default_rng([seed, sorted(true_predicates()).index(name)])
+    states = drawn_states(domain, count, seed)
     cases: list[Case] = []
-    for number in range(count):
-        state = drawn_state(setup, random)
+    for number, state in enumerate(states):
         names = list(state.objects)
         chosen = random.permutation(len(names))[: true_predicates()[name].arguments]
         objects = tuple(names[place] for place in chosen.tolist())
         holds = _holds(name, state, objects)
         for _ in range(DRAWS if number % 2 else 0):
-            other = drawn_state(setup, random)
+            other = states[int(random.random() * count)]
             if _holds(name, other, objects) != holds:
                 low, high = 0.0, 1.0
                 for _ in range(HALVINGS):
@@ -128,4 +139,4 @@ def accuracies(memory: Memory, domain: str, count: int, seed: int) -> dict[str, 
 @cache
 def drawn_cases(name: str, domain: str, count: int, seed: int) -> tuple[Case, ...]:
     """Return `cases_of`, drawn once."""
-    return tuple(cases_of(name, kitchen_file().domains[domain], count, seed))
+    return tuple(cases_of(name, domain, count, seed))

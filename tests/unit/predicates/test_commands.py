@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from pathlib import Path
 
 import pytest
 
 from cli.main import run as run_command
+from stages.kit.tasks import fast_downward
 from stages.predicates.learning.records import document_of, memory_of
 
 
@@ -74,3 +76,24 @@ def test_a_damaged_document_is_refused_in_one_line(learned: Path, change, messag
 
 def test_an_unknown_set_is_refused(learned: Path, tmp_path: Path) -> None:
     assert run("evaluate", "--learned", str(learned), "--sets", "odd", "--out", str(tmp_path / "none")) == 2
+
+
+def test_what_was_learned_is_shown_in_words(learned: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["predicates", "show", str(learned)]) == 0
+    shown = capsys.readouterr().out
+    assert "be_grasped_by_gripper (a): the width of a is less than the gripper's largest opening." in shown
+    assert "makes true in_gripper(?a)" in shown and "'stack <1> on <2>' wants" in shown
+    assert run_command(["predicates", "show", str(learned), "--predicate", "be_grasped_by_gripper"]) == 0
+    assert ": sentence, 'object shelf can not be grasped" in capsys.readouterr().out
+    assert run_command(["predicates", "show", str(learned), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["domain"] == "store_objects"
+    assert run_command(["predicates", "show", str(learned), "--predicate", "odd"]) == 2
+    assert "choose of in_gripper" in capsys.readouterr().err
+    assert run_command(["predicates", "show", str(learned.parent)]) == 3
+
+
+def test_fast_downward_plans_where_it_is_installed(learned: Path, tmp_path: Path) -> None:
+    given = ("--learned", str(learned), "--which", "novel_goals", "--image-width", "240", "--planner", "fast-downward")
+    installed = importlib.util.find_spec(fast_downward.PACKAGE) is not None
+    assert run("plan", *given, "--out", str(tmp_path / "plan")) == (0 if installed else 5)
+    assert (tmp_path / "plan").exists() == installed
