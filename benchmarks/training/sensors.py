@@ -1,4 +1,4 @@
-"""Depth as other sensors than structured light make it: coarse time of flight with holes, things that return nothing."""
+"""Depth as other sensors than structured light make it: coarse time of flight, holes, things that return nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rooms of training frames that follow no recipe: any size, anything beside anything, half library and half `shapes`."""
+"""Rooms of training frames that follow no recipe: any size, anything beside anything, half from `shapes`."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from stages.synthesize.furniture import Catalogue
 LIBRARY_SHARE = 0.45
 """Of the furniture whose class the library has."""
 TRIES = 6
-SMALL = ("bottle", "bowl", "cup", "book", "box", "keyboard", "mouse", "microwave", "vase", "plate", "pan", "can", "jug",
-         "kettle", "cooking_pot", "clock", "remote", "tray", "toolbox", "printer", "laptop", "monitor", "lamp")  # fmt: skip
+SMALL = (
+    *("bottle", "bowl", "cup", "book", "box", "keyboard", "mouse", "microwave", "vase", "plate", "pan", "can", "jug"),
+    *("kettle", "cooking_pot", "clock", "remote", "tray", "toolbox", "printer", "laptop", "monitor", "lamp"),
+)
 HALF_TURNS = (np.array([0.0, 1.0]), np.array([-1.0, 0.0]), np.array([0.0, -1.0]), np.array([1.0, 0.0]))
 """From the middle of the room to the wall whose things are turned by 0, 90, 180 and 270 degrees."""
 
