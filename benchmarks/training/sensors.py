@@ -48,5 +48,5 @@ def coarse_depth(true: np.ndarray, random: np.random.Generator) -> np.ndarray:
     depth[depth > random.uniform(2.8, 7.0)] = 0
     depth[depth < random.uniform(0.1, 0.8)] = 0
     if random.random() < 0.4:
-        depth = cv2.medianBlur(depth, 5 if random.random() < 0.5 else 3)
+        depth = np.asarray(cv2.medianBlur(depth, 5 if random.random() < 0.5 else 3), np.float32)
     return cv2.resize(depth, (width, height), interpolation=cv2.INTER_NEAREST)

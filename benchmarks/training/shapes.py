@@ -32,11 +32,16 @@ def color(random: Random) -> np.ndarray:
     return np.array([*np.clip(rgb + random.normal(0, 4, 3), 5, 250), 255]).astype(np.uint8)
 
 
+def painted(mesh: trimesh.Trimesh, paint: np.ndarray) -> trimesh.Trimesh:
+    """Return the mesh with this colour (4,), or one for each of its faces (F, 4), uint8."""
+    mesh.visual.face_colors = paint  # type: ignore[union-attr]
+    return mesh
+
+
 def box(x: Span, y: Span, z: Span, paint: np.ndarray) -> trimesh.Trimesh:
     """Return a painted box between these bounds [m]."""
     mesh = trimesh.creation.box(bounds=np.array([[x[0], y[0], z[0]], [x[1], y[1], z[1]]]))
-    mesh.visual.face_colors = paint
-    return mesh
+    return painted(mesh, paint)
 
 
 def soft(x: Span, y: Span, z: Span, paint: np.ndarray, radius: float) -> trimesh.Trimesh:
@@ -46,15 +51,13 @@ def soft(x: Span, y: Span, z: Span, paint: np.ndarray, radius: float) -> trimesh
     ball = trimesh.creation.icosphere(subdivisions=1, radius=radius).vertices
     corners = np.stack(np.meshgrid(*zip(low + radius, high - radius, strict=True)), axis=-1).reshape(-1, 3)
     mesh = trimesh.convex.convex_hull((corners[:, None] + ball[None]).reshape(-1, 3))
-    mesh.visual.face_colors = paint
-    return mesh
+    return painted(mesh, paint)
 
 
 def rod(start: np.ndarray, end: np.ndarray, radius: float, paint: np.ndarray, sections: int = 8) -> trimesh.Trimesh:
     """Return a painted rod between two points [m]."""
     mesh = trimesh.creation.cylinder(radius=radius, segment=np.stack([start, end]), sections=sections)
-    mesh.visual.face_colors = paint
-    return mesh
+    return painted(mesh, paint)
 
 
 def disc(x: float, y: float, z: Span, radius: float, paint: np.ndarray, top: float | None = None) -> trimesh.Trimesh:
@@ -63,8 +66,7 @@ def disc(x: float, y: float, z: Span, radius: float, paint: np.ndarray, top: flo
     wide = np.where(mesh.vertices[:, 2] > 0, radius if top is None else top, radius)
     mesh.vertices = np.column_stack([mesh.vertices[:, :2] * wide[:, None], mesh.vertices[:, 2]])
     mesh.apply_translation([x, y, 0.5 * (z[0] + z[1])])
-    mesh.visual.face_colors = paint
-    return mesh
+    return painted(mesh, paint)
 
 
 def join(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
@@ -77,7 +79,7 @@ def legs(x: Span, y: Span, height: float, paint: np.ndarray, random: Random) -> 
     kind, thick = int(random.integers(5)), float(random.uniform(0.02, 0.08))
     inset = float(random.uniform(0.0, 0.12))
     xs, ys = (x[0] + inset, x[1] - inset), (y[0] + inset, y[1] - inset)
-    middle = np.array([0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])])
+    middle = (0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]))
     if kind <= 1:
         lean = float(random.choice([0.0, 0.0, 0.08]))
         ends = [(a, b) for a in xs for b in ys]
@@ -490,10 +492,11 @@ def plant(random: Random) -> trimesh.Trimesh:
     faces = (np.array([[0, 1, 3], [1, 2, 3]])[None] + 4 * np.arange(number)[:, None, None]).reshape(-1, 3)
     leaves = trimesh.Trimesh(vertices, faces, process=False)
     shades = np.clip(green * random.uniform(0.6, 1.4, (number, 1)), 5, 250).repeat(2, axis=0)
-    leaves.visual.face_colors = np.column_stack([shades, np.full(len(shades), 255)]).astype(np.uint8)
+    paint = np.column_stack([shades, np.full(len(shades), 255)]).astype(np.uint8)
+    painted(leaves, paint)
     parts.append(leaves)
     for k in range(0, number, 6):
-        parts.append(rod(np.array([0, 0, 0.8 * pot]), roots[k] + 1e-3, 0.006, leaves.visual.face_colors[2 * k], 4))
+        parts.append(rod(np.array([0, 0, 0.8 * pot]), roots[k] + 1e-3, 0.006, paint[2 * k], 4))
     return join(parts)
 
 
@@ -535,7 +538,7 @@ def bin_(random: Random) -> trimesh.Trimesh:
     body.vertices[:, :2] *= 0.8 + 0.2 * body.vertices[:, 2:] / height
     if random.random() < 0.4:
         body.apply_scale([1, 0.65, 1])
-    body.visual.face_colors = color(random)
+    painted(body, color(random))
     parts = [body, disc(0, 0, (0, 0.02), 0.7 * wide, color(random))]
     if random.random() < 0.4:
         parts.append(disc(0, 0, (height - 0.02, height + 0.03), 1.02 * wide, color(random), 0.6 * wide))
@@ -644,8 +647,7 @@ def curtain(random: Random) -> trimesh.Trimesh:
         [np.column_stack([k, k + 1, k + number]), np.column_stack([k + 1, k + number + 1, k + number])]
     )
     mesh = trimesh.Trimesh(vertices, faces, process=False)
-    mesh.visual.face_colors = paint
-    return mesh
+    return painted(mesh, paint)
 
 
 def radiator(random: Random) -> trimesh.Trimesh:
@@ -759,7 +761,7 @@ def unknown(random: Random) -> trimesh.Trimesh:
         else:
             part = trimesh.creation.icosphere(subdivisions=2, radius=0.4 * edges[0])
             part.apply_translation([0, 0, 0.4 * edges[0]])
-            part.visual.face_colors = paint
+            painted(part, paint)
         if random.random() < 0.4:
             part.apply_transform(trimesh.transformations.random_rotation_matrix(random.random(3)))
         part.apply_translation(where)

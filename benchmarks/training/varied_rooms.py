@@ -166,7 +166,7 @@ def _seat_around(room: Furnished, table: np.ndarray, catalogue: Catalogue, rando
 
 def _put_things(room: Furnished, catalogue: Catalogue, random: Random) -> None:
     """Small things and clutter on level tops and on the floor."""
-    number = int(random.choice([0, random.integers(3, 15), random.integers(12, 45)], p=[0.1, 0.5, 0.4]))
+    number = int(random.choice([0, int(random.integers(3, 15)), int(random.integers(12, 45))], p=[0.1, 0.5, 0.4]))
     if not number:
         return
     half = room.size[:2] / 2
