@@ -146,7 +146,7 @@ def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="fuse",
-    version=5,
+    version=6,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={
