@@ -213,8 +213,8 @@ class TablewarePlanFile(Model):
 
 
 class TablewarePlan(Artifact):
-    """`plan.json`, `plan.txt`, `strip.png` (the table before and after each action); `detections.png` when an image was
-    there."""
+    """`plan.json`, `plan.txt`, `plan.mcap` (ROS 2 messages), `strip.png` (the table before and after each action);
+    `detections.png` when an image was there."""
 
     kind: ClassVar[str] = "tableware_plan"
     description: ClassVar[str] = "actions that clear a table"

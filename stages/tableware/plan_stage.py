@@ -20,6 +20,7 @@ from stages.tableware.planning.records import as_record
 from stages.tableware.planning.refusals import Accepted, accept, statement
 from stages.tableware.planning.rules import Rules
 from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
+from stages.tableware.ros2_plan import write_plan_bag
 from stages.tableware.scene_files import read_image
 from stages.tableware.sight import look, understood
 from stages.tableware.simulation.fast import FastWorld, run_trial
@@ -83,6 +84,7 @@ def run(
         statement=statement(accepted, notes),
     )
     file.write(context.output / "plan.json")
+    write_plan_bag(context.output / "plan.mcap", file)
     context.output.joinpath("plan.txt").write_text(plan_text(file, done), encoding="utf-8")
     with context.progress.step("pictures"):
         draw_strip(panels(done, table), parameters.image_width).save(context.output / "strip.png")

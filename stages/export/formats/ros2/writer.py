@@ -7,15 +7,10 @@ world -> camera. Log time and header stamp are the frame's time.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from functools import cache
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
-from rosbags.typesys import Stores, get_typestore
 
 from schemas.scene_parts import Camera
 from stages.export.formats.ros2 import FORMAT
@@ -23,34 +18,24 @@ from stages.export.frames import ExportFrame, ExportJob
 from stages.export.pictures import picture_suffix
 from stages.kit.formats.frames import LABELS_METADATA, WORLD_FRAME, WORLD_METADATA
 from stages.kit.geometry.transforms import quaternion_of
+from stages.kit.ros2_bag import BagWriter, ros2_header, ros2_types
 
 IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO, TF_MESSAGE = "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
-
-
-@cache
-def _types() -> Any:
-    return get_typestore(Stores.ROS2_HUMBLE)
-
-
-def _header(stamp: int, frame_id: str) -> Any:
-    types = _types().types
-    time = types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
-    return types["std_msgs/msg/Header"](stamp=time, frame_id=frame_id)
 
 
 def compressed_image(stamp: int, encoded: bytes, frame_id: str) -> Any:
     """Return a sensor_msgs/CompressedImage of JPEG or PNG bytes, stamped `stamp` [ns]."""
     kind = "png" if picture_suffix(encoded) == ".png" else "jpeg"
     data = np.frombuffer(encoded, np.uint8)
-    return _types().types[COMPRESSED_IMAGE](header=_header(stamp, frame_id), format=kind, data=data)
+    return ros2_types().types[COMPRESSED_IMAGE](header=ros2_header(stamp, frame_id), format=kind, data=data)
 
 
 def image(stamp: int, pixels: np.ndarray, encoding: str, frame_id: str) -> Any:
     """Return a sensor_msgs/Image of an (H, W) uint16 array, little-endian, rows without padding."""
     height, width = pixels.shape
-    return _types().types[IMAGE](
-        header=_header(stamp, frame_id),
+    return ros2_types().types[IMAGE](
+        header=ros2_header(stamp, frame_id),
         height=height,
         width=width,
         encoding=encoding,
@@ -65,11 +50,11 @@ def camera_info(stamp: int, camera: Camera, frame_id: str, baseline: float = 0.0
 
     With a `baseline` [m] it is that of the right eye of a rectified pair: P[3] = -fx baseline.
     """
-    types = _types().types
+    types = ros2_types().types
     matrix = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     projection = [camera.fx, 0.0, camera.cx, -camera.fx * baseline, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0]
     return types[CAMERA_INFO](
-        header=_header(stamp, frame_id),
+        header=ros2_header(stamp, frame_id),
         height=camera.height,
         width=camera.width,
         distortion_model="plumb_bob",
@@ -85,7 +70,7 @@ def camera_info(stamp: int, camera: Camera, frame_id: str, baseline: float = 0.0
 
 def transforms(stamp: int, parent: str, child: str, parent_from_child: np.ndarray) -> Any:
     """Return a tf2_msgs/TFMessage with the one transform parent -> child, (4, 4)."""
-    types = _types().types
+    types = ros2_types().types
     x, y, z = (float(value) for value in parent_from_child[:3, 3])
     qx, qy, qz, qw = (float(value) for value in quaternion_of(parent_from_child))
     transform = types["geometry_msgs/msg/Transform"](
@@ -93,41 +78,9 @@ def transforms(stamp: int, parent: str, child: str, parent_from_child: np.ndarra
         rotation=types["geometry_msgs/msg/Quaternion"](x=qx, y=qy, z=qz, w=qw),
     )
     stamped = types["geometry_msgs/msg/TransformStamped"](
-        header=_header(stamp, parent), child_frame_id=child, transform=transform
+        header=ros2_header(stamp, parent), child_frame_id=child, transform=transform
     )
     return types[TF_MESSAGE](transforms=[stamped])
-
-
-class _BagWriter:
-    """An MCAP file in the profile of rosbag2; schemas and channels are registered when they first occur."""
-
-    def __init__(self, path: Path, metadata: Mapping[str, dict[str, str]]) -> None:
-        self._file = path.open("wb")
-        self._writer = McapWriter(self._file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
-        self._writer.start(profile="ros2", library="scenewright")
-        for name, table in metadata.items():
-            self._writer.add_metadata(name, table)
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
-
-    def __enter__(self) -> _BagWriter:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._writer.finish()
-        self._file.close()
-
-    def add(self, topic: str, message: Any, stamp: int, sequence: int) -> None:
-        """Append a message at `stamp` [ns]."""
-        name = message.__msgtype__
-        if name not in self._schemas:
-            text, _ = _types().generate_msgdef(name, ros_version=2)
-            self._schemas[name] = self._writer.register_schema(name, "ros2msg", text.encode())
-        if topic not in self._channels:
-            self._channels[topic] = self._writer.register_channel(topic, "cdr", self._schemas[name])
-        data = bytes(_types().serialize_cdr(message, name))
-        self._writer.add_message(self._channels[topic], stamp, data, publish_time=stamp, sequence=sequence)
 
 
 def write(job: ExportJob) -> None:
@@ -138,7 +91,7 @@ def write(job: ExportJob) -> None:
     metadata = {WORLD_METADATA: {"world_frame": WORLD_FRAME, "world_up": job.world_up, "registered": registered}}
     if info.label_table:
         metadata[LABELS_METADATA] = {str(entry.instance): entry.class_name for entry in info.label_table}
-    with _BagWriter(job.root / FORMAT.log, metadata) as bag:
+    with BagWriter(job.root / FORMAT.log, metadata) as bag:
         for frame in job.frames:
             for topic, stream, message in _messages(frame, cameras[frame.camera_name], baselines[frame.camera_name]):
                 bag.add(topic, message, frame.stamp, tally.frames)
