@@ -105,7 +105,7 @@ class FuseParameters(Parameters):
         ge=0,
         le=1,
         description="`ours`: where our own network recognised less than this share of what it took for things, its "
-        "names are not believed, and its masks only where most views had them (0: always believed)",
+        "masks and names count only where most views agree (0: everywhere)",
     )
     unnamed_area: float = Field(
         0.2,

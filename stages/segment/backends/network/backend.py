@@ -117,7 +117,6 @@ class NetworkBackend:
         self._predictor = load_predictor(weights or GENERATED, vocabulary, settings)
         self.label = "own network, trained on generated rooms" if weights is None else f"network {weights.stem}"
         if weights is None and not (reader is not None and self._is_familiar(reader)):
-            settings = settings or GroupingSettings(score_of_any_thing=True)
             self._predictor = load_predictor(VARIED, vocabulary, settings)
             self.label = "own network, trained on varied rooms and a few real frames"
         if not colored:

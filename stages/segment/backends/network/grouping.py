@@ -31,9 +31,6 @@ class GroupingSettings:
     score_threshold: float = 0.3
     """Masks whose mean probability of their class is under this are not named: stuff is dropped, a thing becomes an
     `object`."""
-    score_of_any_thing: bool = False
-    """Whether the score of an `object` says how sure it is that there is a thing, not that it is of its likeliest
-    class."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +70,6 @@ def group(
             if unnamed is None or not classes[index].is_thing:
                 return
             index = unnamed
-            if settings.score_of_any_thing:
-                score = float(probability[thing][:, mask].sum(axis=0).mean())
         if mask.sum() >= settings.minimum_pixels:
             number = len(masks) + 1
             ids[mask] = number

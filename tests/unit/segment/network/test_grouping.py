@@ -119,17 +119,3 @@ def test_raised_masks_without_depth_take_the_nearest() -> None:
     centre_rows = np.round(((np.arange(12) + 0.5) / 2 - 0.5) / 2).clip(0, 2)
     tie = np.isclose((((np.arange(12) + 0.5) / 2 - 0.5) / 2) % 1, 0.5)
     assert np.array_equal(raised[~tie, 0] // 4, centre_rows[~tie])
-
-
-def test_an_unrecognised_thing_may_score_as_a_thing() -> None:
-    things = np.array([entry.is_thing for entry in CLASSES])
-    logits = np.where(things, 0.0, -9.0)[:, None, None] * np.ones((1, 20, 30))
-    heat = np.zeros((20, 30), np.float32)
-    heat[10, 15] = 1.0
-    unnamed = int(np.flatnonzero(things)[-1])
-    scores = []
-    for any_thing in (False, True):
-        settings = GroupingSettings(score_threshold=0.99, score_of_any_thing=any_thing)
-        found = group(logits, heat, np.zeros((2, 20, 30), np.float32), CLASSES, settings, unnamed)
-        scores.append([mask.score for mask in found.masks.values()])
-    assert scores[0] == [pytest.approx(1 / things.sum(), abs=1e-3)] and scores[1] == [pytest.approx(1.0, abs=1e-3)]
