@@ -447,7 +447,7 @@ class Options(Recipe):
     library: Path = Field(description="CAD library (library build --seed 41)")
     rooms: int = Field(4 * len(TRAINING_SEEDS), description="Training rooms of the recipes")
     tables: int = Field(260, description="Training tabletops")
-    varied: int = Field(2400, description="Training rooms that follow no recipe")
+    varied: int = Field(1400, description="Training rooms that follow no recipe")
     workers: int = Field(1, description="Processes")
     seconds: float = Field(float("inf"), description="No scene is begun after so many; fewer frames then")
 

@@ -203,8 +203,8 @@ class Options(Recipe):
 
     data: Path = Field(description="Folder of benchmarks.training.data")
     real: Path | None = Field(None, description="Folder of benchmarks.training.real_frames")
-    steps: int = Field(4600, description="Steps")
-    batch: int = Field(8, description="Frames a step")
+    steps: int = Field(2500, description="Steps")
+    batch: int = Field(32, description="Frames a step")
     seed: int = Field(0, description="Seed")
     device: str = Field("cpu", description="cpu, or cuda")
     threads: int = Field(1, description="Of the processor")
