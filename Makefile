@@ -317,9 +317,10 @@ pictures: setup ## Take the pictures of README and gallery out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo
 
 .PHONY: train-network bench-network
-# About 15 minutes for the frames and an hour for the training, on one core each; stop it and start it again at will.
-train-network: setup ## Make the network of `segment --backend network` anew (QUICK=1: proves the recipe in a minute or two)
-	$(PYTHON) -m benchmarks.training $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-network$(if $(QUICK),-quick)
+# Hours for the frames and more for the training, on one core each; minutes with OPTIONS="--device cuda --workers 12". Stop it and start
+# it again at will.
+train-network: setup ## Make the second network of `segment --backend network` anew (QUICK=1: proves the recipe in a minute or two)
+	$(PYTHON) -m benchmarks.training $(if $(QUICK),--quick) $(OPTIONS) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-network$(if $(QUICK),-quick)
 
 bench-network: setup ## Our own network on rooms held back, real clouds and real logs (QUICK=1: fewer frames)
 	$(EXPERIMENT) network --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-network$(if $(QUICK),-quick) $(ASKED)

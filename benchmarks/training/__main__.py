@@ -1,6 +1,6 @@
 """`make train-network`: library, frames, training, validation; a part that is there is kept, training goes on.
 
-    python -m benchmarks.training --out FOLDER [--quick]
+    python -m benchmarks.training --out FOLDER [--device cuda] [--workers N] [--quick]
 
 Writes FOLDER/run/panoptic.safetensors, metrics.json and table.md. `--quick` proves the recipe in a minute or two: a few
 frames, a few steps, and figures that mean nothing.
@@ -16,6 +16,7 @@ from pydantic import Field
 
 from benchmarks.options import Recipe, asked
 from benchmarks.results import write_measured
+from benchmarks.training.real_frames import PLACES
 from benchmarks.training.samples import FrameSet
 from benchmarks.training.validation import KNOWN, quality_of
 from schemas.vocabulary import load_vocabulary
@@ -31,7 +32,10 @@ QUICK_STEPS, QUICK_SHAPES = 12, 3
 class Options(Recipe):
     """Options."""
 
+    data: Path = Field(Path("../shared/data"), description="Folder with the recordings; without them no real frames")
+    device: str = Field("cpu", description="Of the training: cpu, or cuda")
     threads: int = Field(1, description="Of the training; 1 gives the same bytes again")
+    workers: int = Field(1, description="Processes that make frames and samples")
 
 
 def main() -> int:
@@ -46,11 +50,18 @@ def main() -> int:
     if code:
         return code
     quick = ["--quick"] if arguments.quick else []
+    workers = ["--workers", str(arguments.workers)]
     if not (out / "data" / "done.json").is_file():
-        _module("benchmarks.training.data", "--out", str(out / "data"), "--library", str(out / "library"), *quick)
-    steps = ["--steps", str(QUICK_STEPS)] if arguments.quick else []
-    train = ["--data", str(out / "data"), "--out", str(out / "run"), "--threads", str(arguments.threads)]
-    _module("benchmarks.training.train", *train, *steps)
+        made = ["--out", str(out / "data"), "--library", str(out / "library"), *workers]
+        _module("benchmarks.training.data", *made, *quick)
+    real = []
+    if all((arguments.data / place).is_dir() for place in PLACES):
+        _module("benchmarks.training.real_frames", "--out", str(out / "real"), "--data", str(arguments.data))
+        real = ["--real", str(out / "real")]
+    steps = ["--steps", str(QUICK_STEPS), "--batch", "4"] if arguments.quick else []
+    train = ["--data", str(out / "data"), "--out", str(out / "run"), "--threads", str(arguments.threads), *real]
+    more = workers if arguments.workers > 1 else []
+    _module("benchmarks.training.train", *train, "--device", arguments.device, *more, *steps)
     weights = out / "run" / "panoptic.safetensors"
     predictor = load_predictor(weights, load_vocabulary())
     frames = FrameSet(out / "data" / "validation")
@@ -64,7 +75,7 @@ def main() -> int:
         lines.append(f"| {name} | " + " | ".join(f"{100 * v:.1f}" for v in values.values()) + f" | {mean.classes} |")
     lines += ["", f"{predictor.checkpoint.description}; {len(frames)} validation frames."]
     write_measured(out, metrics, "\n".join(lines) + "\n")
-    print(f"to ship it: cp {weights} data/networks/panoptic.safetensors")
+    print(f"to ship it: cp {weights} data/networks/panoptic_varied.safetensors")
     return 0
 
 

@@ -1,12 +1,12 @@
 """Training frames: views of generated rooms and tabletops with strongly varied colours, lights, lenses and sensors.
 
-    python -m benchmarks.training.data --out FOLDER [--rooms N] [--tables N] [--quick]
+    python -m benchmarks.training.data --out FOLDER [--rooms N] [--tables N] [--varied N] [--workers N] [--quick]
 
-Rooms are those of all recipes of data/recipes with seeds of their tuning range, furnished from a library built with a
-seed of its own; the reporting seeds, and the library that other experiments use (seed 0), are never touched. A folder
-holds shards: `color.npy` (N, 240, 320, 3) uint8, `depth.npy` (N, 240, 320) uint16 [0.25 mm], `label.npy` (N, 240, 320)
-uint8 (place in the frame's table of instances + 1, 0 = nothing) and `frames.json` (camera, mount, class of every
-instance). Arrays are memory-mapped, so training needs little memory.
+Rooms are those of RECIPES with seeds of their tuning range, furnished from a library built with a seed of its own, and
+rooms that follow no recipe (`varied_rooms`); the reporting seeds, and the library that other experiments use (seed 0),
+are never touched. A folder holds shards: `color.npy` (N, 240, 320, 3) uint8, `depth.npy` (N, 240, 320) uint16
+[0.25 mm], `label.npy` (N, 240, 320) uint8 (place in the frame's table of instances + 1, 0 = nothing) and `frames.json`
+(camera, mount, class of every instance). Arrays are memory-mapped, so training needs little memory.
 """
 
 from __future__ import annotations
@@ -16,14 +16,18 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
+from multiprocessing import get_context
 from pathlib import Path
 
+import cv2
 import numpy as np
 import trimesh
 from pydantic import Field
 
 from benchmarks.options import Recipe, asked
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down
+from benchmarks.training.sensors import coarse_depth, lose_things
+from benchmarks.training.varied_rooms import varied_room
 from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
@@ -44,11 +48,13 @@ DEPTH_UNIT = 0.00025
 """[m]"""
 TRAINING_SEEDS, VALIDATION_SEEDS = range(0, 85), range(85, 100)
 """Both of the recipes' tuning range."""
-VIEWS_PER_ROOM, VIEWS_PER_TABLE = 12, 8
+RECIPES = ("bedroom", "kitchen", "office", "room")
+"""Those whose rooms are found at the first start, mostly: the others take longer than all their pictures."""
+VIEWS_PER_ROOM, VIEWS_PER_TABLE, VIEWS_PER_VARIED = 12, 8, 10
 SHARD = 240
 LEAST_CLEARANCE = 0.25
 """The camera keeps this far from everything [m]."""
-ROOM_STREAM, TABLE_STREAM = 31, 32
+ROOM_STREAM, TABLE_STREAM, VARIED_STREAM = 31, 32, 33
 
 
 @dataclass(frozen=True)
@@ -150,6 +156,27 @@ def table_scene(catalogue: Catalogue, random: np.random.Generator) -> Scene:
     return Scene(meshes, classes, targets, np.stack([low, high]))
 
 
+def varied_scene(catalogue: Catalogue, random: np.random.Generator) -> Scene:
+    """Return a room that follows no recipe; now and then the camera looks at a wall for its own sake."""
+    room = varied_room(catalogue, random)
+    targets = []
+    for instance, mesh in room.meshes:
+        extent = float(np.ptp(mesh.bounds, axis=0).max())
+        middle = mesh.bounds.mean(axis=0)
+        if room.classes[instance] == "wall" and random.random() < 0.5:
+            targets.append((middle * [0.9, 0.9, random.uniform(0.5, 1.2)], 0.8, 4.5))
+        elif room.classes[instance] not in ("floor", "wall", "ceiling"):
+            targets.append((middle, *((0.4, 2.2) if extent < 0.5 else (0.8, 5.5))))
+    half = room.size / 2
+    # From further off too, at nothing in particular.
+    targets += [
+        (random.uniform([-1, -1, 0.2], [1, 1, 1.6]) * [half[0], half[1], 1], 1.2, 7.0) for _ in range(len(targets))
+    ]
+    low = np.array([-half[0] + 0.15, -half[1] + 0.15, 0.3])
+    high = np.array([half[0] - 0.15, half[1] - 0.15, min(2.0, room.size[2] - 0.2)])
+    return Scene(room.meshes, room.classes, targets, np.stack([low, high]))
+
+
 def _slab_table(size: np.ndarray, top: float, random: np.random.Generator) -> trimesh.Trimesh:
     thickness = float(random.uniform(0.015, 0.05))
     parts = [trimesh.creation.box(extents=(*size, thickness))]
@@ -166,9 +193,9 @@ def _slab_table(size: np.ndarray, top: float, random: np.random.Generator) -> tr
 
 
 def random_camera(random: np.random.Generator) -> Camera:
-    """Return a camera of 320x240 with a horizontal field of view of 48 to 78 degrees and a slightly moved centre."""
-    focal = 0.5 * WIDTH / float(np.tan(np.deg2rad(random.uniform(48.0, 78.0)) / 2))
-    cx, cy = (WIDTH - 1) / 2 + random.uniform(-6, 6), (HEIGHT - 1) / 2 + random.uniform(-6, 6)
+    """Return a camera of 320x240 with a horizontal field of view of 44 to 86 degrees and a slightly moved centre."""
+    focal = 0.5 * WIDTH / float(np.tan(np.deg2rad(random.uniform(44.0, 86.0)) / 2))
+    cx, cy = (WIDTH - 1) / 2 + random.uniform(-10, 10), (HEIGHT - 1) / 2 + random.uniform(-10, 10)
     return Camera(width=WIDTH, height=HEIGHT, fx=focal, fy=focal, cx=float(cx), cy=float(cy))
 
 
@@ -256,10 +283,15 @@ def random_sensor(random: np.random.Generator) -> DepthCamera:
 def sensed_depth(
     true: np.ndarray, view: Rendering, gloss: np.ndarray, camera: Camera, random: np.random.Generator
 ) -> np.ndarray:
-    """Return the depth (H, W) [m] that a random sensor makes of the true one: its errors shrunk by a random share, as
-    images of 640 pixels that are brought to 320 have finer noise; one view in twelve is exact."""
+    """Return the depth (H, W) [m] that a random sensor makes of the true one: structured light in two of three views,
+    its errors shrunk by a random share, as images of 640 pixels that are brought to 320 have finer noise; else time of
+    flight at a low resolution; one view in twelve is exact. In a third of the views some things give no depth."""
     if random.random() < 1 / 12:
         return true
+    if random.random() < 1 / 3:
+        true = lose_things(true, view.instance, random)
+    if random.random() < 1 / 3:
+        return coarse_depth(true, random)
     noisy = disturb_depth(
         true, view.incidence, view.albedo.mean(axis=2), gloss[view.instance], camera, random, random_sensor(random)
     )
@@ -281,6 +313,7 @@ def samples_of(
             continue
         gloss = vary_look(renderer, soup, scene, size, random)
         view = renderer.render(camera, pose)
+        color = papered(view.color, view.instance, random) if random.random() < 0.6 else view.color
         present, counts = np.unique(view.instance, return_counts=True)
         kept = present[(counts >= 12) & (present > 0)]
         if len(kept) < 3 or counts[present > 0].max() > 0.9 * WIDTH * HEIGHT:
@@ -291,7 +324,7 @@ def samples_of(
         lookup = np.zeros(max(scene.classes) + 1, dtype=np.uint8)
         lookup[kept[:255]] = np.arange(1, len(kept[:255]) + 1)
         yield Sample(
-            color=view.color,
+            color=color,
             depth=np.round(np.minimum(depth / DEPTH_UNIT, 65535)).astype(np.uint16),
             label=lookup[view.instance],
             camera=camera,
@@ -300,6 +333,30 @@ def samples_of(
             classes=tuple(scene.classes[int(instance)] for instance in kept[:255]),
             origin=origin,
         )
+
+
+def papered(color: np.ndarray, instance: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return the picture (H, W, 3) with prints over some instances: collages of patches, lines and smooth blots, drawn
+    on the screen, so that colour edges within a thing say nothing of where it ends."""
+    present = np.unique(instance[instance > 0])
+    if not len(present):
+        return color
+    result = color.astype(np.float32)
+    for chosen in random.choice(present, min(len(present), int(random.integers(1, 6))), replace=False):
+        size = int(np.exp(random.uniform(np.log(6), np.log(120))))
+        coarse = random.integers(0, 256, (max(2, HEIGHT // size), max(2, WIDTH // size), 3)).astype(np.uint8)
+        smooth = cv2.INTER_CUBIC if random.random() < 0.5 else cv2.INTER_NEAREST
+        print_ = cv2.resize(coarse, (WIDTH, HEIGHT), interpolation=smooth)
+        for _ in range(int(random.integers(0, 12))):
+            x, y, w, h = random.integers(0, WIDTH, 4)
+            paint = tuple(map(int, random.integers(0, 256, 3)))
+            if random.random() < 0.5:
+                cv2.rectangle(print_, (int(x), int(y)), (int(x + w // 4), int(y + h // 4)), paint, -1)
+            else:
+                cv2.line(print_, (int(x), int(y)), (int(w), int(h)), paint, int(random.integers(1, 4)))
+        where, strength = instance == chosen, float(random.uniform(0.15, 0.9))
+        result[where] *= 1 - strength + strength * print_[where].astype(np.float32) / 160
+    return np.clip(np.round(result), 0, 255).astype(np.uint8)
 
 
 def write_shard(samples: list[Sample], folder: Path) -> None:
@@ -321,65 +378,101 @@ def write_shard(samples: list[Sample], folder: Path) -> None:
     (folder / "frames.json").write_text(json.dumps(rows) + "\n")
 
 
-def generate(
-    catalogue: Catalogue, rooms: list[tuple[str, int]], tables: range, views: tuple[int, int]
-) -> Iterator[Sample]:
-    """Yield the samples of rooms (recipe, seed) and tables (seed), tables spread evenly among the rooms."""
-    share = len(tables) / max(len(rooms), 1)
-    done = 0
-    for k, (recipe, seed) in enumerate(rooms):
-        random = np.random.default_rng([seed, ROOM_STREAM, recipe_names().index(recipe)])
+@dataclass(frozen=True)
+class Job:
+    """One scene to be made and looked at."""
+
+    kind: str
+    """Name of a recipe, `table` or `varied`."""
+    seed: int
+    views: int
+
+
+def views_of(job: Job, catalogue: Catalogue) -> Iterator[Sample]:
+    """Yield the samples of a scene; a recipe that finds no room is named and yields none."""
+    origin = f"{job.kind}/{job.seed}"
+    size = np.array([4.0, 4.0, 2.5])
+    if job.kind == "table":
+        random = np.random.default_rng([job.seed, TABLE_STREAM])
+        scene = table_scene(catalogue, random)
+    elif job.kind == "varied":
+        random = np.random.default_rng([job.seed, VARIED_STREAM])
+        scene = varied_scene(catalogue, random)
+        size = np.array([*(2 * scene.bounds[1, :2]), scene.bounds[1, 2] + 0.2])
+    else:
+        random = np.random.default_rng([job.seed, ROOM_STREAM, recipe_names().index(job.kind)])
         try:
-            scene = room_scene(recipe, seed, catalogue, random)
+            scene = room_scene(job.kind, job.seed, catalogue, random)
         except BadInput as error:
-            print(f"{recipe} {seed}: {error}", flush=True)
-        else:
-            size = np.array([scene.bounds[1, 0] * 2, scene.bounds[1, 1] * 2, 2.5])
-            yield from samples_of(scene, views[0], size, random, f"{recipe}/{seed}")
-        while done < min(len(tables), round((k + 1) * share)):
-            random = np.random.default_rng([tables[done], TABLE_STREAM])
-            scene = table_scene(catalogue, random)
-            yield from samples_of(scene, views[1], np.array([4.0, 4.0, 2.5]), random, f"table/{tables[done]}")
-            done += 1
+            print(f"{origin}: {error}", flush=True)
+            return
+        size = np.array([*(2 * scene.bounds[1, :2]), 2.5])
+    yield from samples_of(scene, job.views, size, random, origin)
 
 
-def write_set(samples: Iterator[Sample], folder: Path) -> int:
-    """Write samples as shards of SHARD frames; returns how many frames there are."""
+def interleaved(*kinds: list[Job]) -> list[Job]:
+    """Return all jobs, each kind spread evenly over the whole."""
+    places = [((k + 0.5) / len(kind), number, job) for number, kind in enumerate(kinds) for k, job in enumerate(kind)]
+    return [job for _, _, job in sorted(places, key=lambda entry: entry[:2])]
+
+
+def write_set(library: Path, jobs: list[Job], folder: Path, worker: int, workers: int, until: float) -> int:
+    """Write the samples of every `workers`-th job as shards; returns how many frames there are.
+
+    No scene is begun after `until` (`time.time()`), and what there is then is written.
+    """
+    catalogue = Catalogue(open_artifact(library, CadLibrary))  # type: ignore[arg-type]
+    mine = (job for job in jobs[worker::workers] if time.time() < until)
+    samples = (sample for job in mine for sample in views_of(job, catalogue))
     number = 0
     while shard := list(islice(samples, SHARD)):
-        write_shard(shard, folder / f"shard_{number // SHARD:03d}")
+        write_shard(shard, folder / f"shard_{worker:02d}_{number // SHARD:03d}")
         number += len(shard)
-        print(f"{folder.name}: {number} frames", flush=True)
+        print(f"{folder.name}, {worker}: {number} frames", flush=True)
     return number
+
+
+def write_sets(library: Path, jobs: list[Job], folder: Path, workers: int, until: float) -> int:
+    """Write the samples of all jobs with so many processes; returns how many frames there are."""
+    shares = [(library, jobs, folder, worker, workers, until) for worker in range(workers)]
+    if workers == 1:
+        return write_set(*shares[0])
+    with get_context("spawn").Pool(workers) as pool:
+        return sum(pool.starmap(write_set, shares))
 
 
 class Options(Recipe):
     """Options."""
 
     library: Path = Field(description="CAD library (library build --seed 41)")
-    rooms: int = Field(4 * len(TRAINING_SEEDS), description="Training rooms")
+    rooms: int = Field(4 * len(TRAINING_SEEDS), description="Training rooms of the recipes")
     tables: int = Field(260, description="Training tabletops")
-    frames: int = Field(22 * SHARD, description="Training frames at most")
+    varied: int = Field(1400, description="Training rooms that follow no recipe")
+    workers: int = Field(1, description="Processes")
+    seconds: float = Field(float("inf"), description="No scene is begun after so many; fewer frames then")
 
 
 def main() -> None:
     """Make the training and the validation set."""
     arguments = asked(Options)
-    catalogue = Catalogue(open_artifact(arguments.library, CadLibrary))  # type: ignore[arg-type]
-    started = time.perf_counter()
-    names = recipe_names()
-    rooms = [(name, seed) for seed in TRAINING_SEEDS for name in names][: 8 if arguments.quick else arguments.rooms]
-    tables = range(4 if arguments.quick else arguments.tables)
-    held_back = [(name, seed) for seed in VALIDATION_SEEDS for name in names][: 2 if arguments.quick else 16]
-    views = (VIEWS_PER_ROOM, VIEWS_PER_TABLE)
-    validation = generate(catalogue, held_back, range(100_000, 100_000 + len(held_back) // 2), (8, 6))
-    training = islice(generate(catalogue, rooms, tables, views), arguments.frames)
-    counts = {
-        "validation": write_set(validation, arguments.out / "validation"),
-        "training": write_set(training, arguments.out / "training"),
-    }
+    started = time.time()
+    rooms = [Job(name, seed, VIEWS_PER_ROOM) for seed in TRAINING_SEEDS for name in RECIPES]
+    tables = [Job("table", seed, VIEWS_PER_TABLE) for seed in range(arguments.tables)]
+    varied = [Job("varied", seed, VIEWS_PER_VARIED) for seed in range(arguments.varied)]
+    held_back = [Job(name, seed, 8) for seed in VALIDATION_SEEDS for name in RECIPES][:16]
+    held_back_tables = [Job("table", 100_000 + k, 6) for k in range(8)]
+    held_back_varied = [Job("varied", 100_000 + k, 6) for k in range(16)]
+    rooms = rooms[: arguments.rooms]
+    if arguments.quick:
+        rooms, tables, varied = rooms[:8], tables[:4], varied[:6]
+        held_back, held_back_tables, held_back_varied = held_back[:2], held_back_tables[:1], held_back_varied[:2]
+    validation = interleaved(held_back, held_back_tables, held_back_varied)
+    training = interleaved(rooms, tables, varied)
+    library, out, workers, until = arguments.library, arguments.out, arguments.workers, started + arguments.seconds
+    counts = {"training": write_sets(library, training, out / "training", workers, until)}
+    counts["validation"] = write_sets(library, validation, out / "validation", workers, float("inf"))
     (arguments.out / "done.json").write_text(json.dumps(counts) + "\n")
-    print(f"{counts} in {time.perf_counter() - started:.0f} s")
+    print(f"{counts} in {time.time() - started:.0f} s")
 
 
 if __name__ == "__main__":

@@ -97,9 +97,11 @@ def train(
     save_every: float,
     held_out: Callable[[], Mapping[str, Any]] | None = None,
     held_out_every: int = 500,
+    over: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Take the steps that are left. `step` takes one and returns what to log of it, as means over the steps since the
-    line before; `held_out` adds to the log what it finds. The state is saved every `save_every` seconds and at the end.
+    """Take the steps that are left, or those until `over` says so. `step` takes one and returns what to log of it, as
+    means over the steps since the line before; `held_out` adds to the log what it finds. The state is saved every
+    `save_every` seconds and at the end.
     """
     run.out.mkdir(parents=True, exist_ok=True)
     saved, seen = time.perf_counter(), list[Mapping[str, float]]()
@@ -107,7 +109,7 @@ def train(
         started = time.process_time()
         seen.append(step())
         run.seconds += time.process_time() - started
-        last = run.step == steps
+        last = run.step == steps or over()
         line: dict[str, Any] = {}
         if run.step % LOGGED_EVERY == 0 or last:
             means = {name: round(float(np.mean([one[name] for one in seen])), 5) for name in seen[0]}
@@ -121,4 +123,6 @@ def train(
         if time.perf_counter() - saved > save_every or last:
             run.save()
             saved = time.perf_counter()
-    print(f"{steps} steps in {run.seconds / 60:.1f} CPU min: {run.out}")
+        if last:
+            break
+    print(f"{run.step} steps in {run.seconds / 60:.1f} CPU min: {run.out}")

@@ -25,7 +25,7 @@ def write_state(
     for number, entry in optimizer.state_dict()["state"].items():
         tensors |= {f"optimizer.{number}.{name}": value for name, value in entry.items()}
     folder.mkdir(parents=True, exist_ok=True)
-    arrays = {name: value.detach().contiguous().numpy() for name, value in tensors.items()}
+    arrays = {name: value.detach().cpu().contiguous().numpy() for name, value in tensors.items()}
     write_safetensors(folder / "state.new", arrays, {"step": str(step)})
     os.replace(folder / "state.new", folder / FILE)
 

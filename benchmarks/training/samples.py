@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from benchmarks.training.data import DEPTH_UNIT, HEIGHT, WIDTH
-from benchmarks.training.targets import IGNORED, Targets, make_targets
+from benchmarks.training.targets import IGNORED, SOME_THING, Targets, make_targets
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
@@ -32,6 +32,7 @@ class StoredFrame:
     labels: np.ndarray
     camera: Camera
     up: np.ndarray
+    """Zeros where gravity is not known."""
     height: float
     classes: tuple[str, ...]
 
@@ -40,6 +41,7 @@ class FrameSet:
     """All frames of a set of shards, memory-mapped. Raises BadInput for a folder without shards."""
 
     def __init__(self, folder: Path) -> None:
+        self._folder = Path(folder)
         self._shards: list[tuple[list[np.ndarray], list[Any]]] = []
         self._places: list[tuple[int, int]] = []
         for shard in sorted(file.parent for file in Path(folder).glob("shard_*/frames.json")):
@@ -52,6 +54,10 @@ class FrameSet:
             self._shards.append((arrays, rows))
         if not self._places:
             raise BadInput(f"{folder}: no frames", hint="make them first: python -m benchmarks.training.data")
+
+    def __reduce__(self) -> tuple[type[FrameSet], tuple[Path]]:
+        """Another process maps the files itself."""
+        return FrameSet, (self._folder,)
 
     def __len__(self) -> int:
         return len(self._places)
@@ -76,12 +82,6 @@ class FrameSet:
         return tuple(entry.name for entry in load_vocabulary().classes if entry.name in found)
 
 
-def thing_table(classes: tuple[str, ...]) -> np.ndarray:
-    """Return (classes,) bool: which are things."""
-    vocabulary = load_vocabulary()
-    return np.array([vocabulary.by_name(name).kind == "thing" for name in classes])
-
-
 def as_sample(
     frame: StoredFrame, classes: tuple[str, ...], *, color: bool, gravity: bool
 ) -> tuple[np.ndarray, Targets]:
@@ -92,9 +92,15 @@ def as_sample(
 
 
 def _targets(labels: np.ndarray, names: tuple[str, ...], classes: tuple[str, ...]) -> Targets:
-    table = np.full(len(names) + 1, IGNORED, dtype=np.int64)
-    table[1:] = [classes.index(name) if name in classes else IGNORED for name in names]
-    return make_targets(labels[::STRIDE, ::STRIDE], table, thing_table(classes))
+    vocabulary = load_vocabulary()
+    table, things = np.full(len(names) + 1, IGNORED, dtype=np.int64), np.zeros(len(names) + 1, dtype=bool)
+    for label, name in enumerate(names, start=1):
+        if name in classes:
+            table[label] = classes.index(name)
+            things[label] = vocabulary.by_name(name).kind == "thing"
+        else:
+            things[label] = name == SOME_THING
+    return make_targets(labels[::STRIDE, ::STRIDE], table, things)
 
 
 def varied(
@@ -113,7 +119,7 @@ def varied(
     if random.random() < 0.25:
         depth = _cut_background(depth, random)
     mount = Mount()
-    if random.random() >= GRAVITY_DROPOUT:
+    if np.any(up) and random.random() >= GRAVITY_DROPOUT:
         tilted = up + random.normal(0.0, 0.025, 3)
         known = random.random() >= FLOOR_DROPOUT
         mount = Mount(tilted / np.linalg.norm(tilted), height + float(random.normal(0.0, 0.03)) if known else None)
@@ -161,18 +167,39 @@ def _cut_background(depth: np.ndarray, random: np.random.Generator) -> np.ndarra
 
 
 def _other_colors(color: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Return the image with other gains, contrast, gamma, saturation, blur and noise, moved by up to three pixels
-    against the depth as in logs whose colour is not registered."""
-    image = color.astype(np.float32) / 255
+    """Return the image with other gains, contrast, gamma, saturation, vignette, defocus or motion blur, noise and JPEG,
+    moved by up to four pixels against the depth as in logs whose colour is not registered."""
+    image: np.ndarray = color.astype(np.float32) / 255
     if random.random() < 0.3:
-        du, dv = random.integers(-3, 4, 2)
+        du, dv = random.integers(-4, 5, 2)
         image = np.roll(image, (int(dv), int(du)), axis=(0, 1))
     grey = image.mean(axis=2, keepdims=True)
     image = grey + float(random.choice([0.0, 1.0], p=[0.08, 0.92]) * random.uniform(0.3, 1.4)) * (image - grey)
-    image = image * random.uniform(0.7, 1.3) * random.uniform(0.85, 1.15, 3).astype(np.float32)
+    image = image * random.uniform(0.6, 1.5) * random.uniform(0.75, 1.25, 3).astype(np.float32)
     image = (image - 0.5) * random.uniform(0.6, 1.4) + 0.5 + random.uniform(-0.1, 0.1)
-    image = np.clip(image, 0, 1) ** np.float32(np.exp(random.uniform(-0.4, 0.4)))
+    image = np.clip(image, 0, 1) ** np.float32(np.exp(random.uniform(-0.5, 0.5)))
+    blur = random.random()
+    if blur < 0.25:
+        image = cv2.GaussianBlur(image, (0, 0), float(random.uniform(0.4, 1.8)))
+    elif blur < 0.4:
+        image = cv2.filter2D(image, -1, _motion(random))
     if random.random() < 0.3:
-        image = cv2.GaussianBlur(image, (0, 0), float(random.uniform(0.4, 1.6)))
-    image = image + np.float32(random.uniform(0, 0.05)) * random.standard_normal(image.shape, dtype=np.float32)
-    return np.clip(np.round(image * 255), 0, 255).astype(np.uint8)
+        v, u = np.mgrid[-1 : 1 : image.shape[0] * 1j, -1 : 1 : image.shape[1] * 1j]
+        fall = 1 - float(random.uniform(0, 0.5)) * ((u - random.uniform(-1, 1)) ** 2 + v**2) / 2
+        image = image * fall[..., None].astype(np.float32)
+    image = image + np.float32(random.uniform(0, 0.06)) * random.standard_normal(image.shape, dtype=np.float32)
+    shown = np.clip(np.round(image * 255), 0, 255).astype(np.uint8)
+    if random.random() < 0.3:
+        quality = int(random.integers(20, 90))
+        encoded = cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        return np.asarray(cv2.imdecode(encoded, cv2.IMREAD_COLOR))
+    return shown
+
+
+def _motion(random: np.random.Generator) -> np.ndarray:
+    """Return the kernel of a straight motion of up to nine pixels."""
+    kernel = np.zeros((9, 9), np.float32)
+    angle, length = float(random.uniform(0, np.pi)), float(random.uniform(1.5, 4.4))
+    step = (length * np.cos(angle), length * np.sin(angle))
+    cv2.line(kernel, (round(4 - step[0]), round(4 - step[1])), (round(4 + step[0]), round(4 + step[1])), 1.0)
+    return kernel / kernel.sum()

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 IGNORED = 255
-"""Class value of pixels that no loss looks at."""
+"""Class value of pixels that the class loss does not look at."""
+SOME_THING = "*"
+"""Name of an instance in a real frame that somebody outlined and nobody named: its class is not taught."""
 SIGMA = 2.0
 """Standard deviation of a centre's bump [output pixels]; smaller for the smallest instances."""
 SMALL_AREA, SMALL_WEIGHT = 220, 3.0
@@ -28,13 +30,15 @@ class Targets:
     """(2, h, w) float32 rows, columns to the centre of the pixel's instance [output pixels]."""
     things: np.ndarray
     """bool: pixels of things, where the offsets count."""
+    told: np.ndarray
+    """bool: pixels of which somebody knows what they are, where the heat map counts."""
 
 
-def make_targets(labels: np.ndarray, class_of_label: np.ndarray, is_thing: np.ndarray) -> Targets:
+def make_targets(labels: np.ndarray, class_of_label: np.ndarray, thing_of_label: np.ndarray) -> Targets:
     """Return the targets of an image of labels (h, w).
 
-    `class_of_label` (L,) gives the class index of every label, IGNORED for what has none (label 0); `is_thing`
-    (classes,) bool. A centre is the mean of the visible pixels of an instance.
+    `class_of_label` (L,) gives the class index of every label, IGNORED for what has none (label 0); `thing_of_label`
+    (L,) bool, whether it is one thing. A centre is the mean of the visible pixels of an instance.
     """
     height, width = labels.shape
     classes = class_of_label[labels].astype(np.uint8)
@@ -44,8 +48,7 @@ def make_targets(labels: np.ndarray, class_of_label: np.ndarray, is_thing: np.nd
     weight = np.ones((height, width), dtype=np.float32)
     things = np.zeros((height, width), dtype=bool)
     for label in present:
-        index = class_of_label[label]
-        if index == IGNORED or not is_thing[index]:
+        if not thing_of_label[label]:
             continue
         rows, columns = np.nonzero(labels == label)
         row, column = rows.mean(), columns.mean()
@@ -61,4 +64,4 @@ def make_targets(labels: np.ndarray, class_of_label: np.ndarray, is_thing: np.nd
         y, x = np.mgrid[top:bottom, left:right]
         bump = np.exp(-((y - row) ** 2 + (x - column) ** 2) / (2 * sigma**2)).astype(np.float32)
         centres[top:bottom, left:right] = np.maximum(centres[top:bottom, left:right], bump)
-    return Targets(classes, weight, centres, offsets, things)
+    return Targets(classes, weight, centres, offsets, things, (classes != IGNORED) | things)

@@ -14,7 +14,7 @@ from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, Labelled
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.strange_places import thing_score, without_names
+from stages.fuse.strange_places import without_doubtful
 from stages.fuse.surface import Surface, extract_surface
 from stages.fuse.unnamed_pieces import unnamed_pieces
 from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name
@@ -99,7 +99,7 @@ def with_unnamed_pieces(
 
 
 def is_strange(source: MaskSource, parameters: FuseParameters) -> bool:
-    """Whether the segmenter recognised so little of this place that its names are not to be believed."""
+    """Whether the segmenter recognised so little of this place that only what most views agree on is to be believed."""
     return source.recognised is not None and source.recognised < parameters.least_recognised
 
 
@@ -133,9 +133,8 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
             surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
         )
         if parameters.merging == "ours" and is_strange(source, parameters):
-            things, scores = mapper.merging.things, grouping.class_scores
-            score_of = {e.instance: thing_score(e.segments, scores, things, mapper.sightings) for e in entities}
-            entities, labelled = without_names(entities, labelled, score_of, things, unnamed)
+            scores, things = grouping.class_scores, mapper.merging.things
+            entities, labelled = without_doubtful(entities, labelled, scores, mapper.sightings, things, unnamed)
         if parameters.unnamed_area > 0 and parameters.merging == "ours":
             layout = frozenset(entry.id for entry in vocabulary.classes if entry.name in LAYOUT)
             floor = vocabulary.by_name("floor").id

@@ -106,7 +106,7 @@ class FuseParameters(Parameters):
         ge=0,
         le=1,
         description="`ours`: where our own network recognised less than this share of what it took for things, its "
-        "names are not believed, and its masks only where most views had them (0: always believed)",
+        "masks and names count only where most views agree (0: everywhere)",
     )
     unnamed_area: float = Field(
         0.2,
@@ -147,7 +147,7 @@ def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="fuse",
-    version=5,
+    version=6,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={

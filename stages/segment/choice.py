@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -70,6 +70,15 @@ class BackendRequest:
         """Return the parameters as those that a backend declared for itself."""
         assert isinstance(self.parameters, kind)
         return self.parameters
+
+
+def fitting(request: BackendRequest) -> BackendRequest:
+    """Return the request, without the weights of a detector where `auto` took them for a log that has no colour: our
+    own network finds things by depth alone."""
+    if request.parameters.backend != AUTO or request.sequence is None:
+        return request
+    missing = automatic(request.weights).needs - set(request.sequence.info.streams)
+    return replace(request, weights=None, semantic_weights=None) if missing else request
 
 
 def chosen_backend(request: BackendRequest) -> BackendDeclaration:

@@ -15,7 +15,7 @@ from stages.kit.formats.frames import FrameReader, require_depth
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.stage import Context
 from stages.segment.apart import segmented_apart, segmented_here, worker_count
-from stages.segment.choice import BackendRequest, choose_backend, chosen_backend
+from stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
 from stages.segment.parameters import SegmentParameters
 
 
@@ -38,7 +38,7 @@ def run(
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         with context.progress.step("prepare the backend"):
-            request = BackendRequest(
+            asked = BackendRequest(
                 parameters,
                 weights,
                 mask_weights=mask_weights,
@@ -52,6 +52,7 @@ def run(
                 seed=context.seed,
                 ask_again=context.force,
             )
+            request = fitting(asked)
             backend = choose_backend(request)
         annotations: list[FrameSegments] = []
         streams = tuple(dict.fromkeys(("depth", *backend.streams)))

@@ -68,9 +68,9 @@ class Judged:
 WHOLE = 0.98
 
 
-def judge(house: House, recording: Recording, run: Path) -> Judged:
-    """Compare the artifacts of a run, `panoptic_map`, `contact_graph`, `interactive_scene`, with the truth."""
-    world_from_log = np.array(opened(Sequence, run / "sequence").info.gravity.world_from_log)
+def judge(house: House, recording: Recording, sequence: Path, run: Path) -> Judged:
+    """Compare what a run made of a sequence (`panoptic_map`, `contact_graph`, `interactive_scene`) with the truth."""
+    world_from_log = np.array(opened(Sequence, sequence).info.gravity.world_from_log)
     predicted = load_map(opened(PanopticMap, run / "panoptic_map"))
     points = apply(world_from_log, recording.points.astype(float))
     labels = nearest_labels(points, predicted.surface.vertices, predicted.vertex_instances, NEAR)

@@ -1,4 +1,4 @@
-"""In a place that is strange to the segmenter: no names, and only the masks that most views had."""
+"""In a place that is strange to the segmenter: only the masks and the names that most views agree on."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from stages.fuse.closing import MaskSource, is_strange
 from stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from stages.fuse.parameters import FuseParameters
-from stages.fuse.strange_places import LEAST_THING_SCORE, thing_score, without_names
+from stages.fuse.strange_places import LEAST_NAME_SCORE, LEAST_THING_SCORE, thing_score, without_doubtful
 from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import THINGS, class_id
 
@@ -26,17 +26,19 @@ def test_the_score_counts_views_that_had_no_mask() -> None:
     assert thing_score((7,), scores, THINGS, {}) == 0.0
 
 
-def test_things_lose_their_names_and_doubtful_ones_their_surface() -> None:
-    labelled = LabelledSurface(
-        np.array([1, 2, 3, 4], np.int32), np.array([WALL, FRIDGE, CHAIR, 0], np.int32), np.array([1, 2, 3, 0], np.int32)
-    )
-    score_of = {1: 0.0, 2: LEAST_THING_SCORE - 0.01, 3: LEAST_THING_SCORE}
-    kept, surface = without_names(
-        [entity(1, WALL), entity(2, FRIDGE), entity(3, CHAIR)], labelled, score_of, THINGS, OBJECT
-    )
-    assert [(e.instance, e.class_id) for e in kept] == [(1, WALL), (3, OBJECT)]
-    assert surface.class_id.tolist() == [WALL, 0, OBJECT, 0]
-    assert surface.instance.tolist() == [1, 0, 3, 0]
+def test_what_views_do_not_agree_on_loses_its_name_or_its_surface() -> None:
+    numbers = np.array([1, 2, 3, 4, 0], np.int32)
+    labelled = LabelledSurface(numbers, np.array([WALL, FRIDGE, CHAIR, FRIDGE, 0], np.int32), numbers)
+    scores = {
+        2: {FRIDGE: 10 * LEAST_THING_SCORE - 0.1},
+        3: {CHAIR: 10 * LEAST_NAME_SCORE - 0.1, OBJECT: 4.0},
+        4: {FRIDGE: 10 * LEAST_NAME_SCORE + 0.1, OBJECT: 4.0},
+    }
+    entities = [entity(1, WALL), entity(2, FRIDGE), entity(3, CHAIR), entity(4, FRIDGE)]
+    kept, surface = without_doubtful(entities, labelled, scores, dict.fromkeys(range(1, 5), 10), THINGS, OBJECT)
+    assert [(e.instance, e.class_id) for e in kept] == [(1, WALL), (3, OBJECT), (4, FRIDGE)]
+    assert surface.class_id.tolist() == [WALL, 0, OBJECT, FRIDGE, 0]
+    assert surface.instance.tolist() == [1, 0, 3, 4, 0]
 
 
 def test_only_a_segmenter_that_says_so_is_doubted() -> None:

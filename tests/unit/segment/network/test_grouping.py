@@ -18,7 +18,8 @@ CLASSES = (Named(1, False), Named(2, False), Named(4, True), Named(5, True))
 
 def perfect_heads(labels: np.ndarray, class_of_label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return logits, heat and offsets as a network without error would."""
-    targets = make_targets(labels, class_of_label, np.array([entry.is_thing for entry in CLASSES]))
+    things = np.array([index != IGNORED and CLASSES[index].is_thing for index in class_of_label])
+    targets = make_targets(labels, class_of_label, things)
     logits = np.full((len(CLASSES), *labels.shape), -8.0, dtype=np.float32)
     for index in range(len(CLASSES)):
         logits[index][targets.classes == index] = 8.0
