@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from schemas.errors import BadInput
+from stages.kit.formats.numpy_files import read_all_arrays
 from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.splat.building import Arrival
 from stages.splat.training import Learned, Trainer, TrainerState
@@ -48,8 +48,7 @@ def read_checkpoint(folder: Path, trainer: Trainer, arriving: Sequence[Arrival])
     """Bring a new trainer to where a written one was and return the losses so far; None where there is none that can be
     read, and then nothing was changed. `arriving`: the views of both."""
     try:
-        with np.load(folder / FILE, allow_pickle=False) as file:
-            arrays = dict(file)
+        arrays = read_all_arrays(folder / FILE)
         facts = json.loads(arrays["facts"].tobytes())
         gaussians = Gaussians(**{name: arrays[f"gaussians.{name}"] for name in trainer.gaussians.arrays()})
         moments = {name: arrays[f"moments.{name}"] for name in trainer.gaussians.arrays()}
@@ -63,5 +62,5 @@ def read_checkpoint(folder: Path, trainer: Trainer, arriving: Sequence[Arrival])
         state = TrainerState(moments, arrays["moved"], arrays["pull"], **{name: facts[name] for name in FACTS})
         trainer.go_on(gaussians, views, state)
         return [float(loss) for loss in arrays["losses"]]
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
+    except (BadInput, OSError, ValueError, KeyError, TypeError):
         return None

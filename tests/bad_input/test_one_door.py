@@ -118,6 +118,8 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/segment/backends/service/protocol.py": {"json.loads": SERVICE},
     "stages/segment/backends/service/reply_cache.py": {"read_bytes": CACHE},
     "stages/kit/open_words/embedded.py": {"json.loads": PARSED},
+    "stages/splat/checkpoints.py": {"json.loads": PARSED},
+    "stages/splat/triangulation.py": {"open": MADE},
     "stages/suture/segmentation/checkpoint.py": {"json.loads": PARSED},
     "stages/suture/truth_files.py": {"cv2.imread": PICTURE},
     "stages/synthesize/recipes.py": {"open": OURS, "tomllib.load": OURS},

@@ -79,6 +79,8 @@ class SimulatedTeacher:
     def correct(self, state: Perceived, action: Atom) -> str:
         """Name one of the preconditions, common to her operators for the action, that do not hold."""
         sets = [set(each.preconditions) for each in self._operators.schemas if action_of(each.name) == action[0]]
+        if not sets:
+            return ""  # what her domain does not know: a learner may know the action from another one
         binding = dict(zip(("?a", "?b"), action[1:], strict=False))
         shared = [tuple(binding.get(term, term) for term in atom) for atom in set.intersection(*sets)]
         atoms = self._truth.atoms(state)

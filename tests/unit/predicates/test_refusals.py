@@ -62,3 +62,10 @@ def test_a_teacher_who_contradicts_herself_is_asked_again() -> None:
     assert memory.disbelieved == ["object can can not be grasped by the gripper as it is too wide"]
     assert not memory.preconditions().get("pick_up") and len(memory.transitions) == 1
     assert [turn.believed for turn in memory.dialogue if turn.about.startswith("pick_up")] == [False]
+
+
+def test_an_action_that_her_domain_does_not_know_is_refused_without_a_word() -> None:
+    """A learner that comes from another domain tries what was possible there."""
+    teacher = SimulatedTeacher("cook_meal", 1)
+    action = ("push_plate_on_object", "cup", "can")
+    assert not teacher.allows(TABLE, action) and teacher.correct(TABLE, action) == ""

@@ -15,7 +15,7 @@ from tests.unit.report.test_report import parse, report
 def test_the_section_tells_the_session_and_that_no_model_was_asked(tmp_path: Path) -> None:
     (tmp_path / "e").mkdir()
     context = Context(output=tmp_path / "e", seed=7, device="cpu", progress=SilentProgress())
-    made = run(None, None, parameters=RunParameters(task="prepare_cup", image_width=300), context=context)
+    made = run(None, None, None, None, parameters=RunParameters(task="prepare_cup", image_width=300), context=context)
     result = report(tmp_path / "report", episode=AgentEpisode(made.root))
     page = parse((tmp_path / "report" / "report.html").read_text())
     assert result.summary["pictures"] == 2 and "no language model was asked" in page.text
