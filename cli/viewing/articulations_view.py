@@ -20,6 +20,7 @@ def draw_articulations(articulations: Articulations, canvas: Canvas) -> None:
     """Draw what moved: first state blue, second orange, axis red."""
     (points,) = read_arrays(articulations.path("changes.npz"), "points")
     if len(points):
+        canvas.enclose(points.min(axis=0), points.max(axis=0))
         canvas.points("changed", points, np.tile(CHANGED, (len(points), 1)))
     for number, each in enumerate(articulations.info.articulations, start=1):
         origin, axis = np.array(each.origin), np.array(each.axis)
