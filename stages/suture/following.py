@@ -31,6 +31,7 @@ RIG_HINT = (
     'a rig is {"camera": {"width", "height", "fx", "fy", "cx", "cy"}, "baseline": metres}; docs/STITCH.md shows one'
 )
 ENDINGS = (".png", ".jpg")
+UNKNOWN = {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5}
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,8 @@ class Follower:
 
     def line(self, files: PairFiles) -> dict[str, Any]:
         """Return what is known of the needle in a pair: `camera_from_needle` (4, 4) [m], `covariance` (6, 6),
-        `tip_probability`, `abstained`, and what it took. A picture that cannot be used is an abstention."""
+        `tip_probability`, `abstained`, and what it took. A picture that cannot be used is an abstention; with one comes
+        no pose, as a robot may act on these lines."""
         began = time.monotonic()
         said: dict[str, Any] = {"name": files.name, "frame": self._count}
         try:
@@ -136,10 +138,12 @@ class Follower:
             answer = of_view(seen.observation(self._rig, None), self._seed, self._guess)
         except BadInput as error:
             self._guess = None
-            said |= {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5, "abstained": str(error)}
+            said |= UNKNOWN | {"abstained": str(error)}
         else:
             self._guess = None if answer.abstained else answer.pose
             said |= as_estimate_record(in_metres(answer, self._radius)).model_dump(mode="json")
+            if answer.abstained:
+                said |= UNKNOWN
         self._count += 1
         return said | {"skipped": files.skipped, "seconds": round(time.monotonic() - began, 4)}
 
