@@ -41,7 +41,7 @@ class Browser:
         """Ask the driver; return its value."""
         data = None if method == "GET" else json.dumps(body or {}).encode()
         request = urllib.request.Request(self._base + path, data, {"Content-Type": "application/json"}, method=method)
-        with urllib.request.urlopen(request, timeout=30) as reply:
+        with urllib.request.urlopen(request, timeout=120) as reply:
             return json.load(reply)["value"]
 
     def open(self, address: str) -> None:

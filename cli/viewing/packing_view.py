@@ -12,6 +12,7 @@ from schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP, Packing, Packing
 from schemas.scene_parts import Box
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.meshes import draw_solid
 
 PICTURES = ("layout", "attempts", "scene")
 PERIOD = 0.05
@@ -30,10 +31,13 @@ def draw_packing(packing: Packing, canvas: Canvas) -> None:
             canvas.picture(name, file_content(path, LARGEST_SHOWN))
     basket = area_box(instance.basket, BASKET_TOP - BASKET_SLAB, BASKET_TOP)
     canvas.boxes("basket", [basket], ["basket"], [BASKET_COLOR])
+    draw_solid("basket/body", basket, BASKET_COLOR, canvas)
     blocks = instance.obstacles
     if blocks:
         solids = [area_box(block, TABLE_TOP, block.top) for block in blocks]
         canvas.boxes("obstacles", solids, [block.name for block in blocks], [BLOCK_COLOR] * len(blocks))
+        for number, solid in enumerate(solids):
+            draw_solid(f"obstacles/{number}", solid, BLOCK_COLOR, canvas)
     starts = [standing_box(box, box.x, box.y, box.yaw, TABLE_TOP) for box in instance.boxes]
     names = [box.name for box in instance.boxes]
     canvas.boxes("start", starts, names, [START_COLOR] * len(starts))
@@ -42,6 +46,8 @@ def draw_packing(packing: Packing, canvas: Canvas) -> None:
     if places:
         solids = [standing_box(by_name[p.box], p.x or 0.0, p.y or 0.0, p.yaw or 0.0, BASKET_TOP) for p in places]
         canvas.boxes("packed", solids, [place.box for place in places], [PACKED_COLOR] * len(places))
+        for number, solid in enumerate(solids):
+            draw_solid(f"packed/{number}", solid, PACKED_COLOR, canvas)
     urdf = draw_robot(canvas)
     if urdf is not None and packing.path("trajectory.npz").is_file():
         (joints,) = read_arrays(packing.path("trajectory.npz"), "joints", hint="make the packing again")

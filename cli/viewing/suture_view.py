@@ -15,6 +15,7 @@ from schemas.suture_trial import SutureEvaluation, SutureTrial
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.geometry.transforms import apply
 from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.meshes import draw_solid
 
 STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
 ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))
@@ -88,7 +89,7 @@ def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
     canvas.document("trial", "```\n" + file_text(trial.path("trial.txt"), LARGEST_SHOWN) + "```")
     canvas.picture("strip/panels", file_content(trial.path("strip.png"), LARGEST_SHOWN))
     top = Box(center=(0.0, 0.0, -PAD[2] / 2), size=PAD)
-    canvas.boxes("pad", [top], ["pad"], [(0.93, 0.78, 0.7)], show_labels=False)
+    draw_solid("pad", top, (0.93, 0.78, 0.7), canvas)
     wound = ridge()
     canvas.mesh("wound", wound, np.tile(np.array([217, 153, 128], np.uint8), (len(wound.vertices), 1)))
     names = ("seconds", "arm", "world_from_tool", "world_from_needle")

@@ -13,10 +13,11 @@ from schemas.tableware_scene import TablewareItem, TablewareScene
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.meshes import draw_solid
 
 TABLE = (0.78, 0.61, 0.03)
 """Extents of the table top [m]; its surface is at z = 0."""
-TABLE_COLOR = (0.93, 0.93, 0.92)
+TABLE_COLOR = (0.84, 0.83, 0.8)
 BIN_AT, BIN_PITCH, BIN_COLUMNS = (0.62, -0.4), 0.2, 5
 """Where what came to the bin is shown: beside the table, in rows."""
 
@@ -97,7 +98,7 @@ def draw_tableware_evaluation(evaluation: TablewareEvaluation, canvas: Canvas) -
 
 def _table(canvas: Canvas) -> None:
     top = Box(center=(0.0, 0.0, -TABLE[2] / 2), orientation=(0.0, 0.0, 0.0, 1.0), size=TABLE)
-    canvas.boxes("table", [top], ["table"], [TABLE_COLOR], show_labels=False)
+    draw_solid("table", top, TABLE_COLOR, canvas)
 
 
 def _shapes(artifact: Artifact, items: tuple[TablewareItem, ...], canvas: Canvas) -> None:

@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from schemas.scene_parts import Box
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.urdf_file import Shape
+from stages.kit.geometry.boxes import box_rotation
+from stages.kit.geometry.transforms import transform_from
+from stages.kit.viewing.canvas import Canvas, Color, bytes_of
 
 
 def load_mesh(path: Path) -> trimesh.Trimesh:
@@ -21,6 +25,12 @@ def merged(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Return several meshes (at least one) as one."""
     whole: Any = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
     return whole
+
+
+def draw_solid(path: str, box: Box, color: Color, canvas: Canvas) -> None:
+    """Draw a box as a body in one colour, where `Canvas.boxes` draws its edges."""
+    mesh = trimesh.creation.box(box.size, transform_from(box_rotation(box), np.array(box.center)))
+    canvas.mesh(path, mesh, np.tile(np.array(bytes_of(color), np.uint8), (len(mesh.vertices), 1)))
 
 
 def shape_mesh(shape: Shape, folder: Path) -> trimesh.Trimesh:

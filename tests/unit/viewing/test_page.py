@@ -7,13 +7,17 @@ import gzip
 import json
 import re
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from cli.viewing.view import view_artifact
 from schemas.errors import BadInput, MissingDependency
+from schemas.interactive_scene import SettledBody, SettleFile
+from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.geometry.boxes import box_from_bounds
 from stages.kit.viewing.canvas import JointedLink, Trust
 from stages.kit.viewing.page import library, page_canvas
@@ -21,6 +25,8 @@ from stages.kit.viewing.page.library import three_js
 from stages.kit.viewing.page.packing import STEPS
 from stages.kit.viewing.page.page_canvas import PageCanvas
 from tests.browser import WEBGL, Browser, browser, needs_browser
+from tests.unit.urdf.small_room import graph_of, layout
+from tests.unit.viewing.artifacts import seal
 
 HOSTILE = "</script><script>document.title='taken'</script><b>\"'&" + "x" * 10_000
 
@@ -175,13 +181,6 @@ def test_a_page_in_a_browser(tmp_path: Path) -> None:
         assert window.text("#clock") == "2.00 s" and window.run(off) == ["table_1"]
         assert window.text("[data-joint=hinge] output") == "57°"
         opened(window, page, "#%7Bnonsense")
-        # Five hundred bodies.
-        with PageCanvas("bodies", tmp_path / "bodies.html") as canvas:
-            for k in range(500):
-                ball = trimesh.creation.icosphere(1, 0.1)
-                ball.apply_translation((k % 25, k // 25, 0.0))
-                canvas.mesh(f"scene/body_{k}", ball)
-        opened(window, tmp_path / "bodies.html")
         assert window.complaints() == []
     with browser("--disable-gpu", "--disable-3d-apis") as window:
         opened(window, page)
@@ -192,3 +191,61 @@ def test_a_page_in_a_browser(tmp_path: Path) -> None:
         assert window.run(f"{colors}.data; return new Set(d).size") > 5
         window.press(".node .edge")
         assert "gap 2 mm" in window.text("#relations") and window.complaints() == []
+
+
+def scene_of_boxes(run: Path, count: int) -> Path:
+    """An interactive scene of a floor and boxes on it, that all move while they settle."""
+    bodies = [layout("floor_1", "floor", (3.6, 3.0, 0.0), (9.0, 8.0, 0.02))]
+    for k in range(2, count + 1):
+        box = layout(f"cup_{k}", "cup", (0.3 * (k % 25), 0.3 * (k // 25), 0.06), (0.1, 0.1, 0.1))
+        bodies.append(replace(box, parent="floor_1", movable=True))
+    root = run / "interactive_scene"
+    root.mkdir()
+    write_scene_bundle(root, bodies, graph_of(bodies))
+    times = tuple(round(0.05 * k, 2) for k in range(61))  # what `urdf` watches
+    moved = tuple(
+        SettledBody(
+            name=body.name, moved=0.1, turned=0.0, poses=tuple((0, 0, 0.001 * k, 0, 0, 0, 1) for k in range(61))
+        )
+        for body in bodies[1:]
+    )
+    SettleFile(times=times, bodies=moved, verdict="ok", reason="stays").write(root / "settle.json")
+    return seal(root, "interactive_scene")
+
+
+@needs_browser
+def test_a_scene_of_five_hundred_bodies(tmp_path: Path) -> None:
+    page = tmp_path / "scene.html"
+    view_artifact(scene_of_boxes(tmp_path, 500), page)
+    assert page.stat().st_size < page_canvas.LARGEST_PAGE
+    with browser(*WEBGL) as window:
+        opened(window, page)
+        nodes = "[...document.querySelectorAll('.node .name')]"
+        assert window.run(f"return {nodes}.length") == 501  # and the scene
+        window.run(f"{nodes}.find((node) => node.textContent === 'cup_321').click()")
+        assert window.text(".node .chosen") == "cup_321" and "supports cup_321" in window.text("#relations")
+        window.run("const m = document.getElementById('moment'); m.value = 2; m.dispatchEvent(new Event('input'))")
+        assert window.text("#clock") == "2.00 s" and window.complaints() == []
+
+
+@needs_browser
+def test_what_nothing_is_drawn_of_is_a_page_to_read(tmp_path: Path) -> None:
+    with PageCanvas("words", tmp_path / "words.html") as canvas:
+        canvas.document("figures", "first\n```\n| a  b\n```")
+    with browser(*WEBGL) as window:
+        opened(window, tmp_path / "words.html")
+        assert "first" in window.text(".document") and window.text(".document pre") == "| a  b"
+        assert window.run("return document.getElementById('picture').clientHeight") == 0
+        assert window.complaints() == []
+
+
+def test_at_first_everything_is_in_sight_where_it_is_placed(tmp_path: Path) -> None:
+    with PageCanvas("placed", tmp_path / "placed.html") as canvas:
+        for name, x in (("left", -2.0), ("right", 3.0)):
+            canvas.mesh(f"{name}/cube", trimesh.creation.box((1, 1, 1)))
+            canvas.transform(name, np.array([[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]))
+        canvas.time(1.0)
+        canvas.transform("left", np.diag([1.0, 1, 1, 1]) * 1e3)  # where it goes later does not count
+    low, high = document_of(tmp_path / "placed.html")["bounds"]
+    margin = page_canvas.MARGIN * np.array([6, 1, 1])
+    assert np.allclose(low, [-2.5, -0.5, -0.5] - margin) and np.allclose(high, [3.5, 0.5, 0.5] + margin)

@@ -30,7 +30,7 @@
   // ---- state, and the address that holds it ------------------------------------------------------------------------
   const [low, high] = shown.bounds;
   const middle = low.map((value, k) => (value + high[k]) / 2);
-  const extent = Math.max(0.5, Math.hypot(...low.map((value, k) => high[k] - value)));
+  const extent = Math.max(0.02, Math.hypot(...low.map((value, k) => high[k] - value)));
   const start = { eye: [-2.11, 0.825, extent], target: middle, time: null, off: [], fade: {}, joints: {}, chosen: "", trust: false };
   const state = structuredClone(start);
   const number = (value) => typeof value === "number" && Number.isFinite(value);
@@ -61,7 +61,7 @@
   const probe = document.createElement("canvas");  // three.js would complain in the console
   if (probe.getContext("webgl2") || probe.getContext("webgl"))
     try { renderer = new THREE.WebGLRenderer({ canvas, antialias: true }); } catch { renderer = null; }
-  const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(45, 1, 0.02, 20 * extent);
+  const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(45, 1, Math.min(0.02, 0.02 * extent), Math.max(5, 20 * extent));
   camera.up.set(0, 0, 1);
   scene.background = new THREE.Color(0xf3f1ec);
   scene.add(new THREE.HemisphereLight(0xffffff, 0x9a958c, 0.75));
@@ -318,7 +318,7 @@
     tell(name ? relationsOf(name) : []);
     if (box && come) {
       state.target = [0, 1, 2].map((k) => box.corners.reduce((sum, corner) => sum + corner[k], 0) / 8);
-      state.eye[2] = Math.max(0.6, 3 * Math.hypot(...[0, 1, 2].map((k) => box.corners[7][k] - box.corners[0][k])));
+      state.eye[2] = Math.max(Math.min(0.6, extent), 3 * Math.hypot(...[0, 1, 2].map((k) => box.corners[7][k] - box.corners[0][k])));
     }
     remember(); draw();
     tellListeners("chosen", name);
@@ -373,7 +373,7 @@
 
   // ---- mouse and keys --------------------------------------------------------------------------------------------------
   const turn = (yaw, pitch) => { state.eye[0] += yaw; state.eye[1] = Math.min(1.55, Math.max(-1.55, state.eye[1] + pitch)); remember(); draw(); };
-  const zoom = (factor) => { state.eye[2] = Math.min(8 * extent, Math.max(0.05, state.eye[2] * factor)); remember(); draw(); };
+  const zoom = (factor) => { state.eye[2] = Math.min(8 * extent, Math.max(Math.min(0.05, 0.1 * extent), state.eye[2] * factor)); remember(); draw(); };
   function move(x, y) {
     look(); camera.updateMatrixWorld();
     const right = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 0), up = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
@@ -548,8 +548,10 @@
     const details = made("details"), body = made("div", undefined, "document");
     details.append(made("summary", path), body);
     const words = (place, text) => { text.split("**").forEach((part, k) => place.append(k % 2 ? made("b", part) : part)); };
-    let table = null;
+    let table = null, literal = null;
     for (const line of list[list.length - 1].text.split("\n")) {
+      if (line.startsWith("```")) { literal = literal ? null : made("pre", ""); if (literal) body.append(literal); continue; }
+      if (literal) { literal.append(line + "\n"); continue; }
       if (line.startsWith("|")) {
         if (/^[|\-: ]+$/.test(line)) continue;
         if (!table) { table = made("table"); body.append(table); }
@@ -566,6 +568,11 @@
     element("documents").append(details);
   }
 
+  // Nothing in three dimensions: a page to read.
+  if (!things.length) {
+    document.body.classList.add("reading");
+    for (const details of element("documents").children) details.open = true;
+  }
   if (!readAddress() && shown.views.length) state.off = [...shown.views[0].hidden];
   refresh();
   showTrust();

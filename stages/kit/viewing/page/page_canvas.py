@@ -20,9 +20,10 @@ from schemas.plain_text import cleaned
 from schemas.scene_parts import Box, Camera
 from stages.kit.formats.foxglove import PNG_START
 from stages.kit.geometry.boxes import box_corners
+from stages.kit.geometry.transforms import apply
 from stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_color, vertex_colors
 from stages.kit.viewing.page.library import three_js
-from stages.kit.viewing.page.packing import Block, thinned_mesh
+from stages.kit.viewing.page.packing import STEPS, Block, thinned_mesh
 
 FOLDER = Path(__file__).resolve().parent
 LARGEST_PAGE = 15_000_000
@@ -37,7 +38,8 @@ MOST_POINTS = 60_000
 """Of a cloud."""
 MOST_PICTURE_BYTES = 4_000_000
 """Of all pictures together; of more, every second one, every third one and so on is kept."""
-SKIPPED = "not in a page: open the artifact in Rerun"
+MARGIN = 0.15
+"""Around what is kept in sight where no viewer said what that is, of its size."""
 
 
 @dataclass
@@ -78,6 +80,7 @@ class PageCanvas:
         self._graph: dict[str, Any] | None = None
         self._trust: dict[str, dict[str, Any]] = {}
         self._left_out: set[str] = set()
+        self._pyramids: set[str] = set()
 
     def __enter__(self) -> PageCanvas:
         return self
@@ -183,6 +186,7 @@ class PageCanvas:
         strips = [np.concatenate([far, far[:1]]), *(np.array([np.zeros(3), corner]) for corner in far)]
         moment, self._time = self._time, None
         self.line(f"{path}/seen", strips, [(0.2, 0.4, 0.8)] * len(strips))
+        self._pyramids.add(f"{path}/seen")
         self._time = moment
 
     def picture(self, path: str, data: bytes) -> None:
@@ -258,9 +262,8 @@ class PageCanvas:
 
     def _document(self) -> dict[str, Any]:
         meshes = self._drawn_meshes()
-        for mesh in self._meshes:
-            if not np.isfinite(self._low).all():
-                self.enclose(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
+        if not np.isfinite(self._low).all():
+            self._enclose_everything()
         low, high = (self._low, self._high) if np.isfinite(self._low).all() else (-np.ones(3), np.ones(3))
         return {
             "name": cleaned(self._name),
@@ -272,6 +275,25 @@ class PageCanvas:
             "left_out": sorted(self._left_out),
             **self._said,
         }
+
+    def _enclose_everything(self) -> None:
+        """Keep all in sight where it is first placed, but for what cameras see."""
+        bounds = [(mesh.path, mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) for mesh in self._meshes]
+        for entry in (entry for kind in ("points", "lines", "boxes") for entry in self._said[kind]):
+            if entry["at"][1] and entry["path"] not in self._pyramids:
+                low = np.array(entry["low"])
+                bounds.append((entry["path"], low, low + STEPS * np.array(entry["step"])))
+        placed: dict[str, np.ndarray] = {}
+        for entry in self._said["transforms"]:
+            placed.setdefault(entry["path"], np.array([*entry["rows"], 0, 0, 0, 1]).reshape(4, 4))
+        for path, low, high in bounds:
+            parts, world = path.split("/"), np.eye(4)
+            for k in range(len(parts)):
+                world = world @ placed.get("/".join(parts[: k + 1]), np.eye(4))
+            corners = apply(world, trimesh.bounds.corners([low, high]))
+            self.enclose(corners.min(axis=0), corners.max(axis=0))
+        margin = MARGIN * (self._high - self._low)
+        self._low, self._high = self._low - margin, self._high + margin
 
     def page(self, served: ServedPage | None = None) -> bytes:
         """Return the page; `served`: what it needs to talk to the server that it comes from."""
