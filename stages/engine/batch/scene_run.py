@@ -61,6 +61,7 @@ class _Watched:
     status: int = 0
     stopped_by: Outcome | None = None
     peak_memory: int = 0
+    processor_seconds: float = 0.0
 
 
 def end_leftover(folder: Path, grace: float) -> None:
@@ -155,6 +156,7 @@ def _watch(job: Job, process: subprocess.Popen[bytes], cancelled: Callable[[], b
     signal_group(process.pid, signal.SIGKILL)  # what it started and left behind
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = found.status = os.waitstatus_to_exitcode(status)
+    found.processor_seconds = usage.ru_utime + usage.ru_stime  # with those of the steps, for which it waited
     # A spike between two looks shows in the largest process at least [KiB]. The figure begins with what this process
     # held when it forked, so it says something only above our own peak.
     if usage.ru_maxrss > resource.getrusage(resource.RUSAGE_SELF).ru_maxrss:
@@ -262,6 +264,8 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
             "reason": reason,
             "seconds": round(time.monotonic() - begun, 3),
             "peak_memory_bytes": found.peak_memory,
+            "processor_seconds": round(found.processor_seconds, 3),
+            "artifact_bytes": sum(file.bytes for manifest in made.values() for file in manifest.files),
             "artifacts": {step: manifest.content_digest for step, manifest in made.items()},
             "outcomes": {step: manifest.outcome for step, manifest in made.items() if manifest.outcome != "ok"},
             "measures": measures(folder, made),

@@ -15,6 +15,8 @@ from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.kit.measurement.tables import Cell, Table
 
 NOT_RUN = "not run"
+MANY = 100_000
+"""Scenes that the costs are reckoned up to."""
 _PATH = re.compile(r"(?<![\w.])~?/[^\s:,;'\")]+")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
@@ -86,7 +88,9 @@ def scene_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult], *, measu
         "failed_step",
         "reason",
         "seconds",
+        "processor_seconds",
         "peak_memory_mb",
+        "megabytes",
         "attempts",
         "host",
         "started",
@@ -109,7 +113,9 @@ def scene_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult], *, measu
                 result.failed_step,
                 result.reason,
                 result.seconds,
+                result.processor_seconds,
                 round(result.peak_memory_bytes / 1e6, 1),
+                round(result.artifact_bytes / 1e6, 3),
                 result.attempts,
                 result.host,
                 result.started,
@@ -118,6 +124,46 @@ def scene_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult], *, measu
             )
         )
     return Table("scenes", "Scenes", columns, tuple(rows))
+
+
+def cost_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> Table:
+    """Return the processor time, bytes and memory of scenes that ended well and lost no worker, for each parameter
+    set, and the means times 100,000."""
+    costs: dict[str | None, list[tuple[float, float, float]]] = defaultdict(list)
+    for job in jobs:
+        result = latest.get(job.name)
+        if result is not None and result.outcome == "done" and result.attempts == 1 and result.processor_seconds:
+            row = (result.processor_seconds, result.artifact_bytes / 1e6, result.peak_memory_bytes / 1e6)
+            costs[job.parameters].append(row)
+    rows: list[tuple[Cell, ...]] = []
+    for parameters, found in sorted(costs.items(), key=lambda item: item[0] or ""):
+        processor, megabytes, memory = np.array(found).T
+        rows.append(
+            (
+                parameters,
+                len(found),
+                float(processor.mean()),
+                float(np.median(processor)),
+                float(processor.max()),
+                float(megabytes.mean()),
+                float(memory.max()),
+                float(processor.mean()) * MANY / 3600,
+                float(megabytes.mean()) * MANY / 1e6,
+            )
+        )
+    columns = (
+        "parameters",
+        "scenes",
+        "core-seconds, mean",
+        "median",
+        "most",
+        "MB, mean",
+        "most memory [MB]",
+        f"core-hours of {MANY:,}",
+        f"TB of {MANY:,}",
+    )
+    note = "A scene that ran again in a folder of before did only what was missing, and counts with that."
+    return Table("costs", "What a scene costs", columns, tuple(rows), note)
 
 
 def group_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> Table:

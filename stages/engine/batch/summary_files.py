@@ -10,7 +10,7 @@ from pathlib import Path
 from schemas.errors import MachineFailure
 from stages.engine.batch.job import Job
 from stages.engine.batch.results import SceneResult
-from stages.engine.batch.summary import accepted_table, count_table, group_table, reason_table, scene_table
+from stages.engine.batch.summary import accepted_table, cost_table, count_table, group_table, reason_table, scene_table
 from stages.kit.measurement.tables import Table, as_csv, as_markdown, format_cell
 
 PEOPLE_COLUMNS = ("scene", "parameters", "seed", "outcome", "failed_step", "reason", "seconds", "peak_memory_mb")
@@ -68,7 +68,8 @@ def summary_texts(title: str, jobs: Sequence[Job], latest: Mapping[str, SceneRes
     tables = [count_table(jobs, latest)]
     tables += [t for t in (reason_table(jobs, latest), accepted_table(jobs, latest)) if t.rows]
     groups = group_table(jobs, latest)
-    tables += [groups] if groups.rows else []
+    costs = cost_table(jobs, latest)
+    tables += [table for table in (groups, costs) if table.rows]
     markdown = [f"# {title}\n", *(as_markdown(table) for table in (*tables, people))]
     page = [
         "<!doctype html>",

@@ -36,6 +36,10 @@ def test_a_scene_that_ends_well(tmp_path: Path) -> None:
     assert found is not None
     assert (found.outcome, found.exit_code, found.reason, found.failed_step) == ("done", 0, "", None)
     assert found.host == this_host() and found.seconds > 0 and found.peak_memory_bytes > 0
+    assert (
+        found.processor_seconds > 0
+        and found.artifact_bytes == (tmp_path / "run" / "sequence" / "data.txt").stat().st_size
+    )
     assert set(found.artifacts) == {"sequence"} and found.measures == {"sequence/frames": 7.0}
     assert not (tmp_path / "run" / PROCESS_NAME).exists()
     text = (tmp_path / "run" / LOG_NAME).read_text()

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.engine.batch.summary import count_table, group_table, reason_table, without_particulars
+from stages.engine.batch.summary import cost_table, count_table, group_table, reason_table, without_particulars
 from stages.engine.batch.summary_files import summary_texts, write_summary
 from tests.unit.batch.batches import job, result
 
@@ -57,6 +57,20 @@ def test_seeds_of_a_scene_are_no_independent_scenes() -> None:
     assert group_table(jobs, latest) == group_table(jobs, latest), "the same figures each time"
     (alone,) = group_table(jobs[:1], latest).rows
     assert alone[3:5] == (None, None), "one scene has no interval"
+
+
+def test_what_scenes_cost() -> None:
+    jobs = [job(name, parameters="fine") for name in "abcd"]
+    took = {"processor_seconds": 30.0, "artifact_bytes": 2_000_000, "peak_memory_bytes": 10**9}
+    latest = {
+        "a": result("a", **took),
+        "b": result("b", **{**took, "processor_seconds": 60.0, "artifact_bytes": 4_000_000}),
+        "c": result("c", "crash", **took),
+        "d": result("d", attempts=2, lost=("gone",), **took),
+    }
+    (row,) = cost_table(jobs, latest).rows
+    assert row == ("fine", 2, 45.0, 45.0, 60.0, 3.0, 1000.0, pytest.approx(45 * 1e5 / 3600), pytest.approx(0.3))
+    assert cost_table(JOBS, LATEST).rows == (), "results of before say nothing of it"
 
 
 class _Checker(HTMLParser):
