@@ -185,6 +185,7 @@ def make_jobs(batch: Batch, out: Path, *, force: bool = False, command: SceneCom
     """Return the jobs of a batch in order of execution; run folders lie under `out`, which is made absolute."""
     out = Path(os.path.abspath(out))
     facts, paths, limits = pipeline_facts(batch.pipeline), input_variables(batch.pipeline), batch.spec.limits
+    storage = batch.spec.storage
     file_state_once = lru_cache(None)(file_state)
     jobs = []
     for run in shuffled(batch.runs, batch.spec.shuffle_seed):
@@ -204,6 +205,9 @@ def make_jobs(batch: Batch, out: Path, *, force: bool = False, command: SceneCom
                 memory_limit=limits.memory,
                 address_space=limits.address_space,
                 grace=limits.grace,
+                storage=f"{storage.url.rstrip('/')}/{run.name}" if storage else None,
+                storage_timeout=storage.timeout if storage else 60.0,
+                keep=storage is None or storage.keep,
             )
         )
     return jobs

@@ -28,5 +28,11 @@ class Job(Model):
     """Resident memory of all its processes together [bytes]."""
     address_space: Count | None = None
     """RLIMIT_AS of each of its processes [bytes]."""
+    storage: str | None = None
+    """URL of the folder that gets its artifacts when it has ended (storage.py)."""
+    storage_timeout: float = 60.0
+    """[s]"""
+    keep: bool = True
+    """Whether its artifacts stay in `folder` too."""
     grace: float = 10.0
     """Between SIGTERM and SIGKILL [s]."""

@@ -9,6 +9,7 @@ from typing import Literal
 from stages.engine.batch.artifacts import is_still_there
 from stages.engine.batch.job import Job
 from stages.engine.batch.results import SceneResult
+from stages.engine.batch.storage import stored_digest
 
 Retry = Literal["failed", "none", "all"]
 RETRY: tuple[Retry, ...] = ("failed", "none", "all")
@@ -31,9 +32,15 @@ def reason_to_run(job: Job, previous: SceneResult | None, retry: Retry) -> str |
     if previous.outcome != "done":
         return f"ended with: {previous.outcome}" if retry == "failed" else None
     last = job.steps[-1] if job.steps else None
-    if last in previous.artifacts and not is_still_there(Path(job.folder), last, previous.artifacts[last]):
+    if last in previous.artifacts and not _stands(job, last, previous.artifacts[last]):
         return f"the artifact of {last} is gone or has changed"
     return None
+
+
+def _stands(job: Job, step: str, digest: str) -> bool:
+    if job.storage is not None:
+        return stored_digest(job.storage, step, job.storage_timeout) == digest
+    return is_still_there(Path(job.folder), step, digest)
 
 
 def missing_jobs(jobs: Sequence[Job], latest: Mapping[str, SceneResult], retry: Retry) -> dict[str, str]:

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import psutil
 
-from schemas.errors import BadInput
+from schemas.errors import BadInput, ScenewrightError
 from schemas.outside import file_json
 from stages.engine.batch.artifacts import manifests, measures
 from stages.engine.batch.job import Job
@@ -32,6 +32,7 @@ from stages.engine.batch.processes import created_at, end_group, group_is_alive,
 from stages.engine.batch.quantities import format_bytes, format_seconds
 from stages.engine.batch.results import SceneResult
 from stages.engine.batch.scene_log import LOG_NAME, LogFollower, clean
+from stages.engine.batch.storage import drop_local, send
 from stages.engine.chain import REPOSITORY
 
 LAUNCHER = Path(__file__).with_name("launcher.py")
@@ -255,8 +256,17 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
     failed_step = None if outcome == "done" else follower.step
     if outcome == "not ok":  # the chain may have gone on after it
         failed_step = next((step for step, manifest in made.items() if manifest.outcome != "ok"), failed_step)
+    facts = {"measures": measures(folder, made)}
+    if job.storage is not None:
+        try:
+            send(folder, tuple(made), job.storage, job.storage_timeout)
+            if outcome == "done" and not job.keep:
+                drop_local(folder, job.steps)
+        except ScenewrightError as error:
+            outcome, code, reason = "machine failure", MACHINE_FAILED, clean(error.message)
     return SceneResult.model_validate(
         identity
+        | facts
         | {
             "outcome": outcome,
             "exit_code": code,
@@ -268,6 +278,5 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
             "artifact_bytes": sum(file.bytes for manifest in made.values() for file in manifest.files),
             "artifacts": {step: manifest.content_digest for step, manifest in made.items()},
             "outcomes": {step: manifest.outcome for step, manifest in made.items() if manifest.outcome != "ok"},
-            "measures": measures(folder, made),
         }
     )

@@ -28,6 +28,7 @@ from stages.engine.batch.slurm_executor import (
     write_scripts,
 )
 from stages.engine.batch.spec import LocalOptions, RayOptions, SlurmOptions
+from stages.engine.batch.storage import check_storage
 from stages.engine.batch.summary import NOT_RUN
 from stages.engine.batch.summary_files import write_summary
 
@@ -125,6 +126,8 @@ def run_batch(
             say(f"{RESULTS_NAME}: a torn last line of {results.repaired} bytes was cut off; its scene runs again")
         merge_parts(out, results)
         all_jobs = make_jobs(batch, out, force=force, command=command)
+        if batch.spec.storage is not None:
+            check_storage(batch.spec.storage.url, batch.spec.storage.timeout)
         reasons = missing_jobs(all_jobs, latest_by_job(read_results(results.path)), "all" if force else retry)
         todo = [job for job in all_jobs if job.name in reasons]
         say(f"{len(all_jobs)} scenes: {len(todo)} to run, {len(all_jobs) - len(todo)} stand as they are")

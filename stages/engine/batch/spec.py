@@ -93,6 +93,17 @@ class Limits(_Strict):
     stop_after_failures: Annotated[int, Field(ge=1)] | None = None
 
 
+class StorageSpec(_Strict):
+    """Where the artifacts of scenes go when they are made (storage.py)."""
+
+    url: Line
+    """Of a folder: `s3://bucket/rooms`, `file:///mnt/rooms`, or another that fsspec knows."""
+    keep: bool = True
+    """Whether a scene that ended well keeps its artifacts in its run folder too."""
+    timeout: Seconds = 60.0
+    """For one file, or one question [s]."""
+
+
 class LocalOptions(_Strict):
     """Processes on this machine."""
 
@@ -148,6 +159,7 @@ class BatchSpec(_Strict):
     seed_variable: str = "seed"
     shuffle_seed: int = 0
     limits: Limits = Limits()
+    storage: StorageSpec | None = None
     executor: Annotated[LocalOptions | RayOptions | SlurmOptions, Field(discriminator="kind")] = LocalOptions()
 
 
