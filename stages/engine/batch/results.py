@@ -40,7 +40,7 @@ class SceneResult(Model):
     """Wall clock [s] of the attempt that counts."""
     peak_memory_bytes: Count = 0
     """The most resident memory seen over all processes together, or of the largest one, whichever is more."""
-    processor_seconds: float = Field(0.0, ge=0)
+    processor_seconds: float = Field(default=0.0, ge=0)
     """Of all processes of the attempt that counts, in all their threads [s]; of those that were killed, none."""
     artifact_bytes: Count = 0
     """Of the artifacts that `artifacts` names."""
