@@ -14,6 +14,7 @@ from stages.engine.batch.ray_executor import RayExecutor
 from stages.engine.batch.results import RESULTS_NAME, latest_by_job, read_results
 from stages.engine.batch.session import run_batch
 from stages.engine.batch.spec import RayOptions
+from stages.engine.batch.storage import stored_digest
 from tests.unit.batch.batches import batch_of, program_command
 
 ray = pytest.importorskip("ray", reason="the extra `cluster` is not installed")
@@ -50,8 +51,8 @@ def hosts_of_running(out: Path) -> dict[str, str]:
 
 def test_a_killed_node_costs_only_its_scenes(cluster: Any, tmp_path: Path) -> None:
     behaviours = {f"s{k}": "sleep 3" for k in range(SCENES)} | {"bad": "exit 3"}
-    batch = batch_of(tmp_path, behaviours)
-    out = tmp_path / "out"
+    out, store = tmp_path / "out", tmp_path / "store"
+    batch = batch_of(tmp_path, behaviours, f'[storage]\nurl = "file://{store}"\nkeep = false')
     head = cluster.head_node.node_id
     victim: dict[str, Any] = {}
 
@@ -83,6 +84,9 @@ def test_a_killed_node_costs_only_its_scenes(cluster: Any, tmp_path: Path) -> No
         assert result.attempts == 2 and not result.host.endswith(victim["node"]), "on another node"
     assert len({result.host for result in results.values()}) >= 2
     assert len(read_results(out / RESULTS_NAME)) == SCENES + 1
+    for name, result in results.items():  # whole in the storage, and nowhere else
+        for step, digest in result.artifacts.items():
+            assert stored_digest(f"file://{store}/{name}", step, 60.0) == digest and not (out / name / step).exists()
 
 
 def test_interrupting_stops_the_scenes_on_the_workers(cluster: Any, tmp_path: Path) -> None:
