@@ -120,7 +120,15 @@ def frames_of(
     layout = {entry.name for entry in vocabulary.classes if entry.is_layout}
     parameters = SegmentParameters.model_validate({"backend": backend})
     with FrameReader(sequence.path("frames.mcap")) as reader:
-        segment = choose_backend(BackendRequest(parameters, sequence=sequence, reader=reader, **files))
+        segment = choose_backend(
+            BackendRequest(
+                parameters,
+                files.get("weights"),
+                semantic_weights=files.get("semantic_weights"),
+                sequence=sequence,
+                reader=reader,
+            )
+        )
         for frame in reader.frames(every=max(1, len(reader) // count)):
             if frame.depth is None or frame.world_from_camera is None:
                 continue

@@ -28,9 +28,8 @@ class DepthFaults:
     bending: float
     shift: tuple[float, float]
 
-    def depth(self, depth: np.ndarray | None, camera: Camera) -> np.ndarray:
+    def depth(self, depth: np.ndarray, camera: Camera) -> np.ndarray:
         """Return depth (H, W) [m] scaled and bent: 1/z' = 1/z - bending * r^2, r = 1 at the corner; 0 stays 0."""
-        assert depth is not None
         v, u = np.mgrid[0 : camera.height, 0 : camera.width]
         square = ((u - camera.cx) ** 2 + (v - camera.cy) ** 2) / (camera.cx**2 + camera.cy**2)
         with np.errstate(divide="ignore"):

@@ -159,6 +159,7 @@ def build_maps(
     for entry, pose in zip(shared, poses, strict=True):
         frame, camera = entry.frame, reader.cameras[entry.frame.camera_name]
         made = entry.geometric if faults is None else spoiled(frame, camera, faults, entry.geometric)
+        assert frame.depth is not None
         depth = frame.depth if faults is None else faults.depth(frame.depth, camera)
         # The same generator for every case: levels differ in their rates alone.
         random = np.random.default_rng([seed, frame.index])

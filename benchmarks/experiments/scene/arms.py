@@ -23,8 +23,9 @@ class Arm:
     cad: CadParameters
 
 
-THESIS, OURS = {"method": "thesis"}, {"method": "ours"}
-RELEASED = {"candidates": 20, "area_threshold": 0.3, "minimum_scale": 0.3, "maximum_scale": 3.0}
+THESIS: dict[str, object] = {"method": "thesis"}
+OURS: dict[str, object] = {"method": "ours"}
+RELEASED: dict[str, object] = {"candidates": 20, "area_threshold": 0.3, "minimum_scale": 0.3, "maximum_scale": 3.0}
 """Where the released code is more lenient than the text: candidates, overlap with children; and no scale of a candidate
 is dropped that ours would have clipped."""
 
