@@ -74,6 +74,7 @@ FIGURES: dict[str, Figure] = {
     "class_right": over_objects("class_right"),
     "true_model_first": over_objects("true_model_first"),
     "true_model_among_candidates": over_objects("true_model_among_candidates"),
+    "nearest_stand_in": per_room("cad", "nearest_stand_in", np.median),
     "scan2cad_success": over_objects("scan2cad_success"),
     "scan2cad_success_detected": over_objects("scan2cad_success_detected", "detected"),
     "scan2cad_success_every_axis": over_objects("scan2cad_success_every_axis"),

@@ -16,6 +16,7 @@ from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.mapping.experiment import EXPERIMENT as MAPPING
 from benchmarks.experiments.mapping.measuring import MappingParameters, room_for
 from benchmarks.experiments.scene.arms import ARMS, HELD_OUT, MAPS, PERFECT, REAL, Arm
+from benchmarks.experiments.scene.stand_ins import nearest_stand_in
 from benchmarks.generated_rooms import make_library, room_at, room_of
 from benchmarks.graph_scores import OPTIONS, distance_figures, judge
 from benchmarks.keeping import measure_missing
@@ -210,7 +211,14 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
     distance, edges = measure_graph(room.truth, graph, overlaps)
     summary = scene.info
-    extra = {
+    own = {model.id: model for model in room.libraries[False].info.models}
+    off = [nearest_stand_in(own[r.true_model], library.info.models) for r in measured.objects if r.true_model in own]
+    known = [value for value in off if value is not None]
+    # The ids of the two libraries are the same words for other models.
+    undefined = ("true_model_first", "true_model_among_candidates") if case == HELD_OUT else ()
+    extra: dict[str, float | None] = {
+        **dict.fromkeys(undefined),
+        "nearest_stand_in": float(np.median(known)) if known else None,
         "seconds_per_object": seconds / max(1, objects),
         "conflicts_before": float(summary.conflicts_before),
         "conflicts_after": float(summary.conflicts_after),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.experiment import Bench, Results, Trial
@@ -12,6 +13,7 @@ from benchmarks.experiments.scene.arms import ARMS, MAPS, PERFECT, REAL, RECONST
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
 from benchmarks.experiments.scene.measuring import Outcome, SceneParameters, physics_of
+from benchmarks.experiments.scene.stand_ins import off_by
 from benchmarks.generated_rooms import RoomFolder
 from benchmarks.results import figures_of, table
 from stages.urdf.scene_penetration import Overlap
@@ -122,4 +124,13 @@ def test_arms_that_differ_by_their_map_run_where_there_is_one() -> None:
         "ours",
         "thesis",
         "thesis",
+    )
+
+
+def test_a_stand_in_is_as_far_off_as_its_worst_edge_at_the_best_scale() -> None:
+    true = np.array([1.0, 2.0, 0.5])
+    assert off_by(true, 0.7 * true) == pytest.approx(0.0, abs=1e-12), "one scale"
+    worse = off_by(true, true * [1.0, 1.2, 0.9])
+    assert worse == pytest.approx(
+        min(np.abs(s * np.array([1.0, 1.2, 0.9]) - 1).max() for s in np.linspace(0.8, 1.2, 4001)), abs=1e-3
     )
