@@ -11,10 +11,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from benchmarks.discovery import experiment_files, load_experiment, summary_of
-from benchmarks.experiment import Bench, Experiment, Results, shown
+from benchmarks.experiment import Bench, Experiment, Results, Trial, shown
 from benchmarks.gather import gather
 from benchmarks.keeping import measure_missing, read_record, wanted_trials
 from benchmarks.options import add_option
+from benchmarks.reporting_seeds import FILE, UNRECORDED, newest, note_use
 from benchmarks.results import write_results
 from schemas.errors import ScenewrightError
 
@@ -51,7 +52,7 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
     trials = wanted_trials(
         experiment, bench, arms=options.arms, cases=options.cases, seeds=options.seeds, most=options.count
     )
-    code = 0
+    code, met = 0, seeds_met(experiment, bench, trials, kept=options.kept)
     if not options.kept:
         jobs = options.jobs or experiment.jobs
         code = measure_missing(experiment, bench, trials, jobs=jobs, fresh=options.fresh or not experiment.keeps)
@@ -60,13 +61,35 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
     if not records:
         print(f"{experiment.name}: nothing is measured", file=sys.stderr)
         return code
-    results = Results(experiment, bench, shown(experiment, records))
+    results = Results(experiment, bench, shown(experiment, records), met)
     missing = [trial for trial in trials if trial not in records]
     print(write_results(results, ("python", "-m", "benchmarks", *words), missing))
     problems = experiment.problems(results) if experiment.problems else ()
     for problem in problems:
         print(f"expectation not met: {problem}", file=sys.stderr)
     return code or (UNMET if problems else 0)
+
+
+def seeds_met(
+    experiment: Experiment, bench: Bench, trials: Sequence[Trial], *, kept: bool, file: Path = FILE
+) -> dict[str, str]:
+    """Return which set of reporting seeds is measured and by which digest of the method, and record that it is, before
+    anything can be seen; nothing where the experiment's seeds are in no set, or others are measured. What is `kept` was
+    recorded when it was measured: the set's newest digest is told."""
+    if not experiment.seed_group or experiment.method is None or bench.quick or bench.tuning:
+        return {}
+    found = newest(experiment.seed_group, file)
+    if not any(experiment.cluster(trial.seed) in found.seeds for trial in trials):
+        return {}
+    if kept:
+        digests = [met.method for met in found.met if met.experiment == experiment.name]
+        digest = digests[-1] if digests else UNRECORDED
+    else:
+        digest = experiment.method.digest()
+        found = note_use(found.name, experiment.name, digest, file)
+    if found.kind == "tuning":
+        print(f"{experiment.name}: {found.name} has met another method: tuning seeds from now on", file=sys.stderr)
+    return {"set": found.name, "kind": found.kind, "method": digest, "first_used": str(found.first_used)}
 
 
 def bench_of(experiment: Experiment, options: Mapping[str, Any]) -> Bench:

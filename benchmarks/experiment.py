@@ -15,6 +15,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from benchmarks.reporting_seeds import Method
 from stages.kit.measurement.bootstrap import Interval, bootstrap_interval, figure_interval, paired_interval
 from stages.kit.stage import Parameters
 
@@ -98,6 +99,10 @@ class Experiment:
     """Seeds that were looked at while methods and constants were chosen; `--tuning` runs these."""
     reporting: Sequence[str] = ()
     """Seeds for figures alone."""
+    seed_group: str = ""
+    """Group of reporting_seeds.toml that the reporting seeds are the newest set of; "" where they stand here alone."""
+    method: Method | None = None
+    """What is compared: seeds of a group that two digests of it have met are tuning seeds."""
     seeds_of: Callable[[Bench, str], Sequence[str]] | None = None
     """(bench, case) -> seeds, where they depend on the case or on data that may not be there; none leaves it out."""
     default_cases: Callable[[Bench], Sequence[str]] | None = None
@@ -152,6 +157,8 @@ class Results:
     experiment: Experiment
     bench: Bench
     records: Mapping[Trial, Any]
+    seeds_met: Mapping[str, str] = field(default_factory=dict)
+    """Set of reporting seeds, whether it is one still, digest of the method, date of first use (reporting_seeds.py)."""
     _clusters: dict[tuple[str, str], dict[str, list[Any]]] = field(default_factory=dict)
     _values: dict[tuple[str, ...], dict[tuple[int, ...], float | None]] = field(default_factory=dict)
 

@@ -5,9 +5,12 @@ A room's name, `<recipe>-<seed>`, is the seed of its trials.
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.reporting_seeds import newest, read_sets
 from benchmarks.steps import made
 
 TUNING = (
@@ -20,8 +23,14 @@ TUNING = (
 RECIPES = ("kitchen", "office", "bedroom", "room")
 TUNING_UNTRAINED = tuple(f"{recipe}-{seed}" for seed in (2000, 2001) for recipe in RECIPES)
 """Looked at as well, where the masks of our own network matter: it was trained on rooms of the seeds of TUNING."""
-REPORTING = tuple(f"{recipe}-{seed}" for seed in range(1000, 1005) for recipe in RECIPES)
-"""For figures alone (seeds of the recipes' reporting range)."""
+ROOMS = "rooms"
+"""Group of the reporting seeds (reporting_seeds.toml)."""
+REPORTING = newest(ROOMS).seeds
+"""For figures alone (seeds of the recipes' reporting range): the newest set."""
+FIRST_REPORTING = read_sets()[0].seeds
+"""The rooms of the first figures, which have been seen: the network's are of them."""
+DRAWS = 2
+"""Draws of the errors of masks and poses in every room."""
 CLUTTER = "high"
 LIBRARY_SEED = 1
 STEPS = ("library build", "synthesize", "ingest")
@@ -44,6 +53,21 @@ class RoomFolder:
     def sequence(self) -> Path:
         """Artifact of kind sequence."""
         return self.folder / "sequence"
+
+
+def with_draws(rooms: Sequence[str], draws: int = DRAWS) -> tuple[str, ...]:
+    """Return the seeds of trials that draw errors: `<room>+<draw>`, all rooms of the first draw before the second."""
+    return tuple(f"{room}+{draw}" for draw in range(draws) for room in rooms)
+
+
+def room_of(seed: str) -> str:
+    """Return the room of a trial's seed."""
+    return seed.split("+")[0]
+
+
+def error_seed(seed: str) -> int:
+    """Return the number that the errors of a trial are drawn with: another one for every recipe, seed and draw."""
+    return int.from_bytes(hashlib.blake2b(seed.encode(), digest_size=4).digest(), "big")
 
 
 def make_library(root: Path) -> Path:

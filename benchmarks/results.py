@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from benchmarks.experiment import RESAMPLES, Experiment, Results, Trial
+from benchmarks.experiment import RESAMPLES, Results, Trial
 from benchmarks.tabulation import Figure, grid
 from stages.kit.measurement.bootstrap import Interval
 
@@ -50,7 +50,7 @@ def write_results(results: Results, command: Sequence[str], missing: Sequence[Tr
     out, figures = results.bench.out, figures_of(results)
     out.mkdir(parents=True, exist_ok=True)
     _write(out / "metrics.json", {name: figure.value for name, figure in figures.items()})
-    _write(out / "figures.json", described(results.experiment, figures, command))
+    _write(out / "figures.json", described(results, figures, command))
     text = table(results, figures)
     if missing:
         text += f"\nNot measured: {', '.join(map(str, missing))}.\n"
@@ -69,8 +69,9 @@ def write_measured(out: Path | None, metrics: Mapping[str, float], text: str) ->
         (out / "table.md").write_text(text, encoding="utf-8")
 
 
-def described(experiment: Experiment, figures: Mapping[str, Figure], command: Sequence[str]) -> dict[str, Any]:
+def described(results: Results, figures: Mapping[str, Figure], command: Sequence[str]) -> dict[str, Any]:
     """Return figures.json: the figures, and what has to stand beside them."""
+    experiment = results.experiment
     return {
         "experiment": experiment.name,
         "title": experiment.title,
@@ -81,6 +82,7 @@ def described(experiment: Experiment, figures: Mapping[str, Figure], command: Se
         "simulated": experiment.simulated,
         "knows": experiment.knows,
         "does_not_show": experiment.does_not_show,
+        **({"seeds": dict(results.seeds_met)} if results.seeds_met else {}),
         "figures": {name: vars(figure) for name, figure in figures.items()},
     }
 

@@ -23,7 +23,7 @@ from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.mapping.figures_of_merit import summed_qualities
-from benchmarks.generated_rooms import REPORTING, STEPS, make_room
+from benchmarks.generated_rooms import FIRST_REPORTING, STEPS, make_room
 from benchmarks.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
 from benchmarks.object_masks import score_object_masks
 from benchmarks.steps import made, opened
@@ -137,7 +137,7 @@ def runs(arm: str, case: str) -> bool:
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """Rooms, clouds, or the log where it is there."""
     if case == ROOMS:
-        return REPORTING[: QUICK[ROOMS] if bench.quick else 6]
+        return FIRST_REPORTING[: QUICK[ROOMS] if bench.quick else 6]
     if case == CLOUDS:
         return frame_names(bench.parameters.data / FOLDER / "test")[: QUICK[CLOUDS] if bench.quick else None]
     return [case] if (bench.parameters.data / LOGS[case][0]).is_dir() else []
@@ -343,7 +343,7 @@ EXPERIMENT = Experiment(
     arms=ARMS,
     cases=(ROOMS, CLOUDS, *LOGS),
     runs=runs,
-    reporting=REPORTING,
+    reporting=FIRST_REPORTING,
     seeds_of=seeds_of,
     together=lambda trial: (trial.case, trial.seed),
     measure=measure,

@@ -1,8 +1,14 @@
-"""The colours that the map shows on the parts of a placed model: what it looks like is a part of what it is like."""
+"""The colours that the map shows on the parts of a placed model: what it looks like is a part of what it is like.
+
+A camera sees the cover of a book and hardly its pages, the seat of a chair and not its underside. So what is taken from
+the map is by how much the surface that was seen differs from the model's own there, and the part's mean is shifted by
+that. Parts that nobody saw follow a seen part of the same colour (legs are alike), and else stay as they are.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import trim_mean
 
 from stages.cad.model_surfaces import ModelSurface, to_model
 from stages.cad.shapes import Placement
@@ -10,22 +16,38 @@ from stages.cad.shapes import Placement
 NEAR = 0.03
 """Vertices farther from the model than this say nothing of its colour [m]."""
 LEAST_VERTICES = 10
-"""Parts that fewer vertices show keep the colour of the library."""
+"""Parts that fewer vertices show were not seen."""
+STRAY = 0.1
+"""Share of the vertices left out at both ends: labels leak."""
+SAME_COLOR = 12.0
+"""Parts of a model whose own mean colours differ by less are of one material (sRGB, 0 to 255)."""
 
 
 def part_colors(
     surface: ModelSurface, placement: Placement, vertices: np.ndarray, normals: np.ndarray, colors: np.ndarray
 ) -> dict[str, tuple[int, int, int]]:
-    """Return part -> median colour (sRGB, 0 to 255) of the map's vertices that are nearest to it.
+    """Return part -> mean colour (sRGB, 0 to 255) that it is to have, for every part when any was seen.
 
-    `vertices`, `normals` (N, 3) world frame, `colors` (N, 3) uint8. Parts that were not seen are left out.
+    `vertices`, `normals` (N, 3) world frame, `colors` (N, 3) uint8.
     """
-    nearest = surface.closest(to_model(placement, vertices), placement.shape.joints, normals @ placement.rotation)
+    at, facing = to_model(placement, vertices), normals @ placement.rotation
+    nearest = surface.closest(at, placement.shape.joints, facing)
     near = placement.scale * nearest.distance <= NEAR
-    result = {}
+    shifts: dict[str, np.ndarray] = {}
     for k, part in enumerate(surface.model.parts):
         own = near & (nearest.part == k)
         if np.count_nonzero(own) >= LEAST_VERTICES:
-            red, green, blue = (int(value) for value in np.round(np.median(colors[own], axis=0)))
-            result[part] = (red, green, blue)
+            own_look = surface.looks[part].colors[nearest.triangle[own]]
+            shifts[part] = trim_mean(colors[own].astype(float) - own_look, STRAY, axis=0)
+    if not shifts:
+        return {}
+    means = {part: surface.looks[part].mean for part in surface.model.parts}
+    result = {}
+    for part, mean in means.items():
+        shift = shifts.get(part)
+        if shift is None:
+            alike = min(shifts, key=lambda other: float(np.linalg.norm(means[other] - mean)))
+            shift = shifts[alike] if np.linalg.norm(means[alike] - mean) < SAME_COLOR else np.zeros(3)
+        red, green, blue = (int(value) for value in np.round(np.clip(mean + shift, 0, 255)))
+        result[part] = (red, green, blue)
     return result

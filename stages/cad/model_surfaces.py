@@ -12,11 +12,14 @@ import trimesh
 from schemas.cad_library import CadModel
 from stages.cad.shapes import Placement
 from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
+from stages.kit.formats.part_colors import vertex_colors
 from stages.kit.geometry.ray_scenes import Triangles, triangles_of
 from stages.kit.geometry.transforms import apply, inverse
 
 SAMPLES = 300
 """Points that stand for the surface of a model where it is compared with free space."""
+PLAIN = 153
+"""Grey of a part without colours (sRGB, 0 to 255)."""
 FACING = 0.5
 """Cosine within which a triangle belongs to a side."""
 
@@ -33,6 +36,23 @@ class Nearest:
     """(N, 3) of the triangles."""
     part: np.ndarray
     """(N,) index into the model's parts."""
+    triangle: np.ndarray
+    """(N,) index into the triangles of the part's visual mesh."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the triangles (K,) of a part's visual mesh look like."""
+
+    colors: np.ndarray
+    """(K, 3) sRGB, 0 to 255."""
+    areas: np.ndarray
+    """(K,) [m^2]."""
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(3,) mean colour over the surface."""
+        return np.asarray(np.average(self.colors, axis=0, weights=self.areas if self.areas.sum() > 0 else None))
 
 
 @dataclass(frozen=True)
@@ -47,12 +67,15 @@ class ModelSurface:
     """Part -> its visual mesh."""
     sides: dict[str, dict[int, Triangles]]
     """Part -> side (0 to 5: -x, +x, -y, +y, -z, +z of the part frame) -> the triangles that face that way."""
+    numbers: dict[str, dict[int, np.ndarray]]
+    """... and which of the part's triangles they are."""
     corners: dict[str, np.ndarray]
     """Part -> hull vertices (K, 3) of the visual mesh, part frame; they bound the part in every pose."""
     pieces: dict[str, tuple[trimesh.Trimesh, ...]]
     """Part -> convex collision pieces, part frame."""
     samples: dict[str, np.ndarray]
     """Part -> points (K, 3) spread over its visual mesh by area, part frame; `SAMPLES` over all parts."""
+    looks: dict[str, Look]
 
     def closest(self, points: np.ndarray, joints: dict[str, float], normals: np.ndarray | None = None) -> Nearest:
         """Return the nearest surface points of points (N, 3) in the model frame at scale 1.
@@ -63,7 +86,7 @@ class ModelSurface:
         """
         distance = np.full(len(points), np.inf)
         nearest, normal = np.zeros((len(points), 3)), np.zeros((len(points), 3))
-        part_index = np.zeros(len(points), dtype=int)
+        part_index, triangle = np.zeros(len(points), dtype=int), np.zeros(len(points), dtype=int)
         transforms = part_transforms(self.model, joints)
         for k, part in enumerate(self.model.parts):
             model_from_part = transforms[part]
@@ -91,7 +114,9 @@ class ModelSurface:
                 nearest[chosen] = apply(model_from_part, foot[closer])
                 facing = answer["primitive_normals"].numpy()[closer].astype(float)
                 normal[chosen] = facing @ model_from_part[:3, :3].T
-        return Nearest(distance, nearest, normal, part_index)
+                hit = answer["primitive_ids"].numpy()[closer].astype(int)
+                triangle[chosen] = hit if asked_of is whole or value is None else self.numbers[part][value][hit]
+        return Nearest(distance, nearest, normal, part_index, triangle)
 
     def part_distance(self, points: np.ndarray, normal: np.ndarray, part: str) -> float:
         """Return the largest distance of points (N, 3), in the part's frame, to triangles of the part that face the
@@ -142,17 +167,18 @@ def load_surface(folder: Path, model: CadModel) -> ModelSurface:
     visual, collision = load_visual_parts(folder), load_collision_parts(folder)
     surfaces, corners = {}, {}
     sides: dict[str, dict[int, Triangles]] = {}
+    numbers: dict[str, dict[int, np.ndarray]] = {}
     for part in model.parts:
         vertices, faces = np.asarray(visual[part].vertices), np.asarray(visual[part].faces)
         surfaces[part] = triangles_of(vertices, faces)
         triangles = vertices[faces]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-18)
-        sides[part] = {}
+        sides[part], numbers[part] = {}, {}
         for side in range(6):
-            facing = faces[normals[:, side // 2] * (1.0 if side % 2 else -1.0) >= FACING]
+            facing = np.flatnonzero(normals[:, side // 2] * (1.0 if side % 2 else -1.0) >= FACING)
             if len(facing):
-                sides[part][side] = triangles_of(vertices, facing)
+                sides[part][side], numbers[part][side] = triangles_of(vertices, faces[facing]), facing
         corners[part] = np.asarray(visual[part].convex_hull.vertices)
     pieces = {part: tuple(collision.get(part, [])) for part in model.parts}
     areas = {part: float(visual[part].area) for part in model.parts}
@@ -160,7 +186,15 @@ def load_surface(folder: Path, model: CadModel) -> ModelSurface:
     for k, part in enumerate(model.parts):
         count = max(1, round(SAMPLES * areas[part] / max(sum(areas.values()), 1e-12)))
         samples[part] = np.asarray(trimesh.sample.sample_surface(visual[part], count, seed=k)[0])
-    return ModelSurface(model, surfaces, sides, corners, pieces, samples)
+    looks = {part: look_of(visual[part]) for part in model.parts}
+    return ModelSurface(model, surfaces, sides, numbers, corners, pieces, samples, looks)
+
+
+def look_of(mesh: trimesh.Trimesh) -> Look:
+    """Return the look of a part's visual mesh."""
+    painted, faces = vertex_colors(mesh), np.asarray(mesh.faces)
+    colors = np.full((len(faces), 3), PLAIN, float) if painted is None else painted[faces].mean(axis=1)
+    return Look(colors, np.asarray(mesh.area_faces))
 
 
 def to_model(placement: Placement, points: np.ndarray) -> np.ndarray:

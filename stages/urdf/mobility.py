@@ -1,8 +1,8 @@
 """What of a scene is free to move: what an arm carries, and furniture that stands by its own weight.
 
 Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
-rigid thing, not built in, which the contact graph puts on a level plane within 4 cm of its bottom, laden or not. What a
-person marked (`edit mark`) is as they said; what hangs stays.
+thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane within 4 cm of its
+bottom, laden or not. What a person marked (`edit mark`) is as they said; what hangs stays.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
         return Mobility(node.mark == "movable", node.mark == "movable" and node.class_name not in carriable)
     if node.class_name in carriable:
         return Mobility(True)
-    if link is None or link.source == SCENE_NODE or node.node_type == "articulated" or node.joints:
+    if link is None or link.source == SCENE_NODE:
         return Mobility(False)
     if node.class_name in BUILT_IN or node.class_name in fixed:
         return Mobility(False)

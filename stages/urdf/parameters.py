@@ -27,7 +27,7 @@ class UrdfParameters(Parameters):
 
 STAGE = Stage(
     name="urdf",
-    version=9,
+    version=10,
     summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots; MJCF, SRDF, GLB, MCAP",
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},

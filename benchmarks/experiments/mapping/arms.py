@@ -16,14 +16,19 @@ from stages.segment.parameters import SegmentParameters
 
 LEVELS = {"clean": 0.0, "low": 0.15, "middle": 0.3, "high": 0.5}
 """Corruption of the true masks by case (stages/segment/backends/ground_truth/corruption.py)."""
+LASTING = "lasting"
+LASTING_CASES = {LASTING: "detector", "lasting/network": "network"}
+"""Errors that last (stages/segment/backends/ground_truth/lasting.py): whose rates, by case; first the headline."""
+BENT = "lasting/bent"
+"""The errors of the first, and depth with bias, bending and colour beside it (depth_faults.py)."""
 NETWORK = "network"
-DRIFTING = "middle/drifting"
-"""Masks of the middle level, poses that drift (drift.py)."""
-CASES = (*LEVELS, DRIFTING, NETWORK)
+DRIFTING = "lasting/drifting"
+"""The errors of the headline, poses that drift (drift.py)."""
+CASES = (*LASTING_CASES, BENT, DRIFTING, *LEVELS, NETWORK)
 
-SHOWN = "middle"
+SHOWN = LASTING
 """The case that the tables by room and class show; all arms run in it."""
-EVERYWHERE = frozenset({"voxblox++", "thesis_separate", "thesis", "ours"})
+EVERYWHERE = frozenset({"voxblox++", "thesis_separate", "thesis", "thesis_chosen", "ours"})
 """The arms that run in every case."""
 
 
@@ -50,6 +55,10 @@ _PLAIN_EXTRACTION = {
     "minimum_observations": 1,
     "minimum_overlap_share": 0.0,
 }
+_OUR_CHOICES = {
+    name: value for name, value in _PLAIN_EXTRACTION.items() if name not in ("minimum_observations", "label_band")
+}
+"""... but for the two that any mapper can choose: observations that an entity takes, and the band of labels."""
 _THESIS_CONSTANTS = {
     "truncation_voxels": 4.0,
     "maximum_depth": 4.0,
@@ -81,11 +90,24 @@ def all_arms(voxel_size: float) -> tuple[Arm, ...]:
 
     voxblox = {"fusion": "voxblox++", "majority_share": 0.5}
     thesis = {"fusion": "thesis"}
+    joint_only = {"merging": "thesis"}
     separate, joint = {**_PLAIN_EXTRACTION, "merging": "separate"}, {**_PLAIN_EXTRACTION, "merging": "thesis"}
     return (
         arm("voxblox++", "Voxblox++ (SceneNN constants)", voxblox, {**separate, **_VOXBLOX_SCENENN}, "thesis"),
         arm("voxblox++_default", "Voxblox++ (default constants)", voxblox, {**separate, **_VOXBLOX_DEFAULT}, "thesis"),
         arm("thesis_separate", "thesis without joint fusion", thesis, {**separate, **_THESIS_CONSTANTS}, "thesis"),
         arm("thesis", "thesis", thesis, {**joint, **_THESIS_CONSTANTS}, "thesis"),
+        arm(
+            "thesis_chosen",
+            "thesis, our choices",
+            thesis,
+            {**_OUR_CHOICES, **joint_only, **_THESIS_CONSTANTS},
+            "thesis",
+        ),
         arm("ours", "ours", {}, {}, "ours"),
     )
+
+
+def settings(arm: Arm) -> dict[str, object]:
+    """Return what an arm sets, as plain values."""
+    return {name: getattr(arm, name).model_dump(mode="json") for name in ("segment", "fuse", "graph")}

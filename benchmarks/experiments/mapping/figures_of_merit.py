@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.experiment import Measure, Results
 from benchmarks.experiments.mapping.arms import SHOWN
 from benchmarks.experiments.mapping.measuring import Outcome, Ranked
+from benchmarks.generated_rooms import RECIPES
 from stages.evaluate.truth import stuff_classes
 from stages.kit.measurement.average_precision import (
     PrecisionRecall,
@@ -18,6 +19,7 @@ from stages.kit.measurement.average_precision import (
     mean_precision,
 )
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, average_quality_thesis_code
+from stages.synthesize.recipes import load_recipe
 
 Figure = Callable[[Sequence[Outcome]], float | None]
 ANY = "any"
@@ -70,6 +72,44 @@ def quality_measure(which: str, kind: str = "all") -> Figure:
     return measure
 
 
+def fixed_classes() -> frozenset[str]:
+    """Return the classes that the rooms' recipes place, and what rooms are made of: known before anything is drawn."""
+    placed = {place.class_name for recipe in RECIPES for place in load_recipe(recipe).place}
+    return frozenset(placed | {"floor", "wall", "ceiling"})
+
+
+def quality_by_room(which: str = "pq") -> Figure:
+    """Return the headline: the mean over rooms of the mean over the classes that the room has. What is found of a class
+    that a room does not have is in no class of it (`ghosts` counts that)."""
+
+    def measure(outcomes: Sequence[Outcome]) -> float | None:
+        rooms = []
+        for outcome in outcomes:
+            own = [q for q in outcome.qualities.values() if q.true_positives + q.false_negatives]
+            rooms.append(np.mean([getattr(quality, which) for quality in own]))
+        return float(np.mean(rooms)) if rooms else None
+
+    return measure
+
+
+def quality_fixed(outcomes: Sequence[Outcome]) -> float | None:
+    """PQ pooled over rooms, over the fixed classes alone; false finds of a class that a room lacks count there."""
+    fixed = fixed_classes()
+    return average_quality(q for name, q in summed_qualities(outcomes).items() if name in fixed).pq
+
+
+def ghosts(outcomes: Sequence[Outcome]) -> float:
+    """Predicted segments of classes that the room does not have, a room."""
+    return float(
+        np.mean(
+            [
+                sum(q.false_positives for q in outcome.qualities.values() if not q.true_positives + q.false_negatives)
+                for outcome in outcomes
+            ]
+        )
+    )
+
+
 def quality_thesis_code(outcomes: Sequence[Outcome]) -> float | None:
     """PQ as the thesis's code forms it: on the map's own vertices, classes never predicted left out."""
     return average_quality_thesis_code(summed_qualities(outcomes, "qualities_thesis_code").values()).pq
@@ -91,6 +131,11 @@ def frames_per_second(outcomes: Sequence[Outcome]) -> float | None:
 
 
 MEASURES = {
+    "pq_rooms": Measure(quality_by_room()),
+    "sq_rooms": Measure(quality_by_room("sq"), interval=False),
+    "rq_rooms": Measure(quality_by_room("rq"), interval=False),
+    "ghosts": Measure(ghosts),
+    "pq_fixed": Measure(quality_fixed),
     "pq": Measure(quality_measure("pq")),
     "sq": Measure(quality_measure("sq"), interval=False),
     "rq": Measure(quality_measure("rq"), interval=False),

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Trial
-from benchmarks.experiments.mapping.arms import DRIFTING, LEVELS, NETWORK, Arm, all_arms
+from benchmarks.experiments.mapping.arms import BENT, DRIFTING, LASTING, LASTING_CASES, LEVELS, NETWORK, Arm, all_arms
+from benchmarks.experiments.mapping.depth_faults import DepthFaults, drawn_faults
 from benchmarks.experiments.mapping.drift import drifting_poses
-from benchmarks.generated_rooms import make_room
+from benchmarks.generated_rooms import RoomFolder, error_seed, make_room, room_of
 from benchmarks.steps import context_in, opened, unrecorded
 from schemas.contact_graph import ContactGraphFile
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
+from schemas.scene_parts import Camera
 from schemas.sequence import Sequence as SequenceArtifact
 from schemas.vocabulary import load_vocabulary
 from stages.evaluate.graph_measures import box_candidates
@@ -45,8 +48,9 @@ from stages.segment.one_frame import FUSION, describe
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings
 
-DRIFT_STREAM = 11
+DRIFT_STREAM, FAULT_STREAM = 11, 12
 SEED = 0
+"""Of the steps; what is drawn of a room is drawn by its name (`error_seed`)."""
 
 
 class MappingParameters(Parameters):
@@ -54,6 +58,7 @@ class MappingParameters(Parameters):
 
     voxel_size: float = Field(0.02, gt=0, description="Voxel edge of all arms [m] (the publications: 0.01)")
     frames: int = Field(60, ge=1, description="Frames of every room")
+    width: int = Field(640, ge=64, description="Width of the pictures [pixels]; their height is three quarters of it")
     untrained: bool = Field(False, description="With --tuning: rooms that our own network never saw")
 
 
@@ -93,7 +98,7 @@ class SharedFrame:
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outcome]]:
     """Yield the outcomes of the trials of one room, case after case; the maps are left in the folders of the trials."""
     parameters: MappingParameters = bench.parameters
-    room = make_room(bench.out / "rooms", trials[0].seed, parameters.frames)
+    room, drawn = room_for(bench.out / "rooms", trials[0].seed, parameters), error_seed(trials[0].seed)
     sequence, truth_artifact = opened(SequenceArtifact, room.sequence), opened(GroundTruth, room.ground_truth)
     options = EvaluateParameters.model_validate({})
     truth = load_truth(truth_artifact, np.array(sequence.info.gravity.world_from_log), options.minimum_visible_points)
@@ -103,12 +108,18 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
         for case in dict.fromkeys(trial.case for trial in trials):
             present = {trial.arm: trial for trial in trials if trial.case == case}
             seconds = dict.fromkeys(present, 0.0)
-            mappers = build_maps(sequence, reader, shared, [arms[name] for name in present], case, SEED, seconds)
+            mappers = build_maps(sequence, reader, shared, [arms[name] for name in present], case, drawn, seconds)
             for name, trial in present.items():
                 output = bench.folder(trial)
                 panoptic_map = finish_map(mappers.pop(name), output, SEED)
                 found = outcome_of(arms[name], truth, panoptic_map, options, output)
                 yield trial, replace(found, frames=len(shared), seconds=seconds[name])
+
+
+def room_for(root: Path, seed: str, parameters: MappingParameters) -> RoomFolder:
+    """Make the room of a trial's seed unless it is up to date."""
+    size = (parameters.width, 3 * parameters.width // 4)
+    return make_room(root, room_of(seed), parameters.frames, size=size)
 
 
 def read_frames(reader: FrameReader, arms: Sequence[Arm]) -> list[SharedFrame]:
@@ -139,30 +150,53 @@ def build_maps(
     """Return the map of every arm after all frames of a case; adds the time of each to `seconds`."""
     vocabulary = load_vocabulary()
     mappers = {arm.name: new_mapper(arm.fuse, vocabulary) for arm in arms}
-    own = {"backend": NETWORK} if case == NETWORK else {"backend": "ground-truth", "corruption": _level(case)}
-    backend = choose_backend(BackendRequest(SegmentParameters.model_validate(own), sequence=sequence, reader=reader))
+    asked = SegmentParameters.model_validate(_masks_of(case))
+    backend = choose_backend(BackendRequest(asked, sequence=sequence, reader=reader, seed=seed))
+    faults = drawn_faults(np.random.default_rng([seed, FAULT_STREAM])) if case == BENT else None
     poses = np.array([entry.frame.world_from_camera for entry in shared])
     if case == DRIFTING:
         poses = drifting_poses(poses, np.random.default_rng([seed, DRIFT_STREAM]))
     for entry, pose in zip(shared, poses, strict=True):
         frame, camera = entry.frame, reader.cameras[entry.frame.camera_name]
+        made = entry.geometric if faults is None else spoiled(frame, camera, faults, entry.geometric)
+        assert frame.depth is not None
+        depth = frame.depth if faults is None else faults.depth(frame.depth, camera)
         # The same generator for every case: levels differ in their rates alone.
         random = np.random.default_rng([seed, frame.index])
         masks = backend(frame, next(iter(entry.geometric.values()))[0], random)
+        if faults is not None:
+            masks = replace(masks, ids=faults.shifted(masks.ids))
         for arm in arms:
-            geometric, spent = entry.geometric[geometric_settings(arm.segment)]
+            geometric, spent = made[geometric_settings(arm.segment)]
             start = time.perf_counter()
             fuse = FUSION[arm.segment.fusion]
             fused = fuse(geometric.labels, masks, geometric.points, fusion_settings(arm.segment), geometric.small)
             listing = describe(frame.index, fused).segments
-            assert frame.depth is not None
-            mappers[arm.name].add_frame(camera, frame.depth, frame.color, pose, fused.ids, listing)
+            mappers[arm.name].add_frame(camera, depth, frame.color, pose, fused.ids, listing)
             seconds[arm.name] += spent + time.perf_counter() - start
     return mappers
 
 
-def _level(case: str) -> float:
-    return LEVELS[case.split("/")[0]]
+def _masks_of(case: str) -> dict[str, Any]:
+    """Return the options of `segment` of a case."""
+    if case == NETWORK:
+        return {"backend": NETWORK}
+    if case in LEVELS:
+        return {"backend": "ground-truth", "corruption": LEVELS[case]}
+    return {"backend": "ground-truth", "lasting": LASTING_CASES.get(case, LASTING_CASES[LASTING])}
+
+
+def spoiled(
+    frame: Frame, camera: Camera, faults: DepthFaults, wanted: Iterable[GeometricSettings]
+) -> dict[GeometricSettings, tuple[GeometricFrame, float]]:
+    """Return the geometric segments of a frame's spoiled depth, and the seconds they took."""
+    assert frame.depth is not None
+    depth, found = faults.depth(frame.depth, camera), {}
+    for each in wanted:
+        start = time.perf_counter()
+        geometric = segment_depth(depth, camera, each)
+        found[each] = (geometric, time.perf_counter() - start)
+    return found
 
 
 def finish_map(mapper: PanopticMapper, output: Path, seed: int) -> PanopticMap:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from benchmarks.experiments.mapping.arms import DRIFTING as DRIFTING_POSES
+from benchmarks.experiments.mapping.arms import LASTING
 from stages.cad.parameters import CadParameters
 from stages.graph.parameters import GraphParameters
 
@@ -20,28 +23,37 @@ class Arm:
     cad: CadParameters
 
 
-ARMS = (
-    Arm(
-        "thesis",
-        "thesis",
-        "thesis",
-        GraphParameters.model_validate({"method": "thesis"}),
-        CadParameters.model_validate({"method": "thesis"}),
-    ),
-    Arm(
-        "best_single",
-        "ours without the global check",
-        "ours",
-        GraphParameters.model_validate({}),
-        CadParameters.model_validate({"conflict_iterations": 0, "maximum_shift": 0.0}),
-    ),
-    Arm("ours", "ours", "ours", GraphParameters.model_validate({}), CadParameters.model_validate({})),
-)
-"""`best_single` takes what fits each object best by itself and puts it on its support."""
+THESIS: dict[str, object] = {"method": "thesis"}
+OURS: dict[str, object] = {"method": "ours"}
+RELEASED: dict[str, object] = {"candidates": 20, "area_threshold": 0.3, "minimum_scale": 0.3, "maximum_scale": 3.0}
+"""Where the released code is more lenient than the text: candidates, overlap with children; and no scale of a candidate
+is dropped that ours would have clipped."""
 
-PERFECT, RECONSTRUCTED, HELD_OUT, REAL = "perfect", "reconstructed", "held_out_shapes", "real"
-CASES = (PERFECT, RECONSTRUCTED, HELD_OUT)
+
+def _arm(name: str, title: str, map_arm: str, graph: Mapping[str, object], cad: Mapping[str, object]) -> Arm:
+    return Arm(name, title, map_arm, GraphParameters.model_validate(graph), CadParameters.model_validate(cad))
+
+
+ARMS = (
+    _arm("thesis", "thesis, constants of its text", "thesis", THESIS, THESIS),
+    _arm("thesis_released", "thesis, constants of its code", "thesis", THESIS, THESIS | RELEASED),
+    _arm("thesis_chosen", "thesis, our choices in the map", "thesis_chosen", THESIS, THESIS | RELEASED),
+    _arm("thesis_on_ours", "thesis, on our map", "ours", THESIS, THESIS | RELEASED),
+    _arm("ours_on_thesis", "ours, on the thesis's map", "thesis", OURS, OURS),
+    _arm(
+        "best_single", "ours without the global check", "ours", OURS, {"conflict_iterations": 0, "maximum_shift": 0.0}
+    ),
+    _arm("ours", "ours", "ours", OURS, OURS),
+)
+"""`best_single` takes what fits each object best by itself and puts it on its support. `thesis_on_ours` and
+`ours_on_thesis` tell apart what the map gives from what graph and models do."""
+OF_MAPS = frozenset({"thesis_chosen", "thesis_on_ours", "ours_on_thesis"})
+"""Arms that differ from others by their map alone, which a perfect one has not."""
+
+PERFECT, RECONSTRUCTED, DRIFTING, HELD_OUT, REAL = "perfect", "reconstructed", "drifting", "held_out_shapes", "real"
+CASES = (PERFECT, RECONSTRUCTED, DRIFTING, HELD_OUT)
 """Of the generated rooms. `perfect`: true surface that was seen, true labels. `reconstructed`: each arm's own map of
-noisy depth and true masks corrupted by 0.3 (the middle level of `make bench-mapping`). `held_out_shapes`: those maps,
-and a library of other shapes of the same classes."""
-MASK_LEVEL = "middle"
+noisy depth and true masks with errors that last (the headline of `make bench-mapping`); `drifting`: the same with poses
+that drift. `held_out_shapes`: the maps of `reconstructed`, and a library of other sizes of the same styles."""
+MAPS = {RECONSTRUCTED: LASTING, HELD_OUT: LASTING, DRIFTING: DRIFTING_POSES}
+"""Case -> case of `mapping`."""

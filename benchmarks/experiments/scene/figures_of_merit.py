@@ -48,6 +48,16 @@ def _ratio(outcomes: Sequence[Outcome], part: str, whole: str) -> float | None:
     return sum(o.cad.get(part) or 0.0 for o in outcomes) / total if total else None
 
 
+def _of_loose(name: str) -> Figure:
+    """Share of all things that have to be free, over all rooms."""
+
+    def figure(outcomes: Sequence[Outcome]) -> float | None:
+        loose = sum(o.physics["loose"] for o in outcomes)
+        return sum(o.physics[name] for o in outcomes) / loose if loose else None
+
+    return figure
+
+
 FIGURES: dict[str, Figure] = {
     "support_f1": edge_f1("support"),
     "supports_f1": edge_f1("supports"),
@@ -64,6 +74,7 @@ FIGURES: dict[str, Figure] = {
     "class_right": over_objects("class_right"),
     "true_model_first": over_objects("true_model_first"),
     "true_model_among_candidates": over_objects("true_model_among_candidates"),
+    "nearest_stand_in": per_room("cad", "nearest_stand_in", np.median),
     "scan2cad_success": over_objects("scan2cad_success"),
     "scan2cad_success_detected": over_objects("scan2cad_success_detected", "detected"),
     "scan2cad_success_every_axis": over_objects("scan2cad_success_every_axis"),
@@ -77,7 +88,14 @@ FIGURES: dict[str, Figure] = {
     "collisions": per_room("physics", "collisions"),
     "conflicts_before": per_room("cad", "conflicts_before"),
     "settled_rooms": per_room("physics", "settled_rooms"),
+    "settled_rooms_mujoco": per_room("physics", "settled_rooms_mujoco"),
+    "at_rest": _of_loose("at_rest"),
+    "at_rest_both": _of_loose("at_rest_both"),
+    "colliding": _of_loose("colliding"),
+    "held": _of_loose("held"),
+    "loose": per_room("physics", "loose"),
     "unsettled": per_room("physics", "unsettled"),
+    "unsettled_mujoco": per_room("physics", "unsettled_mujoco"),
     "movable": per_room("physics", "movable"),
     "blocked_joints": per_room("physics", "blocked_joints"),
     "joints_found": over_objects("joints_found", "joints_compared"),

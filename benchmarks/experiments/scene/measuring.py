@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,15 +14,17 @@ from pydantic import Field
 
 from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.mapping.experiment import EXPERIMENT as MAPPING
-from benchmarks.experiments.scene.arms import ARMS, HELD_OUT, MASK_LEVEL, PERFECT, REAL, Arm
-from benchmarks.generated_rooms import make_library, make_room, room_at
+from benchmarks.experiments.mapping.measuring import MappingParameters, room_for
+from benchmarks.experiments.scene.arms import ARMS, HELD_OUT, MAPS, PERFECT, REAL, Arm
+from benchmarks.experiments.scene.stand_ins import nearest_stand_in
+from benchmarks.generated_rooms import make_library, room_at, room_of
 from benchmarks.graph_scores import OPTIONS, distance_figures, judge
 from benchmarks.keeping import measure_missing
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import StepFailed, context_in, made, opened, unrecorded
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraphFile
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence as SequenceArtifact
@@ -34,8 +36,11 @@ from stages.evaluate.map_measures import label_true_points, load_map
 from stages.evaluate.replacement_measures import ObjectResult, replacements_of
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.kit.stage import Parameters
-from stages.urdf.settle_report import SettleReport, settle_report
+from stages.urdf.mobility import BUILT_IN, STANDS
+from stages.urdf.mujoco_settle import mujoco_motions
+from stages.urdf.settle_report import BodyMotion, SettleReport, settle_report
 
+ARM = {arm.name: arm for arm in ARMS}
 SEED = 0
 HELD_OUT_SEED = 501
 """Of the library whose shapes no room has."""
@@ -48,6 +53,7 @@ class SceneParameters(Parameters):
     maps: Path = Field(Path("outputs/experiments/bench-mapping"), description="What `mapping` writes: its rooms, maps")
     real: Path | None = Field(None, description="What `make real` wrote; the case `real` needs its maps")
     frames: int = Field(60, ge=1, description="Frames of every room")
+    width: int = Field(640, ge=64, description="Width of the pictures [pixels]; their height is three quarters of it")
     as_is: bool = Field(False, description="Take rooms and maps as they stand, even of older code")
     keep: bool = Field(False, description="Keep the artifacts (100 MB an arm and case)")
 
@@ -77,8 +83,8 @@ class Room:
     truth_artifact: GroundTruth
     truth: TrueRoom
     world_from_log: np.ndarray
-    maps: Mapping[str, Path]
-    """Arm of `mapping` -> its map of this room."""
+    maps: Mapping[tuple[str, str], Path]
+    """(case, arm of `mapping`) -> its map of this room."""
     libraries: Mapping[bool, CadLibrary]
     """Held out? -> library."""
 
@@ -92,7 +98,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
         for name, outcome in run_real(folder, scratch, [arm for arm in ARMS if (REAL, arm.name) in wanted]):
             yield wanted[REAL, name], outcome
         return
-    room = load_room(bench, trials[0].seed, with_maps=any(trial.case != PERFECT for trial in trials))
+    room = load_room(bench, trials[0].seed, {(MAPS[t.case], ARM[t.arm].map_arm) for t in trials if t.case in MAPS})
     for case in dict.fromkeys(trial.case for trial in trials):
         arms = [arm for arm in ARMS if (case, arm.name) in wanted]
         outcomes = run_case(room, arms, case, bench.out / "scenes", shared, keep=bench.parameters.keep)
@@ -112,22 +118,26 @@ def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
     made("library build", held_out_library(bench), "--seed", HELD_OUT_SEED)
 
 
-def load_room(bench: Bench, name: str, *, with_maps: bool) -> Room:
-    """Read a room, and make what is missing of it and of its maps. Raises BadInput or StepFailed."""
+def load_room(bench: Bench, name: str, wanted: Collection[tuple[str, str]]) -> Room:
+    """Read a room, and make what is missing of it and of the `wanted` maps, (case, arm) of `mapping`.
+
+    Raises BadInput or StepFailed.
+    """
     parameters: SceneParameters = bench.parameters
     rooms = parameters.maps / "rooms"
-    folder = room_at(rooms, name, parameters.frames)
+    of_maps = MappingParameters.model_validate({"frames": parameters.frames, "width": parameters.width})
+    folder = room_at(rooms, room_of(name), parameters.frames)
     if not (parameters.as_is and folder.ground_truth.is_dir() and folder.sequence.is_dir()):
-        folder = make_room(rooms, name, parameters.frames)
-    mapping = Bench(parameters.maps, MAPPING.parameters.model_validate({"frames": parameters.frames}), bench.quick)
-    trials = [Trial(arm, MASK_LEVEL, name) for arm in sorted({arm.map_arm for arm in ARMS})]
-    if with_maps and (code := measure_missing(MAPPING, mapping, trials, any_code=parameters.as_is)):
+        folder = room_for(rooms, name, of_maps)
+    mapping = Bench(parameters.maps, of_maps, bench.quick)
+    trials = [Trial(arm, case, name) for case, arm in sorted(wanted)]
+    if trials and (code := measure_missing(MAPPING, mapping, trials, any_code=parameters.as_is)):
         raise StepFailed(f"mapping of {name}", code)
     sequence, artifact = opened(SequenceArtifact, folder.sequence), opened(GroundTruth, folder.ground_truth)
     world_from_log = np.array(sequence.info.gravity.world_from_log)
     truth = load_truth(artifact, world_from_log, OPTIONS.minimum_visible_points)
     libraries = {False: CadLibrary(rooms / "cad_library"), True: CadLibrary(held_out_library(bench))}
-    maps = {trial.arm: mapping.folder(trial) / "panoptic_map" for trial in trials}
+    maps = {(trial.case, trial.arm): mapping.folder(trial) / "panoptic_map" for trial in trials}
     return Room(name, artifact, truth, world_from_log, maps, libraries)
 
 
@@ -147,6 +157,7 @@ class Shared:
         self.graphs: dict[tuple[Path, str], ContactGraphFile] = {}
         self.overlaps: dict[Path, dict[tuple[int, int], float]] = {}
         self.found: dict[tuple[str, Path, str], Found] = {}
+        """By case, map, and what decides the candidates."""
 
 
 def run_case(
@@ -158,7 +169,7 @@ def run_case(
     if case == PERFECT:
         perfect_map(room.truth_artifact, folder / "map")
     for arm in arms:
-        map_folder = folder / "map" if case == PERFECT else room.maps[arm.map_arm]
+        map_folder = folder / "map" if case == PERFECT else room.maps[MAPS[case], arm.map_arm]
         yield _run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, shared)
     if not keep:
         shutil.rmtree(folder)
@@ -171,7 +182,7 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
         built = unrecorded("graph", folder / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map)
         shared.graphs[of_graph] = built.info
     graph = shared.graphs[of_graph]
-    key = (case, panoptic_map.root, arm.cad.method)
+    key = (case, panoptic_map.root, arm.cad.model_dump_json(exclude={"conflict_iterations", "maximum_shift"}))
     context = context_in(folder / "cad_scene", SEED)
     replacing = METHODS[arm.cad.method](arm.cad)
     if key not in shared.found:
@@ -183,7 +194,7 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     start = time.process_time()
     scene = choose_and_write(graph, panoptic_map, library, found.shortlists, found.surfaces, replacing, context)
     seconds = found.seconds + time.process_time() - start
-    settled = settle(scene, folder / "interactive_scene")
+    physics, moved = settle(scene, graph, folder / "interactive_scene")
     if panoptic_map.root not in shared.overlaps:
         shared.overlaps[panoptic_map.root] = overlaps_of(room.truth, panoptic_map)
     overlaps = shared.overlaps[panoptic_map.root]
@@ -200,7 +211,14 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
     distance, edges = measure_graph(room.truth, graph, overlaps)
     summary = scene.info
-    extra = {
+    own = {model.id: model for model in room.libraries[False].info.models}
+    off = [nearest_stand_in(own[r.true_model], library.info.models) for r in measured.objects if r.true_model in own]
+    known = [value for value in off if value is not None]
+    # The ids of the two libraries are the same words for other models.
+    undefined = ("true_model_first", "true_model_among_candidates") if case == HELD_OUT else ()
+    extra: dict[str, float | None] = {
+        **dict.fromkeys(undefined),
+        "nearest_stand_in": float(np.median(known)) if known else None,
         "seconds_per_object": seconds / max(1, objects),
         "conflicts_before": float(summary.conflicts_before),
         "conflicts_after": float(summary.conflicts_after),
@@ -210,15 +228,29 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
         edges=edges,
         cad={**measured.summary, **extra},
         failures=tuple((r.name, r.class_name, why_no_success(r)) for r in measured.objects if not r.success),
-        physics=physics_of(settled),
-        unsettled=what_moved(settled),
+        physics=physics,
+        unsettled=moved,
     )
 
 
-def settle(scene: CadScene, folder: Path) -> SettleReport:
-    """Write the URDF scene and let it go."""
-    unrecorded("urdf", folder, seed=SEED, cad_scene=scene)
-    return settle_report(folder)
+def settle(scene: CadScene, graph: ContactGraphFile, folder: Path) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Write the URDF scene as it was reconstructed, without a rest in the engine before, and let it go in Bullet and in
+    MuJoCo; return figures, and what did not stay in words."""
+    unrecorded("urdf", folder, {"rest": False, "settle_seconds": 0.0}, seed=SEED, cad_scene=scene)
+    report = settle_report(folder)
+    other = {body.name: body for body in mujoco_motions(folder, report.seconds)}
+    return physics_of(report, other, loose_things(graph)), what_moved(report)
+
+
+def loose_things(graph: ContactGraphFile) -> frozenset[str]:
+    """Return the things that stand on the floor or on something and are not built in: those that have to be free."""
+    names = set()
+    for node in graph.nodes:
+        link = graph.parent_link(node.id)
+        stands = link is None or link.relation in STANDS
+        if node.id != SCENE_NODE and node.node_type != "layout" and stands and node.class_name not in BUILT_IN:
+            names.add(node.id)
+    return frozenset(names)
 
 
 def annotated_runs(real: Path | None) -> list[str]:
@@ -247,9 +279,9 @@ def run_real(folder: Path, scratch: Path, arms: Sequence[Arm]) -> Iterator[tuple
         scene = unrecorded(
             "cad", scratch / arm.name / "cad_scene", arm.cad, seed=SEED, contact_graph=graph, library=library, **given
         )
-        settled = settle(scene, scratch / arm.name / "interactive_scene")
+        physics, moved = settle(scene, graph.info, scratch / arm.name / "interactive_scene")
         distance, edges = measure_graph(truth, graph.info, overlaps)
-        yield arm.name, Outcome(distance, edges, physics=physics_of(settled), unsettled=what_moved(settled))
+        yield arm.name, Outcome(distance, edges, physics=physics, unsettled=moved)
 
 
 def overlaps_of(truth: TrueRoom, panoptic_map: PanopticMap) -> dict[tuple[int, int], float]:
@@ -268,12 +300,26 @@ def measure_graph(
     return parts, {name: (found.true_count, found.predicted_count, found.agreed) for name, found in edges.items()}
 
 
-def physics_of(report: SettleReport) -> dict[str, float]:
-    """Return the figures of a settle test."""
+def physics_of(report: SettleReport, other: Mapping[str, BodyMotion], loose: Collection[str]) -> dict[str, float]:
+    """Return the figures of a settle test.
+
+    `other`: movable bodies as another engine saw them; `loose`: things that have to be free: one that is held, since
+    nothing level is below it or it lies in something, is none that is at rest.
+    """
+    struck = {name for pair in report.collisions for name in (pair.first, pair.second)}
+    stay = {body.name for body in report.bodies if body.stays}
+    stay_there = {name for name, body in other.items() if body.stays}
     return {
         "settled_rooms": float(report.settled),
+        "settled_rooms_mujoco": float(report.settled and all(body.stays for body in other.values())),
         "movable": float(len(report.bodies)),
         "unsettled": float(len(report.unsettled)),
+        "unsettled_mujoco": float(len(other) - len(stay_there)),
+        "loose": float(len(loose)),
+        "at_rest": float(len(stay & set(loose))),
+        "at_rest_both": float(len(stay & stay_there & set(loose))),
+        "colliding": float(len(struck & set(loose))),
+        "held": float(len(set(loose) - {body.name for body in report.bodies})),
         "joints": float(len(report.joints)),
         "blocked_joints": float(len(report.blocked)),
         "max_penetration_mm": report.max_penetration_mm,

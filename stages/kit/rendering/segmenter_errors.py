@@ -11,6 +11,8 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
+import numpy as np
+
 GRASPS = 140 / 2 + 122 / 4
 """**Assumed** of the 262 executions: every second one at a table, one of four on the move."""
 FALSE_POSITIVES, MISSED = 8, 2
@@ -50,6 +52,20 @@ class Luck:
     def happens(self, rate: float, *key: object) -> bool:
         """Return whether the number of a key is below a rate: what happens at a rate happens at every higher one."""
         return self.uniform(*key) < rate
+
+
+SECTORS = 8
+"""Regions of views around a thing."""
+NEAR = 1.5
+"""From nearer than this is another region [m]."""
+
+
+def view_region(camera: np.ndarray, points: np.ndarray) -> tuple[int, int]:
+    """Return from where a thing is looked at: the eighth of a turn in which the camera (3,) stands around the middle of
+    what is seen of it, points (N, 3) [m] in a world whose z is up, and whether it is near (1) or far (0)."""
+    away = np.asarray(camera, float) - np.median(points, axis=0)
+    eighth = int(np.floor((np.arctan2(away[1], away[0]) + np.pi) / (2 * np.pi) * SECTORS)) % SECTORS
+    return eighth, int(np.linalg.norm(away) < NEAR)
 
 
 class SegmenterErrors:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,14 @@ from pydantic import TypeAdapter
 
 from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.mapping.arms import EVERYWHERE, SHOWN, all_arms
+from benchmarks.experiments.mapping.depth_faults import BENDING, BIAS, SHIFT, DepthFaults, drawn_faults
 from benchmarks.experiments.mapping.drift import TRANSLATION_PER_METRE, drifting_poses
 from benchmarks.experiments.mapping.experiment import EXPERIMENT
 from benchmarks.experiments.mapping.figures_of_merit import MEASURES, pooled_curve
 from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, ranked
-from benchmarks.generated_rooms import REPORTING, TUNING
+from benchmarks.generated_rooms import DRAWS, REPORTING, TUNING, error_seed, room_of, with_draws
 from benchmarks.results import figures_of, table
+from schemas.scene_parts import Camera
 from stages.kit.measurement.average_precision import Candidates, average_precision
 from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.synthesize.recipes import load_recipe
@@ -50,6 +53,34 @@ def test_drift_grows_with_the_square_root_of_the_way() -> None:
     assert np.std(ends) == pytest.approx(TRANSLATION_PER_METRE * 2.0, rel=0.2)
 
 
+def test_errors_are_drawn_by_recipe_seed_and_draw() -> None:
+    seeds = with_draws(REPORTING)
+    assert len(seeds) == DRAWS * len(REPORTING) and len({error_seed(seed) for seed in seeds}) == len(seeds)
+    assert [room_of(seed) for seed in seeds[: len(REPORTING)]] == list(REPORTING)
+    assert EXPERIMENT.cluster(seeds[0]) == EXPERIMENT.cluster(seeds[len(REPORTING)]) == REPORTING[0]
+
+
+def test_depth_is_scaled_bent_and_beside_the_picture() -> None:
+    camera = Camera(width=65, height=49, fx=60, fy=60, cx=32, cy=24)
+    depth = np.full((49, 65), 2.0, np.float32)
+    depth[0, 0] = 0
+    bent = DepthFaults(0.01, 0.005, (0, 0)).depth(depth, camera)
+    assert (
+        bent[24, 32] == pytest.approx(2.02)
+        and bent[48, 64] == pytest.approx(1.01 / (1 / 2 - 0.005))
+        and bent[0, 0] == 0
+    )
+    ids = np.zeros((48, 640), np.int32)
+    ids[20:30, 100:120] = 7
+    moved = DepthFaults(0, 0, (4.0, -3.0)).shifted(ids)
+    assert np.array_equal(moved[17:27, 104:124], ids[20:30, 100:120]) and (moved == 7).sum() == 200
+    ids[:] = 7
+    assert (DepthFaults(0, 0, (4.0, -3.0)).shifted(ids) == 7).sum() == 636 * 45, "nothing comes in over the border"
+    drawn = [drawn_faults(np.random.default_rng(k)) for k in range(50)]
+    assert max(abs(f.bias) for f in drawn) <= BIAS and max(abs(f.bending) for f in drawn) <= BENDING
+    assert max(abs(v) for f in drawn for v in f.shift) <= SHIFT and min(f.bias for f in drawn) < 0
+
+
 def test_rooms_and_arms_are_those_that_are_stated() -> None:
     assert (len(TUNING), len(REPORTING), len(set(REPORTING))) == (10, 20, 20)
     for name in TUNING + REPORTING:
@@ -74,9 +105,23 @@ def test_figures_are_pooled_before_they_are_divided() -> None:
     rooms = [outcome(3, 1), outcome(1, 5)]
     # Chairs: 4 of 10 found at IoU 0.8, SQ 0.8, RQ 4 / (4 + 3); floors 0.9.
     assert MEASURES["pq"].of(rooms) == pytest.approx((0.8 * 4 / 7 + 0.9) / 2)
+    # By room: (0.8 * 3 / 3.5 + 0.9) / 2 and (0.8 * 1 / 3.5 + 0.9) / 2.
+    assert MEASURES["pq_rooms"].of(rooms) == pytest.approx((0.8 * 2 / 3.5 + 0.9) / 2)
+    assert (
+        MEASURES["pq_fixed"].of(rooms) == pytest.approx(MEASURES["pq"].of(rooms)) and MEASURES["ghosts"].of(rooms) == 0
+    )
     assert MEASURES["instance_ap"].of(rooms) == pytest.approx(0.4)
     assert MEASURES["instance_ap_thesis_code"].of(rooms) == pytest.approx(1.0), "recall that was not reached counts"
     assert MEASURES["frames_per_second"].of(rooms) == pytest.approx(5.0)
+
+
+def test_a_class_of_false_finds_alone_counts_where_it_is_said_to() -> None:
+    room = outcome(3, 1)
+    haunted = replace(room, qualities={**room.qualities, "door": ClassQuality(0, 2, 0, 0.0)})
+    whole = MEASURES["pq_rooms"].of([room])
+    assert whole is not None
+    assert MEASURES["pq_rooms"].of([haunted]) == whole and MEASURES["pq_fixed"].of([haunted]) == pytest.approx(whole)
+    assert MEASURES["ghosts"].of([haunted]) == 2 and MEASURES["pq"].of([haunted]) == pytest.approx(whole * 2 / 3)
 
 
 def test_pooled_rooms_share_the_ranking_but_not_the_truth() -> None:
@@ -94,8 +139,8 @@ def test_figures_are_there_for_every_arm_and_class_and_the_thesis_beside() -> No
     results = results_of({key: outcome(*counts) for key, counts in found.items()})
     figures = figures_of(results)
     # Chairs of both rooms: 7 of 8 found, PQ 0.8 * 7 / 7.5.
-    assert figures["ours/middle/pq_chair"].value == pytest.approx(0.8 * 7 / 7.5)
-    assert figures["ours/middle/pq"].low is not None and figures["ours/middle/sq"].low is None
+    assert figures[f"ours/{SHOWN}/pq_chair"].value == pytest.approx(0.8 * 7 / 7.5)
+    assert figures[f"ours/{SHOWN}/pq_rooms"].low is not None and figures[f"ours/{SHOWN}/sq"].low is None
     text = table(results, figures)
-    assert "| middle: ours – thesis |" in text and "| middle, b |" in text
+    assert f"| {SHOWN}: ours – thesis |" in text and f"| {SHOWN}, b |" in text
     assert "| Han 2024: ours | 35.4 | 80.5 | 43.1 | 58.1 | 45.3 |" in text

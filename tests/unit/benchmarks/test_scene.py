@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.scene import measuring
-from benchmarks.experiments.scene.arms import ARMS, MASK_LEVEL, PERFECT, REAL
+from benchmarks.experiments.scene.arms import ARMS, MAPS, PERFECT, REAL, RECONSTRUCTED
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
-from benchmarks.experiments.scene.measuring import Outcome, SceneParameters
+from benchmarks.experiments.scene.measuring import Outcome, SceneParameters, physics_of
+from benchmarks.experiments.scene.stand_ins import off_by
 from benchmarks.generated_rooms import RoomFolder
 from benchmarks.results import figures_of, table
+from stages.urdf.scene_penetration import Overlap
+from stages.urdf.settle_report import BodyMotion, SettleReport
 
 GRAPH = {"edit_distance": 4.0, "wrong_support": 1.0, "missing_detection": 2.0, "wrong_detection": 0.0}
 
@@ -21,7 +25,8 @@ GRAPH = {"edit_distance": 4.0, "wrong_support": 1.0, "missing_detection": 2.0, "
 def outcome(agreed: int, objects: int, success: float) -> Outcome:
     cad: dict[str, float | None] = {"true_objects": objects, "detected": objects, "replaced": objects}
     cad |= {"scan2cad_success": success, "translation_error_m_mean": 0.02, "rotation_error_rad_mean": 0.1}
-    physics = {"settled_rooms": 1.0, "collisions": 0.0}
+    physics = {"settled_rooms": 1.0, "collisions": 0.0, "settled_rooms_mujoco": 1.0, "loose": float(objects)}
+    physics |= dict.fromkeys(("at_rest", "at_rest_both", "colliding", "held"), 0.0)
     return Outcome(GRAPH, {"support": (10, 10, agreed)}, cad, physics=physics)
 
 
@@ -72,11 +77,12 @@ def test_maps_that_are_missing_are_measured_by_the_mapping_experiment(tmp_path: 
         asked.append((bench.out, trials))
         return 3
 
-    monkeypatch.setattr(measuring, "make_room", lambda root, name, frames: RoomFolder(name, root / name))
+    monkeypatch.setattr(measuring, "room_for", lambda root, name, parameters: RoomFolder(name, root / name))
     monkeypatch.setattr(measuring, "measure_missing", measure_missing)
+    case = MAPS[RECONSTRUCTED]
     with pytest.raises(measuring.StepFailed) as failure:
-        measuring.load_room(bench_in(tmp_path), "kitchen-1", with_maps=True)
-    wanted = [Trial(arm, MASK_LEVEL, "kitchen-1") for arm in sorted({arm.map_arm for arm in ARMS})]
+        measuring.load_room(bench_in(tmp_path), "kitchen-1+0", {(case, arm.map_arm) for arm in ARMS})
+    wanted = [Trial(arm, case, "kitchen-1+0") for arm in sorted({arm.map_arm for arm in ARMS})]
     assert asked == [(tmp_path / "maps", wanted)] and failure.value.exit_code == 3
 
 
@@ -97,3 +103,34 @@ def test_real_logs_begin_with_empty_folders(tmp_path: Path, monkeypatch) -> None
     monkeypatch.setattr(measuring, "unrecorded", build)
     with pytest.raises(InterruptedError):
         next(measuring.run_real(tmp_path / "kitchen", tmp_path / "kitchen", ARMS))
+
+
+def test_what_has_to_be_free_and_is_held_is_not_at_rest() -> None:
+    stays, leaves = BodyMotion("cup_1", 0.0, 0.0, False), BodyMotion("chair_2", 0.2, 0.0, False)
+    report = SettleReport(3.0, (stays, leaves), (), (Overlap("desk_3", "cup_1", "desk_3", "cup_1", 0.009),))
+    there = {"cup_1": stays, "chair_2": BodyMotion("chair_2", 0.0, 0.0, False)}
+    found = physics_of(report, there, {"cup_1", "chair_2", "desk_3", "lamp_4"})
+    assert (found["loose"], found["at_rest"], found["at_rest_both"], found["held"]) == (4, 1, 1, 2)
+    assert (found["colliding"], found["settled_rooms"], found["unsettled_mujoco"]) == (2, 0, 0)
+    of_rooms = outcome(10, 4, 1.0)
+    of_rooms.physics.update(found)
+    assert FIGURES["at_rest"]([of_rooms]) == 0.25 and FIGURES["colliding"]([of_rooms]) == 0.5
+
+
+def test_arms_that_differ_by_their_map_run_where_there_is_one() -> None:
+    assert EXPERIMENT.runs("thesis_on_ours", RECONSTRUCTED) and not EXPERIMENT.runs("thesis_on_ours", PERFECT)
+    maps = {arm.name: (arm.map_arm, arm.graph.method, arm.cad.method) for arm in ARMS}
+    assert maps["ours_on_thesis"] == ("thesis", "ours", "ours") and maps["thesis_on_ours"] == (
+        "ours",
+        "thesis",
+        "thesis",
+    )
+
+
+def test_a_stand_in_is_as_far_off_as_its_worst_edge_at_the_best_scale() -> None:
+    true = np.array([1.0, 2.0, 0.5])
+    assert off_by(true, 0.7 * true) == pytest.approx(0.0, abs=1e-12), "one scale"
+    worse = off_by(true, true * [1.0, 1.2, 0.9])
+    assert worse == pytest.approx(
+        min(np.abs(s * np.array([1.0, 1.2, 0.9]) - 1).max() for s in np.linspace(0.8, 1.2, 4001)), abs=1e-3
+    )

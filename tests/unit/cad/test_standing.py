@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from stages.cad.coloring import part_colors
 from stages.cad.conflicts import convex_solid, penetration
 from stages.cad.free_space import NOTHING_KNOWN, load_free_space
 from stages.cad.free_spots import free_spot
+from stages.cad.model_surfaces import Look
 from stages.cad.scoring import balance_margin, filled_space
 from stages.kit.geometry.boxes import box_from_bounds
 from tests.panoptic_maps import box_mesh, write_map
@@ -133,3 +135,31 @@ def test_parts_take_the_colours_of_their_vertices(library):
     assert part_colors(surface, placement, points, normals, colors) == {"body": (30, 40, 250), "door": (200, 10, 20)}
     far = part_colors(surface, placement, points + [0, 0, 9.0], normals, colors)
     assert far == {}
+
+
+def test_what_is_taken_is_by_how_much_the_seen_surface_differs(library):
+    """Of a model whose triangles have two colours the half that was seen is a little darker: so is all of it then."""
+    surface, placement = placement_at(library, "box_cube", (0, 0, 0), 0.0, 1.0)
+    points, normals = surface_points(mesh_of(library, "box_cube", (0, 0, 0), 0.0, 1.0))
+    look = surface.looks["body"]
+    two = Look(np.where(np.arange(len(look.areas))[:, None] % 3 == 0, [200.0, 60, 50], [240.0, 230, 220]), look.areas)
+    painted = replace(surface, looks={"body": two})
+    nearest = surface.closest(points, {}, normals)
+    seen = np.round(two.colors[nearest.triangle] - 20.0).astype(np.uint8)
+    top = normals[:, 2] > 0.9
+    taken = part_colors(painted, placement, points[top], normals[top], seen[top])["body"]
+    assert np.allclose(taken, two.mean - 20.0, atol=1.0)
+
+
+def test_a_part_that_nobody_saw_follows_one_of_its_colour(library):
+    where = ((0, 0, 0), 0.0, 1.0, {"door_hinge": 2.0})
+    surface, placement = placement_at(library, "fridge_small", *where)
+    points, normals = surface_points(mesh_of(library, "fridge_small", *where))
+    body = surface.closest(points, placement.shape.joints, normals).part == surface.model.parts.index("body")
+    colors = np.tile(np.array([[30, 40, 250]], np.uint8), (len(points), 1))
+    alike = {"body": (100.0, 100, 100), "door": (104.0, 100, 98)}
+    other = alike | {"door": (200.0, 20, 20)}
+    for means, expected in ((alike, (34, 40, 248)), (other, (200, 20, 20))):
+        looks = {k: Look(np.tile([means[k]], (len(v.areas), 1)), v.areas) for k, v in surface.looks.items()}
+        found = part_colors(replace(surface, looks=looks), placement, points[body], normals[body], colors[body])
+        assert found == {"body": (30, 40, 250), "door": expected}

@@ -74,6 +74,13 @@ def test_what_is_free(graph: ContactGraphFile, expected: Mobility) -> None:
     assert mobility(graph, node, (), (node.class_name,)) == Mobility(False)
 
 
+@pytest.mark.parametrize(("class_name", "expected"), [("microwave", FREE), ("desk", FREE), ("fridge", Mobility(False))])
+def test_what_has_doors_and_is_not_built_in_is_free(class_name: str, expected: Mobility) -> None:
+    graph = graph_with(class_name)
+    node = next(node for node in graph.nodes if node.id == "thing_2").model_copy(update={"node_type": "articulated"})
+    assert mobility(graph, node, CARRIABLE, ()) == expected
+
+
 def chair_mesh() -> trimesh.Trimesh:
     """Seat, back and four legs, 0.8 m high, as surfaces."""
     parts = [trimesh.creation.box((0.5, 0.5, 0.06)), trimesh.creation.box((0.5, 0.06, 0.4))]

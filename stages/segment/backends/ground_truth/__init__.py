@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from stages.kit.stage import Parameters
@@ -14,6 +16,9 @@ class GroundTruthParameters(Parameters):
     corruption: float = Field(
         0.0, ge=0, le=1, description="Level of the errors put into ground-truth masks (0 none; part of every name)"
     )
+    lasting: Literal["none", "detector", "network"] = Field(
+        "none", description="Errors that last from frame to frame instead, at the rates of a segmenter on real frames"
+    )
 
 
 BACKEND = BackendDeclaration(
@@ -23,5 +28,5 @@ BACKEND = BackendDeclaration(
     apart=True,
     needs=frozenset({"labels"}),
     parameters=GroundTruthParameters,
-    exclusive=("corruption",),
+    exclusive=("corruption", "lasting"),
 )

@@ -8,8 +8,11 @@ from schemas.errors import BadInput
 from schemas.sequence import SequenceFile
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.kit.geometry.transforms import apply
 from stages.segment.backends.ground_truth import GroundTruthParameters
 from stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
+from stages.segment.backends.ground_truth.lasting import LastingErrors, View
+from stages.segment.backends.ground_truth.lasting_rates import RATES
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame, PanopticMask
@@ -24,7 +27,9 @@ class GroundTruthBackend:
     name = "ground-truth"
     streams: tuple[str, ...] = ("depth", "labels")
 
-    def __init__(self, sequence: SequenceFile, vocabulary: Vocabulary, level: float) -> None:
+    def __init__(
+        self, sequence: SequenceFile, vocabulary: Vocabulary, level: float, lasting: str = "none", seed: int = 0
+    ) -> None:
         if "labels" not in sequence.streams or not sequence.label_table:
             raise BadInput(
                 "this sequence has no ground-truth labels",
@@ -32,6 +37,8 @@ class GroundTruthBackend:
             )
         self.corruption = level
         self.label = f"ground-truth masks, corruption {level:g}"
+        if lasting != "none":
+            self.label = f"ground-truth masks, lasting errors of a {lasting}"
         self._rates = rates_of_level(level)
         self._corrupted = level > 0
         self._masks: dict[int, PanopticMask] = {}
@@ -53,6 +60,10 @@ class GroundTruthBackend:
             True: tuple(c.id for c in named if c.kind == "thing"),
             False: tuple(c.id for c in named if c.kind == "stuff"),
         }
+        things = {entry.name: entry.id for entry in vocabulary.classes if entry.kind == "thing"}
+        self._lasting = (
+            None if lasting == "none" else LastingErrors(RATES[lasting], seed, things, max(self._masks, default=0) + 1)
+        )
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
         """Return the masks of a frame. Raises BadInput when the frame has no labels."""
@@ -61,10 +72,16 @@ class GroundTruthBackend:
         ids = self._lookup[frame.labels]
         present = set(np.unique(ids).tolist()) - {0}
         true = PanopticFrame(ids=ids, masks={i: self._masks[i] for i in sorted(present)})
+        if self._lasting is not None:
+            pose = np.eye(4) if frame.world_from_camera is None else frame.world_from_camera
+            seen = frame.depth > 0 if frame.depth is not None else np.zeros(ids.shape, bool)
+            view = View(apply(pose, geometric.points), seen, pose[:3, 3], frame.index)
+            return self._lasting.spoil(true, view)
         return corrupt(true, self._rates, self._classes, random) if self._corrupted else true
 
 
 def open_backend(request: BackendRequest) -> GroundTruthBackend:
     """Return the backend that the request asks for. Raises UsageError without a log, BadInput as the class does."""
     sequence, _ = request.log()
-    return GroundTruthBackend(sequence.info, load_vocabulary(), request.own(GroundTruthParameters).corruption)
+    own = request.own(GroundTruthParameters)
+    return GroundTruthBackend(sequence.info, load_vocabulary(), own.corruption, own.lasting, request.seed)

@@ -1,0 +1,184 @@
+"""Errors of true masks that last, at the rates of real segmenters on real frames.
+
+A network that takes a kettle for a cup takes it for one in the next frame as well; votes mend nothing there. So an
+error is drawn once for a thing, once for a thing and a region of views (`view_region`), or anew in every frame, and
+which of the three a thing has is drawn too, in shares that give two sights of a thing the correlation that was
+measured: of two sights from one region, and from two. False masks lie on places of floor and walls, and stay there.
+
+Rates: `python -m benchmarks.segmenter_rates`, docs/results/mapping.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from stages.kit.rendering.segmenter_errors import Luck, view_region
+from stages.segment.backends.ground_truth.corruption import displace_boundaries
+from stages.segment.panoptic import PanopticFrame, PanopticMask
+
+CELL = 0.5
+"""Edge of the cubes of which each is one place for a false mask [m]."""
+FALSE_RADIUS = (0.1, 0.3)
+"""**Assumed**: size of false masks [m]."""
+LEAST_CELL_PIXELS = 400
+"""Of a place that is in view, at 640 pixels of width."""
+BOUNDARY = 2.4
+"""**Assumed**: standard deviation of boundaries [pixels at 640 width], drawn anew in every frame."""
+NEVER_SEEN = 5.0
+"""Weight of what all wrong names are, beside those of a class, in sights: a class that was rarely seen is confused as
+others are."""
+
+
+@dataclass(frozen=True)
+class Alike:
+    """How alike an error is in two sights of one thing: correlation from one region of views, and from two."""
+
+    same_region: float
+    other_region: float
+
+    def key(self, luck: Luck, error: str, thing: object, region: object, frame: int) -> tuple[object, ...]:
+        """Return what an error of a thing is drawn by: once for good, by region, or by frame."""
+        kind = luck.uniform("kind", error, thing)
+        if kind < self.other_region:
+            return error, thing
+        return (error, thing, region) if kind < self.same_region else (error, thing, region, "frame", frame)
+
+
+@dataclass(frozen=True)
+class LastingRates:
+    """What a segmenter gets wrong. Rates are of the sights of things that the errors before left whole; that of
+    `false_masks` is a frame."""
+
+    missed: float
+    merged: float
+    split: float
+    wrong_name: float
+    false_masks: float
+    missed_alike: Alike
+    name_alike: Alike
+    confusion: Mapping[str, Mapping[str, int]]
+    """True class -> wrong class -> sights."""
+    false_names: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the pixels of a frame are."""
+
+    points: np.ndarray
+    """(H, W, 3) [m], world."""
+    seen: np.ndarray
+    """(H, W) bool: whether there is a point."""
+    camera: np.ndarray
+    """(3,) [m], world."""
+    frame: int
+
+
+class LastingErrors:
+    """The errors of one segmenter in one room.
+
+    `seed` names the draw; `classes`: name -> id of those that may be given; ids of masks are below `first_free`.
+    """
+
+    def __init__(self, rates: LastingRates, seed: int, classes: Mapping[str, int], first_free: int) -> None:
+        self._rates, self._luck, self._classes, self._free = rates, Luck(seed), classes, first_free
+        self._names = {number: name for name, number in classes.items()}
+
+    def spoil(self, true: PanopticFrame, view: View) -> PanopticFrame:
+        """Return the frame with masks missed, merged, split, of wrong names, and false ones, in this order.
+
+        Masks keep their ids; new ones get higher ones, the same in every frame.
+        """
+        ids, masks, rates = true.ids.copy(), dict(true.masks), self._rates
+        things = {k: (true.ids == k) & view.seen for k, mask in sorted(masks.items()) if mask.is_thing}
+        regions = {k: view_region(view.camera, view.points[own]) for k, own in things.items() if own.any()}
+
+        def struck(error: str, rate: float, alike: Alike) -> list[int]:
+            keys = {k: alike.key(self._luck, error, k, region, view.frame) for k, region in regions.items()}
+            return [k for k, key in keys.items() if k in masks and self._luck.happens(rate, *key)]
+
+        for k in struck("missed", rates.missed, rates.missed_alike):
+            ids[ids == k] = 0
+            del masks[k]
+        for k in struck("merged", rates.merged, rates.missed_alike):
+            self._merge(ids, masks, k)
+        for k in struck("split", rates.split, rates.missed_alike):
+            self._split(ids, masks, k, view)
+        for k in struck("name", rates.wrong_name, rates.name_alike):
+            key = rates.name_alike.key(self._luck, "name", k, regions[k], view.frame)
+            wrong = self._wrong_name(self._names[masks[k].category_id], self._luck.uniform("which", *key))
+            for part in {k, self._free + k} & set(masks):
+                masks[part] = replace(masks[part], category_id=self._classes[wrong])
+        self._false_masks(ids, masks, true, view)
+        random = np.random.default_rng([int(self._luck.uniform("edges") * 2**32), view.frame])
+        ids = displace_boundaries(ids, BOUNDARY * ids.shape[1] / 640, random)
+        present = set(np.unique(ids).tolist())
+        return PanopticFrame(ids=ids, masks={k: mask for k, mask in masks.items() if k in present})
+
+    def _merge(self, ids: np.ndarray, masks: dict[int, PanopticMask], number: int) -> None:
+        """Give the mask's pixels to the thing that it has most of its border with; nothing happens without one."""
+        own = (ids == number).astype(np.uint8)
+        around = ids[(cv2.dilate(own, np.ones((5, 5), np.uint8)) != 0) & (own == 0)]
+        values, counts = np.unique(around, return_counts=True)
+        beside = [
+            (int(n), int(v)) for v, n in zip(values, counts, strict=True) if v in masks and masks[int(v)].is_thing
+        ]
+        if beside:
+            ids[ids == number] = max(beside)[1]
+            del masks[number]
+
+    def _split(self, ids: np.ndarray, masks: dict[int, PanopticMask], number: int, view: View) -> None:
+        """Cut the mask by an upright plane of the room through the middle of what is seen of it."""
+        own = (ids == number) & view.seen
+        if not own.any():
+            return
+        angle = np.pi * self._luck.uniform("cut", number)
+        along = view.points[own][:, :2] @ np.array([np.cos(angle), np.sin(angle)])
+        far = np.zeros_like(own)
+        far[own] = along > np.median(along)
+        ids[far] = self._free + number
+        masks[self._free + number] = masks[number]
+
+    def _wrong_name(self, true: str, chance: float) -> str:
+        """Return the class that a thing of class `true` is taken for, by a number in [0, 1)."""
+        every: dict[str, float] = {}
+        for row in self._rates.confusion.values():
+            for name, count in row.items():
+                every[name] = every.get(name, 0.0) + count
+        total = sum(every.values())
+        own = self._rates.confusion.get(true, {})
+        weights = {
+            name: own.get(name, 0) + NEVER_SEEN * every.get(name, 0.0) / total
+            for name in sorted(every)
+            if name != true and name in self._classes
+        }
+        reach = np.cumsum(list(weights.values()))
+        return list(weights)[int(np.searchsorted(reach, chance * reach[-1], side="right"))]
+
+    def _false_masks(self, ids: np.ndarray, masks: dict[int, PanopticMask], true: PanopticFrame, view: View) -> None:
+        """Put masks of things where floor and walls are: in places that every frame agrees on."""
+        things = [k for k, mask in true.masks.items() if mask.is_thing]
+        bare = view.seen & (true.ids > 0) & ~np.isin(true.ids, things)
+        cells, which = np.unique(np.floor(view.points[bare] / CELL).astype(int), axis=0, return_inverse=True)
+        least = LEAST_CELL_PIXELS * (ids.shape[1] / 640) ** 2
+        large = [k for k, count in enumerate(np.bincount(which.ravel(), minlength=len(cells))) if count >= least]
+        names = sorted(set(self._rates.false_names) & set(self._classes))
+        reach = np.cumsum([self._rates.false_names[name] for name in names])
+        for k in large:
+            cell = tuple(int(v) for v in cells[k])
+            middle = np.median(view.points[bare][which.ravel() == k], axis=0)
+            region = view_region(view.camera, middle[None])
+            key = self._rates.missed_alike.key(self._luck, "false", cell, region, view.frame)
+            if not self._luck.happens(self._rates.false_masks / len(large), *key):
+                continue
+            low, high = FALSE_RADIUS
+            radius = low + (high - low) * self._luck.uniform("radius", cell)
+            near = bare & (np.linalg.norm(view.points - (np.array(cell) + 0.5) * CELL, axis=2) < radius + CELL / 2)
+            name = names[int(np.searchsorted(reach, self._luck.uniform("false name", cell) * reach[-1], side="right"))]
+            number = 2 * self._free + int(self._luck.uniform("number", cell) * 2**20)
+            ids[near] = number
+            masks[number] = PanopticMask(self._classes[name], True)
