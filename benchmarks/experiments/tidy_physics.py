@@ -17,6 +17,7 @@ from benchmarks.experiments.tidy_fast.arms import DELAYS, OURS
 from benchmarks.tabulation import markdown
 from benchmarks.tidy.rivals import against, faster, no_slower
 from stages.kit.measurement.bootstrap import Interval
+from stages.kit.measurement.proportions import wilson_interval
 from stages.tableware.planning.choice import make_policy
 from stages.tableware.planning.joint import JointPolicy
 from stages.tableware.planning.policy import Policy
@@ -142,6 +143,11 @@ def more_figures(results: Results) -> dict[str, float | Interval | None]:
         if not delay_of(trial.case):
             at = f"{trial.arm}/{'truth' if '/truth' in trial.case else 'image'}"
             sums.update({f"{at}/tables": 1, f"{at}/failed_tables": run.failed, f"{at}/lost_tables": run.dropped > 0})
+    for at in {name.rsplit("/", 1)[0] for name in sums}:
+        tables = sums[f"{at}/tables"]
+        for what in ("failed", "lost"):
+            count = sums[f"{at}/{what}_tables"]
+            flat[f"{at}/{what}"] = Interval(count / tables, *wilson_interval(count, tables))
     return flat | {name: float(value) for name, value in sums.items()}
 
 

@@ -85,9 +85,8 @@ def needle_radii(angles: np.ndarray, shape: NeedleShape = USUAL_NEEDLE) -> np.nd
 def needle_line(pose: NeedlePose, angles: np.ndarray, shape: NeedleShape = USUAL_NEEDLE) -> np.ndarray:
     """Return the wire's middle (N, 3) [m] at arc angles [rad]; `pose` is that of the half circle nearest to it."""
     ends = (2.0 * angles / np.pi - 1.0) ** 2 - 1.0 / 3.0
-    line = pose.points(angles)
-    outward = (line - pose.centre) * (shape.radius * (1.0 + shape.opened * ends) / NEEDLE_RADIUS)[:, None]
-    return np.asarray(pose.centre + outward + (shape.warped * ends)[:, None] * pose.normal)
+    line = pose.points(angles, shape.radius * (1.0 + shape.opened * ends))
+    return np.asarray(line + (shape.warped * ends)[:, None] * pose.normal)
 
 
 def needle_tube(pose: NeedlePose, pieces: int = 120, shape: NeedleShape = USUAL_NEEDLE) -> Tubes:
