@@ -102,8 +102,8 @@ def seconds(which: str) -> Measure:
 EXPERIMENT = Experiment(
     name="stitch_follow",
     title="A needle followed from pair to pair",
-    simulated="Needle, thread, drivers and pad before an endoscope, 1280 x 960 pixels; the needle moves by some 3 mm "
-    "and 6 degrees from pair to pair.",
+    simulated="Needle, thread, drivers and pad before an endoscope, 1280 x 960 pixels; the needle moves by a few "
+    "millimetres and degrees from pair to pair.",
     knows="The needle's radius and its taper, which is the renderer's own; most of the calibration; masks are the "
     "network's.",
     does_not_show="Anything about real pictures; a needle that goes far between two pairs; a second needle that comes "
