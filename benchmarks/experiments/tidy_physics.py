@@ -128,12 +128,19 @@ def items_lost(runs: Sequence[Run]) -> float:
     return sum(run.dropped + run.left for run in runs) / sum(run.moved + run.dropped + run.left for run in runs)
 
 
+def wilson(count: int, tables: int) -> Interval:
+    """Return a share of tables."""
+    return Interval(count / tables, *wilson_interval(count, tables))
+
+
 def more_figures(results: Results) -> dict[str, float | Interval | None]:
     """Ratios against Random, by how much faster than Pull and Stack, shares of tables no slower than the better of
     them; failed trials of all tiers."""
     flat: dict[str, float | Interval | None] = {}
     for case in results.cases:
         for arm in results.arms(case):
+            runs = results.of(arm, case)
+            flat[f"{arm}/{case}/failed"] = wilson(sum(run.failed for run in runs), len(runs))
             flat |= against(results, arm, case)
             if arm == FAR_ARM or arm in OURS:
                 flat |= faster(results, arm, case)
@@ -146,8 +153,7 @@ def more_figures(results: Results) -> dict[str, float | Interval | None]:
     for at in {name.rsplit("/", 1)[0] for name in sums}:
         tables = sums[f"{at}/tables"]
         for what in ("failed", "lost"):
-            count = sums[f"{at}/{what}_tables"]
-            flat[f"{at}/{what}"] = Interval(count / tables, *wilson_interval(count, tables))
+            flat[f"{at}/{what}"] = wilson(sums[f"{at}/{what}_tables"], tables)
     return flat | {name: float(value) for name, value in sums.items()}
 
 
