@@ -40,7 +40,7 @@ def follow(
 
     stereo = read_rig(rig)
     make = masks_in(masks, (stereo.height, stereo.width)) if masks is not None else network_masks(segmenter)
-    follower = Follower(stereo, make, needle_radius)
+    follower = Follower(stereo, make, needle_radius, cuts=masks is None)
     pairs = named_pairs(sys.stdin) if str(pictures) == "-" else growing_pairs(pictures, latest=latest, idle=idle)
     for files in pairs:
         sys.stdout.write(json.dumps(follower.line(files), allow_nan=False) + "\n")

@@ -15,6 +15,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
 
 import cv2
@@ -185,9 +186,9 @@ def with_limits(sight: Sight, limits: Limits) -> Sight:
     return replace(sight, detections=seen_from_the_side(estimated_dishes(sight.heights, 0, limits)))
 
 
-def left_out(data: Path) -> dict[str, Sight]:
-    """Return for every frame what is seen with the limits that the other scenes choose."""
-    sights = {frame: frame_sight(data, frame, "estimated")[1] for frame in annotated()[1]}
+def left_out(sights: dict[str, Sight]) -> dict[str, Sight]:
+    """Return for every frame what is seen with the limits that the other scenes choose; `sights`: with estimated
+    sizes."""
     by_limits = {
         limits: {
             frame: frame_counts(marks, with_limits(sights[frame], limits)) for frame, marks in annotated()[1].items()
@@ -213,14 +214,15 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict[str, int]]]:
     """Yield `<class>/<true | found | right>` -> count of images."""
+    seen = lru_cache(partial(frame_sight, bench.parameters.data))
     chosen: dict[str, Sight] = {}
     for trial in trials:
         if trial.case == LEFT_OUT and not chosen:
-            chosen = left_out(bench.parameters.data)
+            chosen = left_out({frame: seen(frame, "estimated")[1] for frame in annotated()[1]})
         if trial.case in GAINS:
             counts, picture = photograph_seen(bench.parameters.data, trial)
         else:
-            color, sight = frame_sight(bench.parameters.data, trial.seed, SIZES[trial.case])
+            color, sight = seen(trial.seed, SIZES[trial.case])
             sight = chosen.get(trial.seed, sight) if trial.case == LEFT_OUT else sight
             counts, picture = frame_counts(annotated()[1][trial.seed], sight), draw_sight(color, sight)
         bench.folder(trial).mkdir(parents=True, exist_ok=True)
@@ -278,6 +280,7 @@ EXPERIMENT = Experiment(
     arms={"ours": "ours"},
     cases=(*SIZES, *GAINS),
     seeds_of=seeds_of,
+    together=lambda trial: "frames" if trial.case in SIZES else (trial.case, trial.seed),
     measure=measure,
     record=dict[str, int],
     measures={},

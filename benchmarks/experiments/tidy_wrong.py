@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, ratio
 from benchmarks.experiments.tidy_fast.arms import OURS, WORLDS
-from benchmarks.tidy.rivals import no_slower
+from benchmarks.tidy.rivals import faster, no_slower
 from stages.kit.measurement.bootstrap import Interval
 from stages.tableware.planning.joint import JointPolicy, plan
 from stages.tableware.planning.policy import Policy
@@ -26,7 +26,7 @@ from stages.tableware.simulation.fast import run_trial
 from stages.tableware.world.scenes import make_table
 
 DEAR, CHEAP = 1.3, 0.7
-TUNING, REPORTING = range(60), range(1000, 1060)
+TUNING, REPORTING = range(60), range(2100, 2160)
 DELAYS = (0, 5)
 
 
@@ -93,11 +93,7 @@ def more_figures(results: Results) -> dict[str, float | Interval | None]:
             flat[f"{at}/slower_than_right"] = _less_one(
                 ratio([(a.time, b.time) for a, b in results.pairs(arm, "ours", case)])
             )
-            for rival in ("pull", "stack"):
-                faster = ratio([(a.time, b.time) for a, b in results.pairs(arm, rival, case)])
-                flat[f"{at}/faster_than_{rival}"] = faster and Interval(
-                    1 - faster.value, 1 - faster.high, 1 - faster.low
-                )
+            flat |= faster(results, arm, case)
             flat[f"{at}/no_slower_share"] = no_slower(results, arm, case, "time")
     return flat
 

@@ -1,6 +1,10 @@
 """An error model of perception for the simulator of trials, fitted to what the needle benchmark measured of ours.
 
     python -m benchmarks.stitch.perception --needle FOLDER --commit HASH
+    python -m benchmarks.stitch.perception --segmentation FOLDER --commit HASH --out FILE
+
+The second is of the network's masks: there all views in air stand for the corner too, and a look takes what the network
+takes for both pictures and the estimate.
 
 Right: answered, centre within 1 mm, plane within 10 degrees, and the tip not taken for the swage. Corner shares are of
 the corner's views in which the needle is more than 15 degrees from edge-on, as pose correction turns it to face the
@@ -18,6 +22,7 @@ from pydantic import Field
 
 from benchmarks.keeping import kept_records
 from benchmarks.options import asked
+from schemas.errors import UsageError
 from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.stage import Parameters
 from stages.suture.evaluation.judgement import Estimate
@@ -33,6 +38,14 @@ def right(record: Estimate) -> bool:
     return record.within and not record.swapped
 
 
+def by_place_learned(records: list[Estimate]) -> dict[str, list[Estimate]]:
+    """Return the simulator's places with the views that stand for them, by the network's masks."""
+    air = [r for r in records if r.holder != "tissue"]
+    seen = [r for r in air if r.visible]
+    tissue = [r for r in records if r.holder == "tissue"]
+    return {"corner_left": seen, "corner_right": seen, "elsewhere": air, "tissue": tissue}
+
+
 def by_place(records: list[Estimate]) -> dict[str, list[Estimate]]:
     """Return the simulator's places with the views that stand for them."""
     free = [r for r in records if r.case in ("rendered", "geometry")]
@@ -45,11 +58,10 @@ def by_place(records: list[Estimate]) -> dict[str, list[Estimate]]:
 
 
 def fitted(
-    records: list[Estimate], other: PerceptionModel, seconds: float, thread: float, told: str
+    places: dict[str, list[Estimate]], other: PerceptionModel, seconds: float, thread: float, told: str
 ) -> PerceptionModel:
-    """Return the model of ours; `other` gives what is not measured. Raises ValueError for too few views of a place."""
-    ours = [record for record in records if record.arm == "ours"]
-    places = by_place(ours)
+    """Return the model of ours from the views that stand for the places; `other` gives what is not measured. Raises
+    ValueError for too few views of a place."""
     for place, found in places.items():
         if len(found) < FEWEST:
             raise ValueError(f"{place}: {len(found)} views, {FEWEST} are needed")
@@ -137,27 +149,56 @@ def as_toml(model: PerceptionModel) -> str:
 class Options(Parameters):
     """Options of the fit."""
 
-    needle: Path = Field(description="Output folder of stitch_needle")
+    needle: Path | None = Field(None, description="Output folder of stitch_needle")
+    segmentation: Path | None = Field(None, description="Output folder of stitch_segmentation, instead")
     commit: str = Field(description="Of the estimator that was measured")
     out: Path = Field(FOLDER / "perception_ours.toml", description="File")
     seconds: float = Field(0.2, description="An estimate with its network")
     thread_length_error: float = Field(0.05, description="Relative standard deviation")
 
 
-def main() -> None:
-    """Fit and write."""
-    options = asked(Options)
-    records: list[Estimate] = list(kept_records("stitch_needle", options.needle).values())
+def of_needle(folder: Path, commit: str) -> tuple[dict[str, list[Estimate]], str]:
+    """Return the views by place and where they come from."""
+    records: list[Estimate] = [r for r in kept_records("stitch_needle", folder).values() if r.arm == "ours"]
     seeds = sorted({record.seed for record in records})
     told = (
-        f"Measured by python -m benchmarks stitch_needle at commit {options.commit}, seeds {seeds[0]} to {seeds[-1]}, "
+        f"Measured by python -m benchmarks stitch_needle at commit {commit}, seeds {seeds[0]} to {seeds[-1]}, "
         "fitted by python -m benchmarks.stitch.perception. Masks are the rendered truth spoiled as a learned mask's, "
         "not a network's; elsewhere and tissue are of both forms of the same scenes. An estimate takes 0.13 s of one "
         "core; what a network adds to it, persistence, systematic share and the error of the thread's length are "
         "assumed."
     )
+    return by_place(records), told
+
+
+def of_segmentation(folder: Path, commit: str) -> tuple[dict[str, list[Estimate]], str, float]:
+    """Return the same of the network's masks, and what a look takes [s]."""
+    kept = kept_records("stitch_segmentation", folder)
+    records = [record for trial, record in kept.items() if trial.arm == "ours_learned"]
+    pictures = [eye.seconds for trial, record in kept.items() if trial.arm == "network" for eye in record]
+    seconds = 2.0 * float(np.median(pictures)) + float(np.median([record.seconds for record in records]))
+    seeds = sorted(record.seed for record in records)
+    told = (
+        f"Measured by python -m benchmarks stitch_segmentation at commit {commit}, {len(seeds)} views of seeds "
+        f"{seeds[0]} to {seeds[-1]}, fitted by python -m benchmarks.stitch.perception. Masks are the network's. The "
+        "corner's shares are those of all views in air that are not near edge-on; persistence, systematic share and "
+        "the error of the thread's length are assumed."
+    )
+    return by_place_learned(records), told, round(seconds, 2)
+
+
+def main() -> None:
+    """Fit and write."""
+    options = asked(Options)
+    seconds = options.seconds
+    if options.segmentation is not None:
+        places, told, seconds = of_segmentation(options.segmentation, options.commit)
+    elif options.needle is not None:
+        places, told = of_needle(options.needle, options.commit)
+    else:
+        raise UsageError("nothing was measured", hint="--needle FOLDER or --segmentation FOLDER")
     other = perception_model(FOLDER / "perception_thesis.toml")
-    model = fitted(records, other, options.seconds, options.thread_length_error, told)
+    model = fitted(places, other, seconds, options.thread_length_error, told)
     options.out.write_text(as_toml(model), encoding="utf-8")
     perception_model(options.out)
     print(options.out)

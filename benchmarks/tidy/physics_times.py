@@ -7,15 +7,13 @@ python -m benchmarks.tidy.physics_times --runs FOLDER --date DATE
 from __future__ import annotations
 
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from pydantic import Field
 from scipy.optimize import nnls
 
-from benchmarks.experiments.tidy_fast.arms import OURS
-from benchmarks.experiments.tidy_physics import FAR, Run, delay_of
+from benchmarks.experiments.tidy_physics import Run, delay_of
 from benchmarks.keeping import kept_records
 from benchmarks.options import asked
 from stages.kit.stage import Parameters
@@ -46,10 +44,10 @@ def main() -> None:
     """Fit and write."""
     options = asked(Options)
     kept = {
-        trial: replace(run, time=run.time - 2.0 * delay_of(trial.case) * run.trips)
+        trial: run
         for trial, run in kept_records("tidy_physics", options.runs).items()
         if int(trial.seed) < FIRST_REPORTING and "/truth" in trial.case
-        if not delay_of(trial.case) or (delay_of(trial.case) == FAR and trial.arm in OURS)
+        if not delay_of(trial.case)
     }
     trip, stack, pull, residual = fit(list(kept.values()))
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True).stdout

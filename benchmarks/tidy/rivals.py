@@ -32,3 +32,12 @@ def no_slower(results: Results, arm: str, case: str, name: str = "time") -> floa
             own, *others = (getattr(run, name) for run in runs)
             shares.append(own <= min(others) + SAME)
     return float(np.mean(shares)) if shares else None
+
+
+def faster(results: Results, arm: str, case: str) -> dict[str, Interval | None]:
+    """Return by what share of its time an arm takes less than Pull and than Stack, over the same tables."""
+    flat: dict[str, Interval | None] = {}
+    for rival in ("pull", "stack"):
+        over = ratio([(a.time, b.time) for a, b in results.pairs(arm, rival, case)])
+        flat[f"{arm}/{case}/faster_than_{rival}"] = over and Interval(1 - over.value, 1 - over.high, 1 - over.low)
+    return flat

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -20,17 +20,22 @@ from schemas.errors import BadInput
 from schemas.outside import file_content, file_json
 from schemas.suture_scene import StereoRigRecord
 from stages.suture.masks import EyeMasks, MaskMaker
-from stages.suture.needle.estimators import ESTIMATORS
+from stages.suture.needle.estimate import estimate
+from stages.suture.needle.observation import NeedleEstimate
 from stages.suture.needle.radius import as_if_usual, in_metres
 from stages.suture.needle.records import as_estimate_record
 from stages.suture.pairs import SQUARE, Pair
-from stages.suture.rig import NeedlePose, StereoRig
+from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 LARGEST_PICTURE = 64 * 2**20
 RIG_HINT = (
     'a rig is {"camera": {"width", "height", "fx", "fy", "cx", "cy"}, "baseline": metres}; docs/STITCH.md shows one'
 )
 ENDINGS = (".png", ".jpg")
+AROUND, RIM = NEEDLE_RADIUS / 2, 48
+"""How far from where it was a needle is looked for [m], and how far a window reaches beyond that [px], so that what
+lies at its edge is judged with what is around it."""
+ARC = np.linspace(0.0, np.pi, 33)
 UNKNOWN = {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5}
 
 
@@ -116,26 +121,65 @@ def _stamp(pair: tuple[Path, Path]) -> tuple[int, ...]:
     return () if min(s.st_size for s in states) == 0 else tuple(v for s in states for v in (s.st_size, s.st_mtime_ns))
 
 
-class Follower:
-    """Turns pairs into lines. The pose of one frame is where the next is looked for first."""
+Window = tuple[slice, slice]
+"""Rows and columns of a picture."""
 
-    def __init__(self, rig: StereoRig, make: MaskMaker, radius: float, seed: int = 0) -> None:
+
+def windows_about(rig: StereoRig, pose: NeedlePose, reach: float) -> tuple[Window, Window]:
+    """Return the windows of both eyes that show a needle at `pose`, wider by `reach` [px] on every side; empty where it
+    is out of the picture."""
+    points = pose.points(ARC)
+    left, right = (_box(pixels, reach, rig) for pixels in (rig.left(points), rig.right(points)))
+    return left, right
+
+
+def _box(pixels: np.ndarray, reach: float, rig: StereoRig) -> Window:
+    low, high = np.nanmin(pixels, axis=0) - reach, np.nanmax(pixels, axis=0) + reach
+    columns, rows = ((int(max(a, 0)), int(max(b, 0)) + 1) for a, b in zip(low, high, strict=True))
+    return slice(rows[0], min(rows[1], rig.height)), slice(columns[0], min(columns[1], rig.width))
+
+
+def masks_within(make: MaskMaker, pair: Pair, windows: tuple[Window, Window]) -> EyeMasks:
+    """Return the masks of what these windows show, in masks of the whole pictures."""
+    cut = replace(pair, left=pair.left[windows[0]], right=pair.right[windows[1]])
+    made, size = make(cut), pair.left.shape[:2]
+
+    def whole(masks: tuple[Any, Any]) -> Any:
+        return tuple(_pasted(mask, window, size) for mask, window in zip(masks, windows, strict=True))
+
+    hidden = made.hidden if made.hidden[0] is None else whole(made.hidden)
+    return EyeMasks(whole(made.needle), whole(made.thread), hidden)
+
+
+def _pasted(mask: np.ndarray, window: Window, size: tuple[int, ...]) -> np.ndarray:
+    picture = np.zeros(size, dtype=bool)
+    picture[window] = mask
+    return picture
+
+
+class Follower:
+    """Turns pairs into lines. Where one pair showed the needle the next is looked at first, in a window of each picture
+    where masks are made of pictures (`cuts`) and with fewer starts; where that gives no pose, all of it is."""
+
+    def __init__(self, rig: StereoRig, make: MaskMaker, radius: float, seed: int = 0, *, cuts: bool = False) -> None:
         self._rig, self._make, self._radius, self._seed = as_if_usual(rig, radius), make, radius, seed
+        self._cuts = cuts
         self._guess: NeedlePose | None = None
         self._count = 0
 
     def line(self, files: PairFiles) -> dict[str, Any]:
         """Return what is known of the needle in a pair: `camera_from_needle` (4, 4) [m], `covariance` (6, 6),
-        `tip_probability`, `abstained`, and what it took. A picture that cannot be used is an abstention; with one comes
-        no pose, as a robot may act on these lines."""
+        `tip_probability`, `abstained`, `whole` (whether all of both pictures was looked at), and what it took. A
+        picture that cannot be used is an abstention; with one comes no pose, as a robot may act on these lines."""
         began = time.monotonic()
-        said: dict[str, Any] = {"name": files.name, "frame": self._count}
+        said: dict[str, Any] = {"name": files.name, "frame": self._count, "whole": True}
         try:
             pair = Pair(self._count, 0.0, 0, self._picture(files.left), self._picture(files.right))
             said["taken"] = files.left.stat().st_mtime
-            seen: EyeMasks = self._make(pair)
-            of_view = ESTIMATORS["ours"].of_view
-            answer = of_view(seen.observation(self._rig, None), self._seed, self._guess)
+            answer = self._near(pair)
+            said["whole"] = answer is None
+            if answer is None:
+                answer = estimate(self._make(pair).observation(self._rig, None), self._seed, self._guess)
         except BadInput as error:
             self._guess = None
             said |= UNKNOWN | {"abstained": str(error)}
@@ -146,6 +190,31 @@ class Follower:
                 said |= UNKNOWN
         self._count += 1
         return said | {"skipped": files.skipped, "seconds": round(time.monotonic() - began, 4)}
+
+    def _near(self, pair: Pair) -> NeedleEstimate | None:
+        """Return the needle near where it was; None where it is not found there, or reaches out of the windows."""
+        if self._guess is None:
+            return None
+        windows = windows_about(self._rig, self._guess, self._reach(self._guess) + RIM)
+        if self._cuts:
+            if any(side.stop - side.start < 2 * RIM for window in windows for side in window):
+                return None
+            masks = masks_within(self._make, pair, windows)
+        else:
+            masks = self._make(pair)
+        answer = estimate(masks.observation(self._rig, None), self._seed, self._guess, near=True)
+        if answer.abstained or answer.pose is None:
+            return None
+        found = windows_about(self._rig, answer.pose, 0.0)
+        inside = all(
+            window.start <= side.start and side.stop <= window.stop
+            for eye, other in zip(windows, found, strict=True)
+            for window, side in zip(eye, other, strict=True)
+        )
+        return answer if inside else None
+
+    def _reach(self, pose: NeedlePose) -> float:
+        return self._rig.focal * AROUND / float(pose.centre[2])
 
     def _picture(self, path: Path) -> np.ndarray:
         content = file_content(path, LARGEST_PICTURE, hint="give the pictures of both eyes")

@@ -88,8 +88,9 @@ class NeedlePose:
         """The end that carries the thread (3,) [m]."""
         return self.points(np.array([np.pi]))[0]
 
-    def points(self, angles: np.ndarray, radius: float = NEEDLE_RADIUS) -> np.ndarray:
-        """Return the points (N, 3) [m] of the circle of `radius` at `angles` (N,) [rad]; the needle is 0 to pi."""
+    def points(self, angles: np.ndarray, radius: float | np.ndarray = NEEDLE_RADIUS) -> np.ndarray:
+        """Return the points (N, 3) [m] at `angles` (N,) [rad] of the circle of `radius` [m], one or (N,); the needle is
+        0 to pi."""
         angles = np.asarray(angles, dtype=float)
         on_circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros_like(angles)], axis=1)
         return on_circle @ self.camera_from_needle[:3, :3].T + self.camera_from_needle[:3, 3]

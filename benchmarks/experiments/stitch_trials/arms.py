@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from stages.suture.trials.ours.pose_correction import BySeenEnds, latest
 from stages.suture.trials.policies import OURS, POLICIES, THESIS
@@ -13,9 +14,12 @@ ARMS = {
     **POLICIES,
     "ours_thesis_eyes": replace(OURS, perception="thesis"),
     "ours_one_at_a_time": replace(OURS, coordination=THESIS.coordination),
+    "ours_network_eyes": OURS,
     "thesis_other_test": replace(THESIS, handover_test=NormalUnchanged()),
 }
 """By the names that metrics keep."""
+NETWORK_EYES = Path(__file__).resolve().parents[2] / "stitch" / "perception_ours_network.toml"
+"""The error model by which `ours_network_eyes` sees: ours from the network's masks, its time counted."""
 WITHOUT = {
     "ours_without_servoes_ends": replace(OURS, pose_correction=THESIS.pose_correction),
     "ours_without_keeps_books": replace(OURS, cinch=THESIS.cinch),

@@ -1,9 +1,9 @@
 """Whole suture trials in the simulator: table 4.1 (Srinivas 2024), the thesis's arms and ours.
 
 Reporting seeds begin at 1400: those from 1000 on were run with perception or policies before this. `ours_thesis_eyes`
-has our policies and the thesis's error model of perception, `ours_one_at_a_time` never moves both drivers at once,
-`thesis_other_test` is the thesis with the other reading of its handover test; `ours_without_...` (run if asked for) are
-ours without one mechanism.
+has our policies and the thesis's error model of perception, `ours_network_eyes` that of ours from the network's masks,
+`ours_one_at_a_time` never moves both drivers at once, `thesis_other_test` is the thesis with the other reading of its
+handover test; `ours_without_...` (run if asked for) are ours without one mechanism.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, statistic
-from benchmarks.experiments.stitch_trials.arms import ARMS, WITHOUT
+from benchmarks.experiments.stitch_trials.arms import ARMS, NETWORK_EYES, WITHOUT
 from benchmarks.tabulation import markdown
 from schemas.suture_trial import SutureRun
 from stages.kit.measurement.bootstrap import Interval
@@ -52,7 +52,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]
     model = perception_model(other) if other else None
     for trial in trials:
         started = time.process_time()
-        outcome = run_trial((ARMS | WITHOUT)[trial.arm], int(trial.seed), model=model)
+        seen = perception_model(NETWORK_EYES) if trial.arm == "ours_network_eyes" else model
+        outcome = run_trial((ARMS | WITHOUT)[trial.arm], int(trial.seed), model=seen)
         spent = time.process_time() - started
         yield trial, Run(**run_of(trial.arm, int(trial.seed), outcome).model_dump(), cpu_seconds=spent)
 

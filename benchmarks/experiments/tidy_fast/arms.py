@@ -44,8 +44,8 @@ WORLDS: dict[str, Chances] = {
 """As the thesis's robot slips and misses; as planned; slipping, missing, and dropping as often as its trials failed."""
 DROPS_ON, SPILLS_ON = ("tier1", "tier2"), ("tier2",)
 DELAYS = (0, 3, 5)
-DRAWS, DRAWS_OF_THE_AIMS = 20, 400
-"""Of what chance decides on a table: the second on tiers 1 and 2, where the aims are."""
+DRAWS = 60
+"""Of what chance decides on a table."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +100,11 @@ def trials(arm: str, tier: str, world: str, seed: int) -> tuple[Run, ...]:
                 table,
                 model,
                 chances,
-                (tier, seed),
+                seed,
                 lambda _, m=model, f=found: JointPolicy(OURS[arm], m, chances, made=f),  # type: ignore[misc]
             )
         elif not done:
-            done = _draws(table, model, chances, (tier, seed), _simple(arm, seed))
+            done = _draws(table, model, chances, seed, _simple(arm, seed))
         added = 2.0 * delay if arm in SIMPLE else 0.0
         rows.append(_row(done, [trial.seconds + added * trial.trips for trial in done], delay, planning))
     return tuple(rows)
@@ -120,12 +120,9 @@ def _simple(arm: str, seed: int) -> Callable[[int], Policy]:
     return lambda draw: same
 
 
-def _draws(
-    table: Table, model: TimeModel, chances: Chances, scene: tuple[str, int], policy: Callable[[int], Policy]
-) -> list[Trial]:
+def _draws(table: Table, model: TimeModel, chances: Chances, seed: int, policy: Callable[[int], Policy]) -> list[Trial]:
     """Return the trials of one policy under every draw: the same luck for all policies (fast.py)."""
-    tier, seed = scene
-    count = 1 if chances is EXACT else DRAWS_OF_THE_AIMS if tier in DROPS_ON else DRAWS
+    count = 1 if chances is EXACT else DRAWS
     return [run_trial(table, policy(draw), model, chances, (seed, draw)) for draw in range(count)]
 
 

@@ -19,6 +19,8 @@ from stages.suture.rig import NeedlePose, StereoRig
 
 FEWEST_PIXELS = 30
 STARTS, MIRRORED, FINALISTS = 14, 3, 6
+NEAR_STARTS, NEAR_FINALISTS = 4, 3
+"""Where a needle that hardly moved is looked for again."""
 COARSE_LEVELS, NARROW_LEVELS = ((3.0, 5), (1.5, 3)), ((1.5, 4), (0.7, 8))
 """Widths of the outline [px], and the most steps with each."""
 POLISH = 4
@@ -66,11 +68,14 @@ class Hypothesis:
         return VARIANCE * np.linalg.inv(self.outline.information + tiny)[:6, :6]
 
 
-def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | None = None) -> NeedleEstimate:
+def estimate(
+    observation: NeedleObservation, seed: int = 0, guess: NeedlePose | None = None, near: bool = False
+) -> NeedleEstimate:
     """Return the needle's pose, covariance and the probability that its tip is the tip; or an abstention.
 
-    `guess`, such as the last frame's pose, is one more start; the answer does not lean on it. Raises BadInput for a
-    rig or images that cannot be.
+    `guess`, such as the last frame's pose, is one more start; the answer does not lean on it. `near`: the needle is
+    taken to be near the guess, and fewer others are tried beside it. Raises BadInput for a rig or images that cannot
+    be.
     """
     observation.check()
     masks = needle_masks(observation)
@@ -83,7 +88,7 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
         return NeedleEstimate.none(swapped)
     eyes = windows(observation)
     sheets = (sheet_of(eyes[0]), sheet_of(eyes[1]))
-    rivals = _hypotheses(observation, eyes, sheets, seed, guess)
+    rivals = _hypotheses(observation, eyes, sheets, seed, guess, near)
     if not rivals:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
     features = presence_features(observation.rig, sheets, rivals[0].outline, rivals[0].evidence)
@@ -130,10 +135,11 @@ def _hypotheses(
     sheets: tuple[Sheet, Sheet],
     seed: int,
     guess: NeedlePose | None,
+    near: bool = False,
 ) -> list[Hypothesis]:
     rig, random = observation.rig, np.random.default_rng(seed)
     points = _disparity_points(observation, random)
-    begun = starts(rig, eyes, points, STARTS, SAMPLED, random)
+    begun = starts(rig, eyes, points, NEAR_STARTS if near else STARTS, SAMPLED, random)
     if guess is not None:
         begun.insert(0, guess)
     still = np.zeros(2)
@@ -142,10 +148,10 @@ def _hypotheses(
     for outline in coarse[:MIRRORED]:
         coarse.append(fit_outline(rig, sheets, _mirrored(outline.pose), still, COARSE_LEVELS))
     ordered = [rival.outline for rival in _weighed(rig, eyes, sheets, coarse)]
-    return _weighed(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered)))
+    return _weighed(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered, NEAR_FINALISTS if near else FINALISTS)))
 
 
-def _finalists(coarse: list[Outline]) -> list[Outline]:
+def _finalists(coarse: list[Outline], most: int) -> list[Outline]:
     """Return the best few outlines, none of them like another with tip and swage exchanged or not."""
     kept: list[Outline] = []
     for outline in coarse:
@@ -153,7 +159,7 @@ def _finalists(coarse: list[Outline]) -> list[Outline]:
             _near(either_way(outline.pose, other.pose)[0], SAME) for other in kept
         ):
             kept.append(outline)
-        if len(kept) == FINALISTS:
+        if len(kept) == most:
             break
     return kept
 

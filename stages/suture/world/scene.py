@@ -16,7 +16,18 @@ from stages.kit.geometry.transforms import apply, inverse, transform_from
 from stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose, StereoRig
 from stages.suture.world.pad import RIDGE_HEIGHT
 from stages.suture.world.thread import THREAD_RADIUS, loose_thread
-from stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD, Tubes, chain, driver_tube, joined, needle_tube
+from stages.suture.world.tubes import (
+    LEFT_DRIVER,
+    RIGHT_DRIVER,
+    THREAD,
+    USUAL_NEEDLE,
+    NeedleShape,
+    Tubes,
+    chain,
+    driver_tube,
+    joined,
+    needle_tube,
+)
 
 HOLDERS = ("air", "left", "right", "both", "tissue")
 PLACES = {
@@ -67,6 +78,7 @@ class NeedleScene:
     place: str
     without_needle: bool = False
     """Everything but the needle; `pose` is where it would be."""
+    shape: NeedleShape = USUAL_NEEDLE
 
     def tubes(self) -> Tubes:
         """Return every tube of the scene in the left camera's frame."""
@@ -76,7 +88,7 @@ class NeedleScene:
         for body, (grip, approach, across, opening) in self.grips.items():
             parts.append(driver_tube(grip, approach, across, opening, body))
         others = joined(parts).moved(self.camera_from_world)
-        return others if self.without_needle else joined([needle_tube(self.pose), others])
+        return others if self.without_needle else joined([needle_tube(self.pose, shape=self.shape), others])
 
 
 def camera_place(rig: StereoRig, random: np.random.Generator) -> np.ndarray:

@@ -10,14 +10,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.suture.rig import NeedlePose
+from stages.suture.rig import NEEDLE_RADIUS, NeedlePose
 
 NEEDLE, THREAD, LEFT_DRIVER, RIGHT_DRIVER = 1, 2, 3, 4
 WIRE_RADIUS = 0.0005
 """Half the thickness of the needle's wire [m]; a needle for a 2-0 thread is about 1 mm thick."""
-TAPER_ANGLE = 0.7
-"""The tip's taper runs over this angle of the arc [rad], 8.4 mm."""
 TIP_RADIUS = 0.00004
+
+
+@dataclass(frozen=True)
+class NeedleShape:
+    """How a needle is made, and bent by use."""
+
+    radius: float = NEEDLE_RADIUS
+    """Of its half circle [m]."""
+    wire: float = WIRE_RADIUS
+    """Half the wire's thickness [m]."""
+    taper_angle: float = 0.7
+    """The tip's taper runs over this angle of the arc [rad], 8.4 mm."""
+    taper_power: float = 1.6
+    """How round the taper is; 1 is a cone."""
+    opened: float = 0.0
+    """By what share of it the ends lie farther from the centre than the middle."""
+    warped: float = 0.0
+    """By how much [m] the ends lie farther along the normal than the middle."""
+
+
+USUAL_NEEDLE = NeedleShape()
 
 
 @dataclass(frozen=True)
@@ -54,18 +73,26 @@ def chain(points: np.ndarray, radii: np.ndarray, body: int) -> Tubes:
     return Tubes(points[:-1], points[1:], radii[:-1], radii[1:], bodies)
 
 
-def needle_radii(angles: np.ndarray) -> np.ndarray:
-    """Return the wire's radius [m] at arc angles [rad]: a slightly rounded taper to the tip, a crimp at the swage."""
-    along = np.clip(angles / TAPER_ANGLE, 0.0, 1.0)
-    taper = TIP_RADIUS + (WIRE_RADIUS - TIP_RADIUS) * (1.0 - (1.0 - along) ** 1.6)
+def needle_radii(angles: np.ndarray, shape: NeedleShape = USUAL_NEEDLE) -> np.ndarray:
+    """Return the wire's radius [m] at arc angles [rad]: a more or less rounded taper to the tip, a crimp at the
+    swage."""
+    along = np.clip(angles / shape.taper_angle, 0.0, 1.0)
+    taper = TIP_RADIUS + (shape.wire - TIP_RADIUS) * (1.0 - (1.0 - along) ** shape.taper_power)
     crimp = 1.0 - 0.08 * np.exp(-(((np.pi - angles) * 12.0 - 2.5) ** 2) / 0.8)
     return taper * crimp
 
 
-def needle_tube(pose: NeedlePose, pieces: int = 120) -> Tubes:
+def needle_line(pose: NeedlePose, angles: np.ndarray, shape: NeedleShape = USUAL_NEEDLE) -> np.ndarray:
+    """Return the wire's middle (N, 3) [m] at arc angles [rad]; `pose` is that of the half circle nearest to it."""
+    ends = (2.0 * angles / np.pi - 1.0) ** 2 - 1.0 / 3.0
+    line = pose.points(angles, shape.radius * (1.0 + shape.opened * ends))
+    return np.asarray(line + (shape.warped * ends)[:, None] * pose.normal)
+
+
+def needle_tube(pose: NeedlePose, pieces: int = 120, shape: NeedleShape = USUAL_NEEDLE) -> Tubes:
     """Return the needle at `pose`."""
     angles = np.linspace(0.0, np.pi, pieces + 1)
-    return chain(pose.points(angles), needle_radii(angles), NEEDLE)
+    return chain(needle_line(pose, angles, shape), needle_radii(angles, shape), NEEDLE)
 
 
 def driver_tube(grip: np.ndarray, approach: np.ndarray, across: np.ndarray, opening: float, body: int) -> Tubes:

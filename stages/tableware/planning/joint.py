@@ -1,37 +1,31 @@
 """Our policy: pulls, stackings, multi-object and single grasps chosen together for the whole table.
 
 The exact optimum (optimum.py) of expected time and risk, slips counted in, where the table is small enough, which the
-thesis's tables are; larger ones are cleared in portions, each by its own optimum. Of the plans nearly as fast as the
-fastest (`slack`) the one with the fewest trips is taken, which loses least when the bin is farther than thought, but
-only of those no slower than Pull and Stack are to be expected. The plan says what is best for whatever
-may be left, so that after a slip nothing is planned anew unless something moved.
+thesis's tables are; larger ones are cleared in portions, each by its own optimum. What a trip takes is known badly (the
+bin's place, the arm's speed), and it is what decides between many short trips and few laden ones. So of the plans that
+are best for some time of a trip within `OFF` of the one that is told, the one is taken whose regret is least: by how
+much, as a share, it costs more than the best plan would, where the time is off by the most. The plan says what is best
+for whatever may be left, so that after a slip nothing is planned anew unless something moved.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from stages.tableware.actions.grasp import Grasp, grasp, grasp_two, taken
+from stages.tableware.actions.grasp import grasp, grasp_two
 from stages.tableware.actions.pull import pull
 from stages.tableware.actions.stack import stack
 from stages.tableware.planning.action import Action, Primitive
 from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
-from stages.tableware.planning.policy import THESIS, Policy, liftable
-from stages.tableware.planning.rules import Rules, can_grasp_two, letters
+from stages.tableware.planning.policy import liftable
+from stages.tableware.planning.rules import Rules, can_grasp_two
 from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.planning.trip_options import slip_cost
-from stages.tableware.policies.pull import PullPolicy
-from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.world.items import Table
 
-SLACK = 0.029
-"""How much slower than the fastest, as a share of its cost, a plan with fewer trips may be."""
-MARGIN = 0.005
-"""By how much it is to be faster than Pull and Stack for that, as these are reckoned without misses of pulls."""
-UNLIKELY = 0.03
-"""What is less likely than this is not followed further when Pull's time is reckoned; it counts as `slip_cost`."""
-CHARGES = (1.0, 2.0, 4.0, 8.0)
-"""Seconds charged for a trip beyond what it takes, to find plans with fewer of them."""
+OFF = 0.3
+"""How far off, as a share of it, the time of a trip with its delay is reckoned to be."""
+STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Shares of `OFF` for which the best plans are made."""
 WORTH = 60.0
 """Seconds that we give for not losing an item (ours): six trips."""
 PORTION = 14
@@ -71,56 +65,27 @@ def rules_in(rules: Rules, chances: Chances) -> Rules:
 
 
 def plan(
-    table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float | None = None, worth: float = WORTH
+    table: Table, rules: Rules, model: TimeModel, chances: Chances, off: float = OFF, worth: float = WORTH
 ) -> Plan:
-    """Return the plan for a table, or the first portion of one with more than 16 items; `slack`: None takes ours."""
-    rules = rules_in(rules, chances)
-    portion = _portion(table)
-    optimum = Optimum(portion, rules, model, chances, worth)
-    plans = [Plan(optimum, optimum.solve())]
-    least = _cost(plans[0], worth)
-    limit = least * (1.0 + (SLACK if slack is None else slack))
-    if slack is None and not chances.drops:
-        limit = max(least, min(limit, *(_alone(rival, portion, model, chances) for rival in _rivals(rules))))
-    if chances.sure and limit > least:
-        return Plan(optimum, optimum.fewest_trips(plans[0].solution, limit + 1e-9))
-    for charge in CHARGES if limit > least else ():
-        other = Plan(optimum, optimum.solve(charge))
-        if _cost(other, worth) > limit:
-            break
-        plans.append(other)
-    return min(plans, key=lambda plan: (round(plan.expected_trips, 6), _cost(plan, worth)))
+    """Return the plan for a table, or the first portion of one with more than 16 items.
+
+    Of the plans that are best with some time of a trip within a share `off` of the model's, that of the least regret.
+    A plan's cost is linear in that time and the least cost concave, so that its regret is greatest at an end.
+    """
+    optimum = Optimum(_portion(table), rules_in(rules, chances), model, chances, worth)
+    charges = [off * step * model.whole_trip for step in (STEPS if off else (0.0,))]
+    plans = [Plan(optimum, optimum.solve(charge)) for charge in charges]
+    least = {charge: _cost(best, charge, worth) for charge, best in zip(charges, plans, strict=True)}
+
+    def regret(one: Plan) -> float:
+        return max(_cost(one, charge, worth) / max(least[charge], 1e-9) for charge in (charges[0], charges[-1]))
+
+    return min(plans, key=lambda one: (round(regret(one), 9), _cost(one, 0.0, worth)))
 
 
-def _rivals(rules: Rules) -> tuple[Policy, ...]:
-    """Return the thesis's policies with the sizes and the hand of our rules."""
-    theirs = replace(THESIS, setting=rules.setting)
-    return PullPolicy(theirs), *((StackPolicy(theirs),) if rules.setting.stacking else ())
-
-
-def _alone(policy: Policy, table: Table, model: TimeModel, chances: Chances, likely: float = 1.0) -> float:
-    """Return the seconds to be expected of a policy of the thesis, where pulls do not miss and nothing falls. A slip
-    is followed where that is likely enough, for `likely` is the chance that it comes to this table."""
-    time = 0.0
-    while table.items:
-        *before, action = policy.decide(table).parts
-        for part in before:
-            time, table = time + part.seconds(model), part.after(table)
-        assert isinstance(action, Grasp)  # these policies neither pull nor stack without grasping
-        time, rest = time + model.whole_trip, table.without(taken(table, action))
-        if len(action.items) == 2:
-            hold = chances.holds(*(letters((table.by_name[name],)) for name in action.items))
-            if likely * (1.0 - hold) >= UNLIKELY:
-                stayed = table.without(taken(table, replace(action, items=action.items[:1])))
-                time += (1.0 - hold) * _alone(policy, stayed, model, chances, likely * (1.0 - hold))
-                return time + hold * _alone(policy, rest, model, chances, likely * hold)
-            time += (1.0 - hold) * slip_cost(model)
-        table = rest
-    return time
-
-
-def _cost(plan: Plan, worth: float) -> float:
-    return plan.seconds + worth * plan.lost
+def _cost(plan: Plan, charge: float, worth: float) -> float:
+    """Return what a plan costs [s] when each trip takes `charge` more than the model says."""
+    return plan.seconds + charge * plan.expected_trips + worth * plan.lost
 
 
 def _portion(table: Table) -> Table:
@@ -147,11 +112,11 @@ class JointPolicy:
         model: TimeModel,
         chances: Chances,
         seed: int = 0,
-        slack: float | None = None,
+        off: float = OFF,
         worth: float = WORTH,
         made: Plan | None = None,
     ) -> None:
-        self._make = lambda table: plan(table, rules, model, chances, slack, worth)
+        self._make = lambda table: plan(table, rules, model, chances, off, worth)
         self._rules = rules_in(rules, chances)
         self._first, self._plan = made, made
         self._trip: Trip | None = None

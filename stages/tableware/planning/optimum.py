@@ -100,24 +100,6 @@ class Optimum:
             left |= 1 << number
         return left
 
-    def fewest_trips(self, best: Solution, limit: float) -> Solution:
-        """Return the solution that clears the whole table in the fewest trips within `limit` seconds, where nothing is
-        left to chance; for what is not on its way it says what `best` does. `limit` is at least what `best` takes."""
-        options = self._options
-        layers = []
-        before = np.full(1 << len(self.table.items), np.inf)
-        before[0] = 0.0
-        while before[self.everything] > limit:
-            before, chosen = _one_trip_more(self._piles, self._columns, before)
-            layers.append(chosen)
-        option, seconds, trips = best.option.copy(), best.seconds.copy(), best.trips.copy()
-        left, spent = self.everything, float(before[self.everything])
-        for number in range(len(layers), 0, -1):
-            option[left], seconds[left], trips[left] = layers[number - 1][left], spent, number
-            spent -= float(options.seconds[option[left]])
-            left &= ~int(options.masks[self._choice_of[option[left]]])
-        return Solution(option, seconds, trips, best.lost)
-
     def trips(self, solution: Solution | None = None, left: int | None = None) -> list[Trip]:
         """Return the trips that clear the table, or what is left of it, in order, when nothing slips."""
         solution = solution or self.solve()
@@ -231,27 +213,3 @@ def _solve(piles, options, worth, per_trip):  # type: ignore[no-untyped-def]
                             losses[left] = lost[option] + (1.0 - slip) * losses[rest] + slip * losses[again]
             part = (part - 1) & left
     return chosen, time, trips, losses
-
-
-@njit(cache=True)
-def _one_trip_more(piles, options, before):  # type: ignore[no-untyped-def]
-    """From the least seconds to clear what is left in at most k trips, (2^N,), those for k + 1 and the next option."""
-    below, above = piles
-    number_of, starts, seconds, blockers = options.number_of, options.starts, options.seconds, options.blockers
-    size = 1 << len(below)
-    best = np.full(size, np.inf)
-    chosen = np.full(size, -1, np.int64)
-    best[0] = 0.0
-    for left in range(1, size):
-        if _meets(left, below, ~left):  # something would stand on what has gone
-            continue
-        part = left
-        while part:
-            group = number_of[part]
-            rest = left & ~part
-            if group >= 0 and before[rest] < best[left] and not _meets(part, above, rest):
-                for option in range(starts[group], starts[group + 1]):
-                    if not blockers[option] & rest and seconds[option] + before[rest] < best[left]:
-                        best[left], chosen[left] = seconds[option] + before[rest], option
-            part = (part - 1) & left
-    return best, chosen

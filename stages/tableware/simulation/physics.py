@@ -42,6 +42,8 @@ TRAVEL = 0.17
 """Height of the fingertips on the way above everything [m]."""
 SPREAD = 0.72
 """Share of a dish's inner radius to which the fingers open when they pull it from inside."""
+HOVER = 0.015
+"""Height [m] over the table at which a utensil is carried to another."""
 EMPTY = 0.0008
 """Fingers that are nearer to each other than this [m] hold nothing: the thinnest wall has 3 mm."""
 HEAVY = 4
@@ -62,14 +64,9 @@ class Speeds:
     """For bowls and plates."""
     heavy: float = 120.0
     """For two piles of bowls, `HEAVY` walls together: with 40 N the outer ones slip."""
-    cups: float = 20.0
-    """For cups, however many: pressed harder, one of some nested ones is wedged out of the others."""
-    gentle: float = 20.0
-    """For a utensil that is taken alone, or a pile of them."""
-    edge: float = 5.0
-    """For two utensils side by side: pressed harder, flat things edge to edge spring out of the fingers."""
-    cage: float = 6.0
-    """Around a utensil that is pulled."""
+    least: float = 20.0
+    """The least that a 2F-85 presses with: for cups, however many (pressed harder, one of some nested ones is wedged
+    out of the others), and for utensils, taken or led."""
     carry_loose: float = 0.4
     """With things that stand or lie free in what is held."""
     lift_loose: float = 0.09
@@ -296,20 +293,21 @@ class PhysicsTable:
         self.arm.move_line(_raised(away, TRAVEL + 0.03), self.speeds.descend)
 
     def _pull_bar(self, action: Pull, seen: Table) -> None:
-        """Close lightly on a utensil where it lies, lead it over the table, let go: a loose cage slides along it. It is
-        taken where the jaws fit, at its middle if they do there."""
+        """Take a utensil where it lies, carry it just above the table, let go. A hand that presses with 20 N does not
+        let it give way: dragged, it would sweep the one beside which it is to lie off the table. It is taken where the
+        jaws fit, at its middle if they do there."""
         item = seen.by_name[action.item]
         turn = (action.theta_E - action.theta_S + pi / 2) % pi - pi / 2
         hold = bar_hold(seen, action.item)
         tip = np.array([0.0, 0.0, hold.pose[2, 3]])
         offset = hold.pose[:2, 3] - np.array(item.position[:2])
         rotation = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
-        self._above(hold.pose, hold.opening)
-        self._descend(hold.pose)
-        self.arm.close(self.speeds.cage)
-        self._key("inside")
+        self._take(hold, self.speeds.least, [action.item])
         goal = np.array([*action.p_E[:2], 0.0]) + np.array([*(rotation @ offset), 0.0]) + tip
         there = tool_pose(goal, action.theta_S + turn)
+        pose = self.arm.pose_of(self.arm.target)
+        self.arm.move_line(_raised(pose, pose[2, 3] + HOVER), self.speeds.pull)
+        self.arm.move_line(_raised(there, there[2, 3] + HOVER), self.speeds.pull)
         self.arm.move_line(there, self.speeds.pull)
         self._key("pulled")
         self.arm.open_to(0.022)
@@ -443,10 +441,10 @@ def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
 def finger_force(seen: Table, names: list[str], speeds: Speeds) -> float:
     """Return the force [N] of each finger for some piles."""
     if all(not seen.by_name[name].is_dish for name in names):
-        return speeds.edge if len(names) == 2 else speeds.gentle
+        return speeds.least
     held = [item for name in names for item in walls(seen, name)]
     if all(item.kind == "cup" for item in held):
-        return speeds.cups
+        return speeds.least
     return speeds.heavy if len(names) == 2 and len(held) >= HEAVY else speeds.force
 
 

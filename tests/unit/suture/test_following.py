@@ -15,11 +15,14 @@ import numpy as np
 import pytest
 
 from schemas.errors import BadInput
+from stages.suture import following
 from stages.suture.following import Follower, growing_pairs, named_pairs, read_rig
-from stages.suture.masks import masks_in
+from stages.suture.masks import EyeMasks, masks_in
+from stages.suture.needle.estimate import estimate
 from stages.suture.needle.estimators import ESTIMATORS
 from stages.suture.needle.radius import as_if_usual, in_metres
-from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from stages.suture.pairs import Pair
+from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose
 from tests.unit.suture.needle_cases import drawn_mask, observed, pose_at
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -92,14 +95,41 @@ def test_a_pair_becomes_a_line_and_a_broken_picture_an_abstention(masks: Path, t
 
 def test_with_an_abstention_comes_no_pose(masks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The estimator's best guess is kept by `suture needle` for looking at; here a robot may act on it."""
-    ours = ESTIMATORS["ours"]
-    doubted = replace(ours, of_view=lambda *given: replace(ours.of_view(*given), abstained="hardly a needle"))
-    monkeypatch.setitem(ESTIMATORS, "ours", doubted)
+    monkeypatch.setattr(
+        following, "estimate", lambda *given, **near: replace(estimate(*given, **near), abstained="hardly a needle")
+    )
     arrive(tmp_path, "000000")
     (files,) = growing_pairs(tmp_path, latest=False, idle=0.0)
     line = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280)), NEEDLE_RADIUS).line(files)
     assert line["abstained"] == "hardly a needle"
     assert line["camera_from_needle"] is None and line["covariance"] is None
+
+
+def test_a_needle_is_looked_for_where_it_was_and_everywhere_when_lost(tmp_path: Path) -> None:
+    """Of three pairs the needle moves a little before the second and far away before the third."""
+    poses = [pose_at()]
+    for shift in ([0.002, 0.001, 0.0], [-0.035, 0.02, 0.0]):
+        moved = poses[-1].camera_from_needle.copy()
+        moved[:3, 3] += shift
+        poses.append(NeedlePose(moved))
+    looked: list[tuple[int, ...]] = []
+
+    def white_is_needle(pair: Pair) -> EyeMasks:
+        looked.append(pair.left.shape[:2])
+        eyes = (pair.left[..., 0] > 0, pair.right[..., 0] > 0)
+        return EyeMasks(eyes, (np.zeros_like(eyes[0]), np.zeros_like(eyes[1])), (None, None))
+
+    for number, pose in enumerate(poses):
+        for eye, side in enumerate(("left", "right")):
+            mask = drawn_mask(TWO_CAMERAS, pose, eye).astype(np.uint8)
+            cv2.imwrite(str(tmp_path / f"{number}_{side}.png"), np.repeat(255 * mask[..., None], 3, axis=2))
+    follower = Follower(TWO_CAMERAS, white_is_needle, NEEDLE_RADIUS, cuts=True)
+    lines = [follower.line(files) for files in growing_pairs(tmp_path, latest=False, idle=0.0)]
+    assert [line["whole"] for line in lines] == [True, False, True] and len(looked) == 4
+    assert looked[0] == looked[3] == (960, 1280) and looked[1][0] * looked[1][1] < 960 * 1280 / 4
+    for line, pose in zip(lines, poses, strict=True):
+        assert not line["abstained"]
+        assert np.array(line["camera_from_needle"])[:3, 3] == pytest.approx(pose.centre, abs=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.stitch.perception import as_toml, fitted
+from benchmarks.stitch.perception import as_toml, by_place, fitted
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.trials.perception import FOLDER, perception_model
 
@@ -47,7 +47,7 @@ def records() -> list[Estimate]:
 
 def test_shares_and_spreads_are_those_of_the_estimates(tmp_path: Path) -> None:
     thesis = perception_model(FOLDER / "perception_thesis.toml")
-    model = fitted(records(), thesis, 0.2, 0.05, "Measured here and now, for a test.")
+    model = fitted(by_place(records()), thesis, 0.2, 0.05, "Measured here and now, for a test.")
     assert model.measured and model.right_share.corner_left == model.right_share.elsewhere == 0.8
     assert model.right_share.tissue == 1.0 and model.abstained_share.tissue == 0.5
     assert model.abstained_share.corner_right == 0.5  # four failures: those of all places count
@@ -59,4 +59,4 @@ def test_shares_and_spreads_are_those_of_the_estimates(tmp_path: Path) -> None:
     path.write_text(as_toml(model))
     assert perception_model(path).model_dump(exclude={"provenance"}) == model.model_dump(exclude={"provenance"})
     with pytest.raises(ValueError, match="tissue: 0 views"):
-        fitted(records()[:-10], thesis, 0.2, 0.05, "Measured here and now, for a test.")
+        fitted(by_place(records()[:-10]), thesis, 0.2, 0.05, "Measured here and now, for a test.")

@@ -230,7 +230,7 @@ def test_the_optimum_is_that_of_a_search_over_single_actions(seed: int) -> None:
 def test_the_plan_takes_as_long_as_it_says_when_nothing_slips(tier: str) -> None:
     table = make_table(tier, 3)
     said = seconds(clear(table, Rules(), MODEL, EXACT))
-    trial = run_trial(table, JointPolicy(Rules(), MODEL, EXACT, slack=0.0), MODEL, EXACT, 0)
+    trial = run_trial(table, JointPolicy(Rules(), MODEL, EXACT, off=0.0), MODEL, EXACT, 0)
     assert not trial.failed and trial.moved == len(table.items)
     assert trial.seconds == pytest.approx(said)
     for policy in (PullPolicy(), StackPolicy(), RandomOne(0), RandomPile(0)):
