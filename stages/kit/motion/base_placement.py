@@ -88,7 +88,7 @@ def plan_drive(
     """
     query = base_query(np.asarray(start, dtype=float), goal, arm, room)
     try:
-        return find_path(query, checker, random, samples=samples, smoothing=80)
+        return find_path(query, checker, random, samples=samples)
     except MotionFailed as failed:
         what = failed.failure
         raise MotionFailed(what.kind, f"driving: {what.message}", what.objects, dict(what.numbers)) from None
