@@ -251,8 +251,8 @@ def shown(experiment: Experiment, records: Mapping[Trial, Any]) -> dict[Trial, A
 
 
 def ratio(pairs: Sequence[tuple[float, float]], of: Callable[..., Any] = np.mean) -> Interval | None:
-    """Return the mean (or what else `of` is, as np.median) of the firsts over that of the seconds with its 95 % interval
-    over pairs; None for none."""
+    """Return the mean (or what else `of` is, as np.median) of the firsts over that of the seconds, with its 95 %
+    interval over pairs; None for none."""
 
     def over(values: np.ndarray, axis: int) -> np.ndarray:
         means = of(values, axis=axis)

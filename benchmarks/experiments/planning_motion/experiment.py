@@ -159,7 +159,7 @@ EXPERIMENT = Experiment(
     title="Motion planning beside OMPL",
     simulated="a Panda among exact geometry",
     knows="all geometry",
-    does_not_show="Execution, or planning against what a camera sees. OMPL is driven from Python: of its time a part is "
+    does_not_show="Execution, or planning against what a camera sees. OMPL is driven from Python: part of its time are "
     "the calls of checks from C++ into Python, one for each motion on the compiled check.",
     arms={
         "ours": "compiled RRT-Connect",

@@ -244,7 +244,7 @@ def _path_is_free(motion: Moving, rows: np.ndarray) -> bool:
             motion.body[motion.moving[k]] = rows[row, k]
         if find_collision(motion.robot, motion.scene, motion.body, motion.first_frame)[0] != FREE:
             return False
-    for row in range(1, rows.shape[0]):
+    for row in range(1, rows.shape[0]):  # noqa: SIM110 (numba has no `all`)
         if not way_is_free(motion, rows[row - 1], rows[row]):
             return False
     return True
