@@ -184,14 +184,14 @@ def _find(scene: Scene, budgets: Budgets, parameters: PlanParameters, context: C
     return state, planning
 
 
-def _start(
-    model: WorldModel, carry: np.ndarray, stand: tuple[float, ...], random: np.random.Generator
-) -> np.ndarray:
-    """Return where the robot starts (3,). Raises UsageError for what is no place, MotionFailed for none that is free."""
+def _start(model: WorldModel, carry: np.ndarray, stand: tuple[float, ...], random: np.random.Generator) -> np.ndarray:
+    """Return where the robot starts (3,). Raises UsageError for no place, MotionFailed for none that is free."""
     if stand and len(stand) != 3:
         raise UsageError(f"--stand has {len(stand)} values", hint="x y [m] and yaw [deg]")
     if not stand and not model.description.drives:
-        raise UsageError(f"the robot {model.description.name} does not drive", hint="say where it is with --stand X Y YAW")
+        raise UsageError(
+            f"the robot {model.description.name} does not drive", hint="say where it is with --stand X Y YAW"
+        )
     if not stand:
         return start_base(model, carry, random)
     base = np.array([*stand[:2], np.radians(stand[2])])

@@ -31,8 +31,8 @@ FINE = RESOLUTION / FINER
 RANGE = 0.8
 """Longest motion that OMPL's trees grow by [rad]; the quickest of 0.4, 0.8, 1.6 and OMPL's default on tuning seeds."""
 ATTEMPTS = 240
-"""At a shortcut, as many as ours. By OMPL's partialShortcutPath, which was both quicker and shorter on the tuning seeds
-than its simplifyMax, ropeShortcutPath and defaults."""
+"""At a shortcut, as many as `plan` makes. By OMPL's partialShortcutPath, which was both quicker and shorter on the
+tuning seeds than its simplifyMax, ropeShortcutPath and defaults."""
 SPACE = SearchSpace(CHAIN.lower, CHAIN.upper, np.full(7, RESOLUTION))
 SAMPLES = 20000
 """Of ours; the mesh fallback gets the 2000 that it is used with."""
@@ -52,9 +52,9 @@ def _query(query: MotionQuery) -> Query:
 
 def ours(checker: CollisionChecker, query: MotionQuery, seed: int, simplified: bool) -> np.ndarray | None:
     """Compiled RRT-Connect, compiled shortcuts, confirmation by the meshes."""
-    smoothing = {} if simplified else {"smoothing": 0}
+    random, attempts = np.random.default_rng(seed), ATTEMPTS if simplified else 0
     try:
-        return find_path(_query(query), checker, np.random.default_rng(seed), samples=SAMPLES, **smoothing)
+        return find_path(_query(query), checker, random, samples=SAMPLES, smoothing=attempts)
     except MotionFailed:
         return None
 

@@ -72,7 +72,9 @@ def inputs(bench: Bench, trial: Trial) -> list[Path]:
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Answer]]:
     """Yield the answers to the queries of one set, seed by seed."""
     case = trials[0].case
-    makers = [partial(room_set, scene) for scene in bench.parameters.scene] if case == ROOM else [SETS[case]]
+    makers: list[Callable[[], QuerySet]] = (
+        [partial(room_set, scene) for scene in bench.parameters.scene] if case == ROOM else [SETS[case]]
+    )
     for number, make in enumerate(makers):
         queries = make()
         for arm in ARMS.values():
