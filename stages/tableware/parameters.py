@@ -134,7 +134,7 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="tableware simulate",
-    version=5,
+    version=6,
     summary="Let a policy, or a plan, clear a table in the fast simulator or in physics",
     parameters=SimulateParameters,
     reads={"scene": TablewareScene, "plan": Optionally(TablewarePlan)},
