@@ -212,7 +212,7 @@ scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTI
 	$(EXPERIMENT) scenenn $(if $(DATA),--data $(DATA)) --out $(OUTPUTS)/experiments/scenenn $(ASKED)
 
 .PHONY: bench-planning
-# 100 reporting seeds a query set (QUICK=1: 10); SCENE is an interactive scene, for the case reconstructed_room.
+# 200 reporting seeds a query set (QUICK=1: 10); SCENE is an interactive scene (or several), for the case reconstructed_room.
 SCENE ?= $(OUTPUTS)/demo/interactive_scene
 PLANNING := $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
 bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)

@@ -257,11 +257,12 @@ def shown(experiment: Experiment, records: Mapping[Trial, Any]) -> dict[Trial, A
     return {trial: record for trial, record in parts.items() if record is not None}
 
 
-def ratio(pairs: Sequence[tuple[float, float]]) -> Interval | None:
-    """Return the mean of the firsts over that of the seconds with its 95 % interval over pairs; None for none."""
+def ratio(pairs: Sequence[tuple[float, float]], of: Callable[..., Any] = np.mean) -> Interval | None:
+    """Return the mean (or what else `of` is, as np.median) of the firsts over that of the seconds, with its 95 %
+    interval over pairs; None for none."""
 
     def over(values: np.ndarray, axis: int) -> np.ndarray:
-        means = values.mean(axis=axis)
+        means = of(values, axis=axis)
         return np.asarray(means[..., 0] / means[..., 1])
 
     return bootstrap_interval(

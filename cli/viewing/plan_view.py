@@ -10,7 +10,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import DecodeError
 
 from cli.viewing.inputs import input_artifact
-from cli.viewing.robot_view import ROBOT, draw_robot
+from cli.viewing.robot_view import PANDA, ROBOT, draw_robot
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
@@ -33,7 +33,7 @@ def draw_plan(plan: Plan, canvas: Canvas) -> None:
     if not path.exists():
         return
     with IndexedMcap(path) as log:
-        draw_robot(canvas)
+        draw_robot(canvas, str(plan.manifest.parameters.get("robot", PANDA)) if plan.manifest else PANDA)
         _animate(log, canvas)
     for seconds, text, bad in moments(plan):
         canvas.moment(seconds, text, bad=bad)

@@ -11,16 +11,16 @@ from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.meshes import merged, shape_mesh
 
 ROBOT = "robot/"
-NAME = "panda"
+PANDA = "panda"
 
 
-def draw_robot(canvas: Canvas) -> Urdf | None:
-    """Draw the robot's links, each in its own frame, and return its description; None (and a note) where that is not
-    installed: then only the room moves."""
+def draw_robot(canvas: Canvas, name: str = PANDA) -> Urdf | None:
+    """Draw the links of a robot (`load_robot`), each in its own frame, and return its description; None (and a note)
+    where that is not installed: then only the room moves."""
     from stages.kit.simulation.robot_description import load_robot
 
     try:
-        robot = load_robot(NAME)
+        robot = load_robot(name)
         urdf = parse_urdf(robot.urdf)
     except Exception as error:  # noqa: BLE001 (a view without the robot is better than none)
         canvas.document("robot", f"not drawn: {error}")

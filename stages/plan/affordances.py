@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stages.kit.geometry.transforms import apply
-from stages.kit.motion.base_placement import SHOULDER_HEIGHT
 from stages.kit.motion.grasps import narrowest_width
-from stages.kit.motion.kinematics import reach
+from stages.kit.motion.kinematics import reach, shoulder_height
 from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.world import FRICTION, GRAVITY
 from stages.kit.tasks.strips import Atom
@@ -42,7 +41,7 @@ def affordance_atoms(model: WorldModel, objects: dict[str, str], size_uncertaint
 
 def within_height(model: WorldModel, height: float) -> bool:
     """Whether the arm on its pedestal reaches a height [m] at some distance."""
-    shoulder = model.description.pedestal_height + SHOULDER_HEIGHT
+    shoulder = model.description.pedestal_height + shoulder_height(model.chain)
     return abs(height - shoulder) < 0.95 * reach(model.chain)
 
 

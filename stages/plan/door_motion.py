@@ -10,7 +10,7 @@ import numpy as np
 from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.arm_motion import ARM_RESOLUTION, ArmPlanner, Tally
-from stages.kit.motion.base_placement import sample_bases, shoulder_distance
+from stages.kit.motion.base_placement import possible_bases, shoulder_distance
 from stages.kit.motion.cartesian import follow
 from stages.kit.motion.collision import Collision
 from stages.kit.motion.doors import ContactPoint, body_from_moved, closing_direction, push_points, tool_poses
@@ -150,12 +150,13 @@ def _candidate_bases(
 ) -> np.ndarray:
     """Return free bases (K, 3) from which all points (N, 3) lie within the arm's length."""
     planner_reach = 0.98 * ArmPlanner(model, random, 1).reach
-    bases = sample_bases(points.mean(axis=0), model.room, budgets.bases, random, nearest=0.2, farthest=0.9, heading=1.2)
+    middle, ring = points.mean(axis=0), {"nearest": 0.2, "farthest": 0.9, "heading": 1.2}
+    bases = possible_bases(model.description, state.base, middle, model.room, budgets.bases, random, **ring)
     rows = []
     for base in bases:
         poses = np.tile(np.eye(4), (len(points), 1, 1))
         poses[:, :3, 3] = points
-        if max(shoulder_distance(base, pose, model.description) for pose in poses) > planner_reach:
+        if max(shoulder_distance(base, pose, model.description, model.chain) for pose in poses) > planner_reach:
             continue
         collision = model.checker.check(np.concatenate([base, state.arm]))
         if collision is None:
@@ -295,7 +296,7 @@ def _arc(
     start: np.ndarray,
     tally: Tally,
 ) -> np.ndarray | None:
-    """Return arm values (K, 7) along the poses, free with the door where it is at each of them."""
+    """Return arm values (K, J) along the poses, free with the door where it is at each of them."""
     body, joint, values = arc.body, arc.joint, arc.values
     frame = inverse(base_pose(base, model.description))
     try:
@@ -310,7 +311,7 @@ def _arc(
     with model.joints_at(body, {joint.name: float(values[0])}):
         for index, value in enumerate(values):
             model.world.set_joint(body, joint.name, max(0.0, float(value)))
-            rows = densify(arms[max(0, index - 1) : index + 1], ARM_RESOLUTION)
+            rows = densify(arms[max(0, index - 1) : index + 1], np.full(arms.shape[1], ARM_RESOLUTION))
             for row in rows[-2:]:
                 collision = collision or checker.check(np.concatenate([base, row]))
             if collision is not None:

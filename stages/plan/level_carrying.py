@@ -24,7 +24,7 @@ DRAWN_IN = (0.0, 0.1, 0.2)
 
 
 def drawn_in(model: WorldModel, planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray:
-    """Return arm values (K, 7) from `arm` (7,) on a level line towards the pedestal, as far as it goes freely."""
+    """Return arm values (K, J) from `arm` (J,) on a level line towards the pedestal, as far as it goes freely."""
     pose = base_pose(base, model.description) @ forward(model.chain, arm)
     inward = base[:2] - pose[:2, 3]
     inward /= max(float(np.linalg.norm(inward)), 1e-9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
@@ -13,8 +12,6 @@ from schemas.language_map import LanguageMap
 from schemas.plan import Plan
 from stages.kit.estimates import grows_with
 from stages.kit.stage import External, Optionally, Parameters, Stage
-
-DATA = Path(__file__).resolve().parents[2] / "data"
 
 
 class PlanParameters(Parameters):
@@ -35,7 +32,12 @@ class PlanParameters(Parameters):
         description="Named priors such as in(bottle,fridge_2): a thing of this class is believed to be there, hidden "
         "by closed furniture; its pose and shape are seen once the furniture is open",
     )
-    robot: str = Field("panda", description="Robot of data/robots/")
+    robot: str = Field("panda", description="Robot of data/robots/, or a description of your own (a .toml file)")
+    stand: tuple[float, ...] = Field(
+        (),
+        description="Where the robot starts: x y [m] and yaw [deg]; one that does not drive stays there. Empty: where "
+        "most room is",
+    )
     planner: Literal["builtin", "fast-downward"] = Field(
         "builtin", description="Task planner; fast-downward is a program of its own (extra planning-gpl)"
     )
@@ -78,15 +80,17 @@ class PlanParameters(Parameters):
 
 
 def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
-    """Return the files of `data/` that describe the robot, its URDF too where it lies there, and what words need."""
-    names: tuple[str, ...] = (f"robots/{parameters.robot}.toml", f"robots/{parameters.robot}.urdf")
-    names = names if (DATA / names[1]).is_file() else names[:1]
+    """Return the files of `data/` that describe the robot, the user's own by their whole path, and what words need."""
+    from stages.kit.simulation.robot_description import FOLDER, description_files
+
+    files = [file.resolve() for file in description_files(parameters.robot)]
+    names = [str(file.relative_to(FOLDER.parent) if FOLDER in file.parents else file) for file in files]
     return (*names, "words/two_towers.safetensors", "words/calibration.toml")
 
 
 STAGE = Stage(
     name="plan",
-    version=10,
+    version=11,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={

@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.base_placement import free_bases, sample_bases
+from stages.kit.motion.base_placement import free_bases, possible_bases
 from stages.kit.motion.collision import RESTING_DEPTH
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
@@ -111,7 +111,7 @@ def _bases_around(
 ) -> np.ndarray:
     if fixed is not None:
         return fixed[None]
-    bases = sample_bases(target, model.room, budgets.bases, random)
+    bases = possible_bases(model.description, state.base, target, model.room, budgets.bases, random)
     return free_bases(bases, state.arm, model.checker, tally.blockers, budgets.bases // 4)
 
 
@@ -339,7 +339,8 @@ def plan_place(
     checker.carry(item, state.tool_from_item)
     checker.allow(touch=model.links(item))
     for place in places[: max(4, budgets.bases // 6)]:
-        bases = sample_bases(place.world_from_item[:3, 3], model.room, budgets.bases // 8, random)
+        goal = place.world_from_item[:3, 3]
+        bases = possible_bases(model.description, state.base, goal, model.room, budgets.bases // 8, random)
         bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
         queue += [(base, place) for base in bases]
     try:

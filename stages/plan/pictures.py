@@ -18,7 +18,8 @@ from stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescript
 from stages.kit.simulation.shapes import has_colors, link_shapes, paint
 from stages.kit.simulation.world import PhysicsWorld
 
-ROBOT_COLORS = {"hand": (70, 72, 78), "finger": (40, 42, 46), PEDESTAL_LINK: (58, 66, 84), "link": (236, 238, 240)}
+HAND, FINGER, PEDESTAL, ARM = (70, 72, 78), (40, 42, 46), (58, 66, 84), (236, 238, 240)
+"""Colours of the robot."""
 PALETTE = ((166, 143, 120), (139, 158, 171), (171, 139, 139), (146, 164, 136), (181, 166, 127), (150, 141, 168))
 
 
@@ -76,9 +77,11 @@ class RoomPictures:
                     low.append(placed.corners.min(axis=(0, 1)))
                     high.append(placed.corners.max(axis=(0, 1)))
         self.low, self.high = np.min(low, axis=0), np.max(high, axis=0)
+        self.robot = robot
+        colors = {robot.hand_link: HAND, PEDESTAL_LINK: PEDESTAL} | dict.fromkeys(robot.finger_links, FINGER)
         for link, meshes in link_shapes(mobile_robot_urdf(robot)).items():
             if meshes:
-                color = next(color for key, color in ROBOT_COLORS.items() if key in link)
+                color = colors.get(link, ARM)
                 self._moving[f"robot/{link}"] = build_soup([(10_000, _painted(mesh, color)) for mesh in meshes])
 
     def _renderer(self, snapshot: Snapshot, shell: bool) -> SceneRenderer:
@@ -108,8 +111,8 @@ class RoomPictures:
     def near(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
         """Return (H, W, 3) uint8: the robot at work, from where most of it and of its fingers can be seen."""
         renderer = self._renderer(snapshot, True)
-        robot = np.array([snapshot.links[f"robot/{name}"][:3, 3] for name in sorted(_shown(snapshot))])
-        hand = snapshot.links["robot/panda_hand"] if "robot/panda_hand" in snapshot.links else np.eye(4)
+        robot = np.array([snapshot.links[name][:3, 3] for name in sorted(self._shown(snapshot))])
+        hand = snapshot.links[f"robot/{self.robot.hand_link}"]
         points = np.concatenate([robot, apply(hand, np.array([[0, 0, 0.08], [0, 0, 0.11], [0, 0, 0.13]]))])
         weights = np.concatenate([np.full(len(robot), 0.5 / len(robot)), np.full(3, 0.5 / 3)])
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -131,9 +134,11 @@ class RoomPictures:
         up_target = np.array([middle[0], middle[1], 0.85 * middle[2] + 0.05])
         return renderer.render(camera, look_at(eye, up_target)).color
 
-
-def _shown(snapshot: Snapshot) -> list[str]:
-    return [name[6:] for name in snapshot.links if name.startswith("robot/panda_link") or name == "robot/panda_hand"]
+    def _shown(self, snapshot: Snapshot) -> list[str]:
+        """Return the names in a snapshot of the robot's links from the foot of its arm to its hand."""
+        others = {"anchor", "slide_x", "slide_y", PEDESTAL_LINK, self.robot.tool_link, *self.robot.finger_links}
+        links = [name for name in snapshot.links if name.startswith("robot/")]
+        return [name for name in links if name.removeprefix("robot/") not in others]
 
 
 def picture_camera(width: int, field_of_view: float = 1.15) -> Camera:

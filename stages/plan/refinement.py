@@ -90,7 +90,7 @@ def refine_action(
                 request.random,
                 samples=request.budgets.path_samples,
             )
-            manipulation, path = _same_turns(manipulation, path)
+            manipulation, path = _same_turns(model, manipulation, path)
             rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
             pace = LADEN_PACE if state.holding is not None and model.laden(state.holding) else 1.0
             if len(path) > 1:
@@ -105,13 +105,13 @@ def refine_action(
     return steps, state
 
 
-def _same_turns(manipulation: Manipulation, path: np.ndarray) -> tuple[Manipulation, np.ndarray]:
+def _same_turns(model: WorldModel, manipulation: Manipulation, path: np.ndarray) -> tuple[Manipulation, np.ndarray]:
     """Shift the yaw of the manipulation by whole turns to where the drive ends."""
     shift = path[-1] - manipulation.base
     shift[:2] = 0.0
     if abs(shift[2]) < 1e-9:
         return manipulation, path
-    change = np.concatenate([shift, np.zeros(7)])
+    change = np.concatenate([shift, np.zeros(len(model.description.arm_joints))])
     segments = tuple(replace(segment, path=segment.path + change) for segment in manipulation.segments)
     return replace(manipulation, base=manipulation.base + shift, segments=segments), path
 

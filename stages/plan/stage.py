@@ -17,7 +17,7 @@ from schemas.interactive_scene import InteractiveScene
 from schemas.language_map import LanguageMap
 from schemas.plan import Failure, Plan, PlanFile, PlannedAction, TriedPlan
 from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.failures import MotionFailed, end_in_collision
 from stages.kit.simulation.robot_description import RobotDescription, load_robot
 from stages.kit.stage import Context
 from stages.kit.tasks.pddl import domain_text, problem_text
@@ -162,7 +162,7 @@ def _find(scene: Scene, budgets: Budgets, parameters: PlanParameters, context: C
     if goals:
         planning.problem, planning.literals = goals[0]
     try:
-        state = RobotState(start_base(model, carry, context.random(START)), carry)
+        state = RobotState(_start(model, carry, parameters.stand, context.random(START)), carry)
     except MotionFailed as failed:
         planning.failures.append(failed.failure)
         return RobotState(np.zeros(3), carry), planning
@@ -182,6 +182,23 @@ def _find(scene: Scene, budgets: Budgets, parameters: PlanParameters, context: C
             planning.problem, planning.literals, planning.steps = problem, literals, attempt.steps
             break
     return state, planning
+
+
+def _start(model: WorldModel, carry: np.ndarray, stand: tuple[float, ...], random: np.random.Generator) -> np.ndarray:
+    """Return where the robot starts (3,). Raises UsageError for no place, MotionFailed for none that is free."""
+    if stand and len(stand) != 3:
+        raise UsageError(f"--stand has {len(stand)} values", hint="x y [m] and yaw [deg]")
+    if not stand and not model.description.drives:
+        raise UsageError(
+            f"the robot {model.description.name} does not drive", hint="say where it is with --stand X Y YAW"
+        )
+    if not stand:
+        return start_base(model, carry, random)
+    base = np.array([*stand[:2], np.radians(stand[2])])
+    collision = model.checker.check(np.concatenate([base, carry]))
+    if collision is not None:
+        raise end_in_collision("start", collision.part, collision.other, collision.depth)
+    return base
 
 
 def _ungrounded(scene: Scene, parameters: PlanParameters, context: Context) -> tuple[str, ...]:

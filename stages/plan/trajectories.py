@@ -19,8 +19,7 @@ GRIPPER_SECONDS = 0.6
 
 def planned_rows(steps: list[Step], robot: RobotDescription) -> tuple[dict[str, np.ndarray], list[tuple[int, int]]]:
     """Return the arrays of the planned motion and the half-open range of rows of each step."""
-    speed = np.concatenate([np.full(2, robot.base_speed), [robot.base_turn_speed], np.full(7, robot.arm_speed)])
-    acceleration = np.concatenate([[1.0, 1.0, 2.0], np.full(7, robot.arm_acceleration)])
+    speed, acceleration = robot.speeds, robot.accelerations
     times: list[np.ndarray] = []
     bodies: list[np.ndarray] = []
     openings: list[np.ndarray] = []
@@ -46,7 +45,7 @@ def planned_rows(steps: list[Step], robot: RobotDescription) -> tuple[dict[str, 
             count += len(rows)
         ranges.append((start, count))
     if not bodies:
-        return _arrays(np.zeros(0), np.zeros((0, 10)), np.zeros(0), np.zeros(0, dtype=np.int32)), ranges
+        return _arrays(np.zeros(0), np.zeros((0, len(speed))), np.zeros(0), np.zeros(0, dtype=np.int32)), ranges
     columns = [np.concatenate(parts) for parts in (times, bodies, openings, actions)]
     return _arrays(*columns), ranges
 
@@ -55,7 +54,7 @@ def executed_rows(snapshots: list[Snapshot]) -> dict[str, np.ndarray]:
     """Return the arrays of what the joints did, names prefixed `executed_`."""
     rows = _arrays(
         np.array([entry.time for entry in snapshots]),
-        np.array([entry.body for entry in snapshots]).reshape(-1, 10),
+        np.array([entry.body for entry in snapshots]),
         np.array([entry.opening for entry in snapshots]),
         np.array([entry.action for entry in snapshots], dtype=np.int32),
     )

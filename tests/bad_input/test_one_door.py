@@ -93,11 +93,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/kit/language/reply_schema.py": {"model_validate_json": PARSED},
     "stages/kit/language/transcripts.py": {"model_validate_json": PARSED, "open": WRITES},
     "stages/kit/services/connection.py": {"json.loads": SERVICE},
-    "stages/kit/simulation/robot_description.py": {
-        "tomllib.loads": OURS,
-        "ElementTree.fromstring": PARSED,
-        "read_text": OURS,
-    },
+    "stages/kit/simulation/robot_description.py": {"ElementTree.fromstring": PARSED},
     "stages/kit/simulation/shapes.py": {"ElementTree.fromstring": PARSED},
     "stages/kit/simulation/urdf_split.py": {"ElementTree.fromstring": PARSED},
     "stages/kit/tasks/fast_downward.py": {"read_text": MADE},

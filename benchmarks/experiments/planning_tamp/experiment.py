@@ -17,13 +17,14 @@ from typing import get_args
 
 import numpy as np
 
-from benchmarks.experiment import Bench, Experiment, Results, Trial
+from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Bench, Experiment, Results, Trial
 from benchmarks.experiments.planning_tamp.rooms import exact_room
 from benchmarks.steps import made, opened, unrecorded
 from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
+from stages.kit.measurement.bootstrap import figure_interval
 from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.progress import SilentProgress
 from stages.kit.tasks.pddl import parse_domain, parse_problem
@@ -168,7 +169,7 @@ def figures(results: Sequence[RoomResult]) -> dict[str, float]:
         metrics |= {f"{key}/rooms": len(own), f"{key}/goals": len(posed), f"{key}/successes": len(good)}
         if posed:
             metrics[f"{key}/success"] = round(len(good) / len(posed), 4)
-            low, high = wilson_interval(len(good), len(posed))
+            low, high = success_interval(posed)
             metrics |= {f"{key}/success_low": round(low, 4), f"{key}/success_high": round(high, 4)}
         if good:
             metrics[f"{key}/actions"] = float(np.median([result.actions for result in good]))
@@ -180,6 +181,24 @@ def figures(results: Sequence[RoomResult]) -> dict[str, float]:
         for reason, count in Counter(result.reason for result in posed if not result.success).items():
             metrics[f"{key}/failed_{reason}"] = count
     return metrics
+
+
+def success_interval(posed: Sequence[RoomResult]) -> tuple[float, float]:
+    """Return the 95 % interval of the share of successes: Wilson's where each room was tried once, else a bootstrap
+    over rooms, as the tasks of one room succeed and fail together."""
+    rooms: dict[int, list[bool]] = {}
+    for result in posed:
+        rooms.setdefault(result.seed, []).append(result.success)
+    if len(rooms) == len(posed):
+        return wilson_interval(sum(result.success for result in posed), len(posed))
+
+    def share(drawn: Sequence[list[bool]]) -> float:
+        return float(np.mean([success for room in drawn for success in room]))
+
+    random = np.random.default_rng(SEED_OF_INTERVALS)
+    found = figure_interval(share, list(rooms.values()), random, resamples=RESAMPLES)
+    assert found is not None  # there is a room
+    return found.low, found.high
 
 
 def more_figures(results: Results) -> dict[str, float | None]:

@@ -20,7 +20,8 @@ from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
 from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.robot_description import RobotDescription
 
-ARM_RESOLUTION = np.full(7, 0.05)
+ARM_RESOLUTION = 0.05
+"""Largest step of a joint between two checks [rad]."""
 
 
 @dataclass
@@ -90,15 +91,15 @@ class ArmPlanner:
         self.model = model
         self.random = random
         self.samples = samples
-        self.space = SearchSpace(model.chain.lower, model.chain.upper, ARM_RESOLUTION)
+        self.space = SearchSpace(model.chain.lower, model.chain.upper, np.full(len(model.chain.lower), ARM_RESOLUTION))
         self.reach = reach(model.chain)
 
     def reachable(
         self, base: np.ndarray, world_from_tool: np.ndarray, tally: Tally, starts: int = 6
     ) -> np.ndarray | None:
-        """Return arm values (7,) for a tool pose, or None (counted in the tally)."""
+        """Return arm values (J,) for a tool pose, or None (counted in the tally)."""
         tally.tried += 1
-        distance = shoulder_distance(base, world_from_tool, self.model.description)
+        distance = shoulder_distance(base, world_from_tool, self.model.description, self.model.chain)
         if distance > self.reach:
             tally.unreachable += 1
             tally.nearest = min(tally.nearest, distance - self.reach)
@@ -122,14 +123,14 @@ class ArmPlanner:
         return collision is None
 
     def line(self, base: np.ndarray, start: np.ndarray, world_from_goal: np.ndarray, tally: Tally) -> np.ndarray | None:
-        """Return arm values (K, 7) from `start` (7,) included along a straight line of the tool; None if not free."""
+        """Return arm values (K, J) from `start` (J,) included along a straight line of the tool; None if not free."""
         here = base_pose(base, self.model.description) @ forward(self.model.chain, start)
         return self.along(base, start, straight_poses(here, world_from_goal), tally)
 
     def along(
         self, base: np.ndarray, start: np.ndarray, world_from_tools: list[np.ndarray], tally: Tally
     ) -> np.ndarray | None:
-        """Return arm values (K + 1, 7) from `start` through tool poses; None (tallied) if not free."""
+        """Return arm values (K + 1, J) from `start` through tool poses; None (tallied) if not free."""
         frame = inverse(base_pose(base, self.model.description))
         try:
             arms = follow(self.model.chain, [frame @ pose for pose in world_from_tools], start)
@@ -138,7 +139,7 @@ class ArmPlanner:
             tally.nearest = min(tally.nearest, failed.failure.numbers["distance"])
             return None
         path = np.concatenate([start[None], arms])
-        collision_at = first_collision(densify(path, ARM_RESOLUTION), lambda arm: self._check(base, arm))
+        collision_at = first_collision(densify(path, self.space.resolution), lambda arm: self._check(base, arm))
         if collision_at is not None:
             tally.collided(collision_at[1])
             return None
@@ -148,12 +149,12 @@ class ArmPlanner:
         return self.model.checker.check(np.concatenate([base, arm]))
 
     def path(self, base: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-        """Return a free joint path (N, 7). Raises MotionFailed as find_path does."""
-        query = Query(np.concatenate([base, start]), np.arange(3, 10), start, goal[None], self.space)
+        """Return a free joint path (N, J). Raises MotionFailed as find_path does."""
+        query = Query(np.concatenate([base, start]), np.arange(3, 3 + len(start)), start, goal[None], self.space)
         return find_path(query, self.model.checker, self.random, samples=self.samples)
 
     def folded(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
-        """Return arm values (7,) with the tool drawn in over the pedestal; what is held stays upright."""
+        """Return arm values (J,) with the tool drawn in over the pedestal; what is held stays upright."""
         world_from_tool = base_pose(base, self.model.description) @ forward(self.model.chain, arm)
         approach = world_from_tool[:3, 2]
         heading = np.arctan2(approach[1], approach[0])

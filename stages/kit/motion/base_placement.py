@@ -9,6 +9,7 @@ import numpy as np
 from stages.kit.geometry.transforms import inverse, wrapped
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import ArmChain, shoulder_height
 from stages.kit.motion.path_query import Query
 from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace
@@ -16,8 +17,6 @@ from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.robot_description import RobotDescription
 
 BASE_RESOLUTION = np.array([0.03, 0.03, 0.06])
-SHOULDER_HEIGHT = 0.333
-"""Of the arm over its mounting frame [m]."""
 
 
 def sample_bases(
@@ -42,10 +41,23 @@ def sample_bases(
     return np.column_stack([x, y, yaw])[inside]
 
 
+def possible_bases(
+    robot: RobotDescription,
+    here: np.ndarray,
+    target: np.ndarray,
+    room: tuple[np.ndarray, np.ndarray],
+    count: int,
+    random: np.random.Generator,
+    **ring: float,
+) -> np.ndarray:
+    """Return `sample_bases` of a robot that drives; (1, 3) `here`, where it stands, of one that does not."""
+    return sample_bases(target, room, count, random, **ring) if robot.drives else here[None]
+
+
 def free_bases(
     bases: np.ndarray, arm: np.ndarray, checker: CollisionChecker, blockers: Counter[str], most: int
 ) -> np.ndarray:
-    """Return the first `most` of the bases (K, 3) at which the robot with its arm (7,) held so is free.
+    """Return the first `most` of the bases (K, 3) at which the robot with its arm (J,) held so is free.
 
     What blocks the others is counted in `blockers`.
     """
@@ -61,9 +73,9 @@ def free_bases(
     return np.array(rows).reshape(-1, 3)
 
 
-def shoulder_distance(base: np.ndarray, world_from_tool: np.ndarray, robot: RobotDescription) -> float:
+def shoulder_distance(base: np.ndarray, world_from_tool: np.ndarray, robot: RobotDescription, chain: ArmChain) -> float:
     """Return the distance [m] of a tool position from the shoulder of the robot at a base pose (3,)."""
-    shoulder = np.array([base[0], base[1], robot.pedestal_height + SHOULDER_HEIGHT])
+    shoulder = np.array([base[0], base[1], robot.pedestal_height + shoulder_height(chain)])
     return float(np.linalg.norm(world_from_tool[:3, 3] - shoulder))
 
 
@@ -82,20 +94,20 @@ def plan_drive(
     *,
     samples: int = 1500,
 ) -> np.ndarray:
-    """Return a free path (N, 3) of the base from `start` to `goal`, x, y [m], yaw [rad], the arm (7,) held still.
+    """Return a free path (N, 3) of the base from `start` to `goal`, x, y [m], yaw [rad], the arm (J,) held still.
 
     The yaw of the last point may differ from the goal's by whole turns. Raises MotionFailed as `find_path` does.
     """
     query = base_query(np.asarray(start, dtype=float), goal, arm, room)
     try:
-        return find_path(query, checker, random, samples=samples, smoothing=80)
+        return find_path(query, checker, random, samples=samples)
     except MotionFailed as failed:
         what = failed.failure
         raise MotionFailed(what.kind, f"driving: {what.message}", what.objects, dict(what.numbers)) from None
 
 
 def base_query(start: np.ndarray, goal: np.ndarray, arm: np.ndarray, room: tuple[np.ndarray, np.ndarray]) -> Query:
-    """Return the search for a way of the base from `start` to `goal` (3,) with the arm (7,) held.
+    """Return the search for a way of the base from `start` to `goal` (3,) with the arm (J,) held.
 
     The yaw goes the shorter way round; start and goal may stand outside the floor's corners.
     """

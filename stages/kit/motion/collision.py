@@ -37,7 +37,7 @@ class Collision:
 
 
 class CollisionChecker:
-    """Asks whether configurations (10,) of base and arm are free.
+    """Asks whether configurations (3 + J,) of base and arm are free.
 
     `clearance` [m] is kept to everything, itself excepted. What may be touched is said by `allow`.
     """
@@ -132,7 +132,7 @@ class CollisionChecker:
         return self.compiled.other_name(index, self.carried)
 
     def check(self, body: np.ndarray) -> Collision | None:
-        """Return the worst collision of a configuration (10,), or None when it is free.
+        """Return the worst collision of a configuration (3 + J,), or None when it is free.
 
         The compiled check answers where it can; whatever it refuses is for the meshes to decide.
         """
@@ -142,7 +142,7 @@ class CollisionChecker:
         return self.check_meshes(body)
 
     def check_meshes(self, body: np.ndarray) -> Collision | None:
-        """Return the worst collision of a configuration (10,) by the meshes alone, or None when it is free."""
+        """Return the worst collision of a configuration (3 + J,) by the meshes alone, or None when it is free."""
         self.checks += 1
         self.robot.set_body(body)
         if self.carried is not None:

@@ -16,6 +16,8 @@ from stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_collision
 
 UNCERTAIN_COUNT = 0
 """Place in the counts of refusals that the mesh checker might not share; the others follow."""
+LEAST_GAIN, LEAST_PARTIAL_GAIN = 0.5, 4.0
+"""Of a shortcut, straight and partial, in resolutions: those that save less are not looked at."""
 WHOLE_WAY = 1_000_000
 """As `most` of `last_free`: more steps than any way has."""
 
@@ -136,7 +138,8 @@ def search(
     samples used.
 
     The path is empty when `samples` did not suffice. `step` is the longest extension in resolutions. All goals are
-    roots of the second tree.
+    roots of the second tree. The smaller tree grows (LaValle 2006, Planning Algorithms, section 5.5.3): the one that
+    is in a narrow place finds few ways, and needs most of the samples.
     """
     resolution = motion.resolution
     dimension = start.shape[0]
@@ -184,6 +187,8 @@ def search(
                 if forward:
                     return _joined(points_a, parents_a, count_a - 1, points_b, parents_b, parent), used
                 return _joined(points_b, parents_b, parent, points_a, parents_a, count_a - 1), used
+        if count_a < count_b:
+            continue
         points_a, points_b = points_b, points_a
         parents_a, parents_b = parents_b, parents_a
         count_a, count_b = count_b, count_a
@@ -218,24 +223,55 @@ def _joined(
 
 
 @njit(cache=True, error_model="numpy")
+def _length(rows: np.ndarray, resolution: np.ndarray) -> float:
+    """Return the Euclidean length of a path (N, D) in resolutions."""
+    total = 0.0
+    for row in range(1, rows.shape[0]):
+        square = 0.0
+        for k in range(rows.shape[1]):
+            value = (rows[row, k] - rows[row - 1, k]) / resolution[k]
+            square += value * value
+        total += np.sqrt(square)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _path_is_free(motion: Moving, rows: np.ndarray) -> bool:
+    """Whether the pieces between rows (N, D), of which the first and last are free, are: its bends are looked at
+    first."""
+    for row in range(1, rows.shape[0] - 1):
+        for k in range(rows.shape[1]):
+            motion.body[motion.moving[k]] = rows[row, k]
+        if find_collision(motion.robot, motion.scene, motion.body, motion.first_frame)[0] != FREE:
+            return False
+    for row in range(1, rows.shape[0]):  # noqa: SIM110 (numba has no `all`)
+        if not way_is_free(motion, rows[row - 1], rows[row]):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
 def shorten(
     motion: Moving, path: np.ndarray, attempts: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return a shorter path (M, D): pairs of random points on it are joined by straight pieces where those are free.
+    """Return a shorter path (M, D), and which of its pieces (M - 1,) are new, and thus free at this resolution.
 
-    Returned too: which of its pieces (M - 1,) are such, or parts of such, and thus free at this resolution.
+    Pairs of random points on it are joined, where that is free and shorter, in turn by a straight piece and by one in
+    which a single value goes straight while the others keep to the path (the partial shortcut of Geraerts & Overmars
+    2007, IJRR 26(8)): where all of them together cannot, most of them still can. The latter are asked to save more,
+    as they take more looks.
     """
     resolution = motion.resolution
+    dimension = path.shape[1]
     rows = path.copy()
     count = path.shape[0]
     looked_at = np.zeros(count - 1, dtype=np.bool_)
     ends = np.zeros(count + 2 * attempts + 2)
-    first, second = np.empty(path.shape[1]), np.empty(path.shape[1])
-    for _ in range(attempts):
+    for attempt in range(attempts):
         if count < 3:
             break
         for row in range(1, count):
-            ends[row] = ends[row - 1] + np.max(np.abs(rows[row] - rows[row - 1]) / resolution)
+            ends[row] = ends[row - 1] + _length(rows[row - 1 : row + 1], resolution)
         low, high = ends[count - 1] * random.random(), ends[count - 1] * random.random()
         if low > high:
             low, high = high, low
@@ -243,22 +279,33 @@ def shorten(
         j = min(np.searchsorted(ends[:count], high, side="right") - 1, count - 2)
         if i == j:
             continue
+        old = np.empty((j - i + 2, dimension))
         along = (low - ends[i]) / max(ends[i + 1] - ends[i], 1e-12)
-        first[:] = rows[i] + (rows[i + 1] - rows[i]) * along
+        old[0] = rows[i] + (rows[i + 1] - rows[i]) * along
+        old[1:-1] = rows[i + 1 : j + 1]
         along = (high - ends[j]) / max(ends[j + 1] - ends[j], 1e-12)
-        second[:] = rows[j] + (rows[j + 1] - rows[j]) * along
-        if np.max(np.abs(second - first) / resolution) > high - low - 0.5:
+        old[-1] = rows[j] + (rows[j + 1] - rows[j]) * along
+        if attempt % 2 == 0:
+            piece = np.empty((2, dimension))
+            piece[0], piece[1] = old[0], old[-1]
+        else:
+            piece = old.copy()
+            k = int(dimension * random.random())
+            for row in range(1, old.shape[0] - 1):
+                piece[row, k] = old[0, k] + (old[-1, k] - old[0, k]) * (ends[i + row] - low) / (high - low)
+        if _length(piece, resolution) > high - low - (LEAST_GAIN if attempt % 2 == 0 else LEAST_PARTIAL_GAIN):
             continue  # hardly shorter
-        if not way_is_free(motion, first, second):
+        if not _path_is_free(motion, piece):
             continue
-        fresh = np.empty((count - (j - i) + 2, path.shape[1]))
+        inner = piece.shape[0]
+        fresh = np.empty((count - (j - i) + inner, dimension))
         fresh[: i + 1] = rows[: i + 1]
-        fresh[i + 1], fresh[i + 2] = first, second
-        fresh[i + 3 :] = rows[j + 1 : count]
-        free = np.empty(fresh.shape[0] - 1, dtype=np.bool_)
-        free[: i + 1] = looked_at[: i + 1]
-        free[i + 1] = True
-        free[i + 2 :] = looked_at[j:]
-        rows, looked_at = fresh, free
+        fresh[i + 1 : i + 1 + inner] = piece
+        fresh[i + 1 + inner :] = rows[j + 1 : count]
+        seen = np.empty(fresh.shape[0] - 1, dtype=np.bool_)
+        seen[: i + 1] = looked_at[: i + 1]
+        seen[i + 1 : i + inner] = True
+        seen[i + inner :] = looked_at[j:]
+        rows, looked_at = fresh, seen
         count = rows.shape[0]
     return rows, looked_at

@@ -12,11 +12,13 @@ import numpy as np
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from stages.kit.simulation.robot_description import RobotDescription
+from stages.kit.simulation.robot_description import RobotDescription, joints_between
 from stages.kit.simulation.urdf_split import read_urdf
 
 POSITION_TOLERANCE = 1e-4
 ROTATION_TOLERANCE = 1e-3
+WHOLE_TURN = 2 * np.pi - 1e-6
+"""Joints with a range of this [rad] do not end the search at a limit: it goes on from the limit's other side."""
 
 
 @dataclass(frozen=True)
@@ -42,17 +44,13 @@ class InverseSolution:
 
 
 def arm_chain(robot: RobotDescription) -> ArmChain:
-    """Read the chain from the robot's URDF (arm base to tool link). Raises ValueError on a joint axis that is not z."""
+    """Read the chain from the robot's URDF (arm base to tool link); frames of joints whose axis is not z are turned so
+    that it is."""
     root = read_urdf(robot.urdf)
-    by_child = {joint.find("child").get("link"): joint for joint in root.findall("joint")}  # type: ignore[union-attr]
+    by_name = {joint.get("name"): joint for joint in root.findall("joint")}
     transforms: list[np.ndarray] = []
     pending = np.eye(4)
-    link = robot.tool_link
-    path = []
-    while link != robot.arm_base:
-        path.append(by_child[link])
-        link = by_child[link].find("parent").get("link")  # type: ignore[union-attr,assignment]
-    for joint in reversed(path):
+    for joint in [by_name[name] for name in joints_between(root, robot.arm_base, robot.tool_link)]:
         origin = joint.find("origin")
         offset = np.eye(4)
         if origin is not None:
@@ -61,12 +59,20 @@ def arm_chain(robot: RobotDescription) -> ArmChain:
             offset[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
         pending = pending @ offset
         if joint.get("name") in robot.arm_joints:
-            axis = [float(value) for value in joint.find("axis").get("xyz").split()]  # type: ignore[union-attr]
-            if axis != [0.0, 0.0, 1.0]:
-                raise ValueError(f"{joint.get('name')}: axis {axis} is not z")
-            transforms.append(pending)
-            pending = np.eye(4)
+            element = joint.find("axis")
+            axis = [float(value) for value in ("1 0 0" if element is None else element.get("xyz", "1 0 0")).split()]
+            turned = _from_z(np.array(axis))
+            transforms.append(pending @ turned)
+            pending = turned.T
     return ArmChain(np.array(transforms), pending, robot.lower, robot.upper)
+
+
+def _from_z(axis: np.ndarray) -> np.ndarray:
+    """Return a rotation (4, 4) that takes z to an axis (3,)."""
+    turned = np.eye(4)
+    if not np.array_equal(axis, [0.0, 0.0, 1.0]):
+        turned[:3, :3] = Rotation.align_vectors(axis[None], np.array([[0.0, 0.0, 1.0]]))[0].as_matrix()
+    return turned
 
 
 @njit(cache=True)
@@ -190,6 +196,7 @@ def _descend(
                     at_limit = (arm[joint] <= lower[joint] and step[joint] < 0) or (
                         arm[joint] >= upper[joint] and step[joint] > 0
                     )
+                    at_limit = at_limit and upper[joint] - lower[joint] < WHOLE_TURN
                     if at_limit:
                         free[joint] = False
                         blocked = True
@@ -199,7 +206,10 @@ def _descend(
         if longest > 0.5:
             step *= 0.5 / longest
         for joint in range(count):
-            arm[joint] = min(max(arm[joint] + step[joint], lower[joint]), upper[joint])
+            value = arm[joint] + step[joint]
+            if upper[joint] - lower[joint] >= WHOLE_TURN:  # the same place a turn away is within the limits
+                value += 2 * np.pi * ((value < lower[joint]) - (value > upper[joint]))
+            arm[joint] = min(max(value, lower[joint]), upper[joint])
     return best, best_position, best_rotation
 
 
@@ -233,10 +243,21 @@ def forward(chain: ArmChain, arm: np.ndarray) -> np.ndarray:
     return frames[-1]
 
 
+def shoulder_height(chain: ArmChain) -> float:
+    """Return the height [m] of the second joint (the shoulder) over the arm's mounting frame."""
+    return float(_shoulder(chain)[2])
+
+
 def reach(chain: ArmChain) -> float:
-    """Return an upper bound of the distance [m] of the tool from the second joint (the shoulder)."""
+    """Return an upper bound of the distance [m] of the tool from where the shoulder's height is on the first axis."""
+    beside = np.linalg.norm(_shoulder(chain)[:2])
     offsets = [np.linalg.norm(transform[:3, 3]) for transform in chain.fixed[2:]]
-    return float(sum(offsets) + np.linalg.norm(chain.tool[:3, 3]))
+    return float(beside + sum(offsets) + np.linalg.norm(chain.tool[:3, 3]))
+
+
+def _shoulder(chain: ArmChain) -> np.ndarray:
+    shoulder: np.ndarray = (chain.fixed[0] @ chain.fixed[1])[:3, 3]
+    return shoulder
 
 
 def inverse_kinematics(

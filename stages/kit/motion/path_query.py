@@ -21,7 +21,7 @@ class Query:
     """A search over some of the values of a configuration; the others are held."""
 
     body: np.ndarray
-    """(10,) base and arm; where the others are held."""
+    """(3 + J,) base and arm; where the others are held."""
     moving: np.ndarray
     """(D,) indices of the values that move."""
     start: np.ndarray
@@ -32,7 +32,7 @@ class Query:
     """Bounds and resolution of the values that move."""
 
     def whole(self, values: np.ndarray) -> np.ndarray:
-        """Return the configuration (10,) with the moving values (D,) put in."""
+        """Return the configuration (3 + J,) with the moving values (D,) put in."""
         body = self.body.copy()
         body[self.moving] = values
         return body

@@ -28,10 +28,11 @@ from stages.kit.motion.path_query import (
 )
 from stages.kit.motion.rrt_connect import FINER, first_collision, interpolate, rrt_connect, without_repeats
 
-STEP = 8
+STEP = 16
 """Longest extension of a tree, in resolutions."""
-MESH_SAMPLES = 2000
-"""At most so many samples are drawn when the mesh checker has taken over: one costs as much as ten compiled ones."""
+MESH_SAMPLES, MESH_SMOOTHING = 2000, 60
+"""At most so many samples are drawn, and shortcuts tried, when the mesh checker has taken over: one of its checks costs
+as much as ten compiled ones."""
 ESCAPES = 120
 """Directions that are tried to leave a place too narrow for the compiled check."""
 REJECTIONS = 4
@@ -44,7 +45,7 @@ def find_path(
     random: np.random.Generator,
     *,
     samples: int = 2000,
-    smoothing: int = 60,
+    smoothing: int = 240,
     effort: Effort | None = None,
 ) -> np.ndarray:
     """Return a path (N, D) of straight pieces from the start to one of the goals, confirmed free by the mesh checker.
@@ -78,7 +79,9 @@ def find_path(
             return path
         effort.rejected += 1
     if effort.rejected or may_differ(query, goals, checker, counts):
-        return _mesh_path(query, goals, checker, random, min(samples, MESH_SAMPLES), smoothing, effort)
+        return _mesh_path(
+            query, goals, checker, random, min(samples, MESH_SAMPLES), min(smoothing, MESH_SMOOTHING), effort
+        )
     raise no_path(samples, blockers(counts, checker))
 
 

@@ -99,11 +99,7 @@ class PhysicalRobot:
 
         Raises MotionFailed `grasp_lost` or `path_blocked` with numbers.
         """
-        description = self.description
-        speed = np.concatenate(
-            [np.full(2, description.base_speed), [description.base_turn_speed], np.full(7, description.arm_speed)]
-        )
-        acceleration = np.concatenate([[1.0, 1.0, 2.0], np.full(7, description.arm_acceleration)])
+        speed, acceleration = self.description.speeds, self.description.accelerations
         opening = 0.0 if self.held is not None else segment.opening
         if abs(opening - self._opening) > 1e-6:
             self._opening = opening
@@ -150,7 +146,7 @@ class PhysicalRobot:
             )
 
     def way_back(self) -> np.ndarray:
-        """Return (N, 10) rows that go back along the commanded targets to where the base came to rest."""
+        """Return (N, 3 + J) rows that go back along the commanded targets to where the base came to rest."""
         rows = np.array(self._trail[::-1])
         keep = np.concatenate([[True], np.abs(np.diff(rows, axis=0)).max(axis=1) > 1e-9])
         return rows[keep][::4] if keep.sum() > 8 else rows[keep]

@@ -20,7 +20,7 @@ class Snapshot:
     action: int
     """Index of the action, -1 before the first."""
     body: np.ndarray
-    """(10,) base and arm."""
+    """(3 + J,) base and arm."""
     opening: float
     links: dict[str, np.ndarray]
     """World poses (4, 4) of robot links that have a shape, of movable bodies and of moving parts."""

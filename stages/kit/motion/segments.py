@@ -13,7 +13,7 @@ class Segment:
     """A piece of motion: a path, then an event of the gripper."""
 
     path: np.ndarray
-    """(N, 10): base x, y [m], yaw [rad] and arm (7,) [rad]; straight between rows."""
+    """(N, 3 + J): base x, y [m], yaw [rad] and arm (J,) [rad]; straight between rows."""
     opening: float
     """Distance of the fingers during the path [m]."""
     pace: float = 1.0
@@ -44,5 +44,5 @@ class Manipulation:
 
 
 def whole_body(base: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """Return (N, 10) rows of one base pose (3,) with arm values (N, 7)."""
+    """Return (N, 3 + J) rows of one base pose (3,) with arm values (N, J)."""
     return np.concatenate([np.tile(base, (len(arms), 1)), arms], axis=1)

@@ -15,8 +15,7 @@ from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.interactive_scene import SceneBody
 from schemas.scene_parts import Box
 from stages.kit.geometry.transforms import transform_from_quaternion
-from stages.kit.motion.base_placement import SHOULDER_HEIGHT
-from stages.kit.motion.kinematics import arm_chain, reach
+from stages.kit.motion.kinematics import arm_chain, reach, shoulder_height
 from stages.kit.predicates.vocabulary import Vocabulary
 from stages.kit.simulation.robot_description import RobotDescription
 
@@ -119,7 +118,8 @@ class RoomState:
 
 def arm_heights(robot: RobotDescription) -> tuple[float, float]:
     """Return between which heights [m] the arm of a robot reaches from its pedestal, at some distance."""
-    shoulder, far = robot.pedestal_height + SHOULDER_HEIGHT, REACHED * reach(arm_chain(robot))
+    chain = arm_chain(robot)
+    shoulder, far = robot.pedestal_height + shoulder_height(chain), REACHED * reach(chain)
     return shoulder - far, shoulder + far
 
 

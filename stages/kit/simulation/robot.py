@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from schemas.errors import UsageError
 from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion, transform_from_yaw
 from stages.kit.simulation.engine import engine
 from stages.kit.simulation.robot_description import BASE_JOINTS, PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
@@ -14,7 +13,6 @@ from stages.kit.simulation.world import Contact, PhysicsWorld
 
 FINGER_FRICTION = 1.2
 BASE_FORCE = 50000.0
-ARM_FORCES = np.array([87.0, 87.0, 87.0, 87.0, 40.0, 40.0, 40.0])
 
 
 @dataclass(frozen=True)
@@ -24,13 +22,13 @@ class Configuration:
     base: np.ndarray
     """(3,) x [m], y [m], yaw [rad]."""
     arm: np.ndarray
-    """(7,) [rad]."""
+    """(J,) [rad]."""
     opening: float
     """Distance between the fingers [m]."""
 
     @property
     def body(self) -> np.ndarray:
-        """Base and arm as one vector (10,)."""
+        """Base and arm as one vector (3 + J,)."""
         return np.concatenate([self.base, self.arm])
 
 
@@ -38,11 +36,6 @@ class Robot:
     """A mobile arm loaded into a world. Kinematic use: `set`; physical use: `command`, then step the world."""
 
     def __init__(self, world: PhysicsWorld, description: RobotDescription) -> None:
-        if len(description.arm_joints) != len(ARM_FORCES):
-            raise UsageError(
-                f"the robot {description.name} has {len(description.arm_joints)} arm joints and stands still",
-                hint=f"choose one with {len(ARM_FORCES)} that drives, as panda",
-            )
         self.world = world
         self.description = description
         flags = engine.URDF_USE_SELF_COLLISION  # pairs are chosen below
@@ -69,7 +62,19 @@ class Robot:
             engine.changeDynamics(
                 self.body_id, finger, lateralFriction=FINGER_FRICTION, spinningFriction=0.02, physicsClientId=client
             )
+        if description.coupled_fingers:
+            self._couple_fingers()
         self._choose_self_collisions()
+
+    def _couple_fingers(self) -> None:
+        """Let one finger move as far as the other, as equal forces alone leave open where both stand."""
+        client = self.world.client
+        first, second = self.finger_joints
+        places = ([0, 1, 0], [0, 0, 0], [0, 0, 0])
+        gear = engine.createConstraint(
+            self.body_id, first, self.body_id, second, engine.JOINT_GEAR, *places, physicsClientId=client
+        )
+        engine.changeConstraint(gear, gearRatio=-1, erp=0.2, maxForce=500, physicsClientId=client)
 
     def _choose_self_collisions(self) -> None:
         """Switch off pairs of links that are near each other along the chain: their shapes overlap by design."""
@@ -102,7 +107,7 @@ class Robot:
             engine.resetJointState(self.body_id, index, float(value), physicsClientId=self.world.client)
 
     def set_body(self, body: np.ndarray) -> None:
-        """Put base and arm (10,) at values; the fingers stay."""
+        """Put base and arm (3 + J,) at values; the fingers stay."""
         values = [[value] for value in body.tolist()]
         engine.resetJointStatesMultiDof(self.body_id, self.body_joints, values, physicsClientId=self.world.client)
 
@@ -111,7 +116,7 @@ class Robot:
         indices = [*self.body_joints, *self.finger_joints]
         states = engine.getJointStates(self.body_id, indices, physicsClientId=self.world.client)
         values = np.array([state[0] for state in states])
-        return Configuration(values[:3], values[3:10], float(values[10] + values[11]))
+        return Configuration(values[:3], values[3:-2], float(values[-2] + values[-1]))
 
     def link_pose(self, index: int) -> np.ndarray:
         """Return world_from_link (4, 4)."""
@@ -125,17 +130,17 @@ class Robot:
     # --- physical ---------------------------------------------------------------------------------------------
 
     def command(self, body: np.ndarray, opening: float, velocity: np.ndarray | None = None) -> None:
-        """Set position targets of base and arm (10,) and of the fingers [m apart]; forces are limited."""
+        """Set position targets of base and arm (3 + J,) and of the fingers [m apart]; forces are limited."""
         client = self.world.client
-        forces = np.concatenate([np.full(3, BASE_FORCE), ARM_FORCES])
+        forces = np.concatenate([np.full(3, BASE_FORCE), self.description.arm_forces])
         engine.setJointMotorControlArray(
             self.body_id,
             self.body_joints,
             engine.POSITION_CONTROL,
             targetPositions=body.tolist(),
-            targetVelocities=(np.zeros(10) if velocity is None else velocity).tolist(),
-            positionGains=[0.25] * 10,
-            velocityGains=[1.0] * 10,
+            targetVelocities=(np.zeros(len(body)) if velocity is None else velocity).tolist(),
+            positionGains=[0.25] * len(body),
+            velocityGains=[1.0] * len(body),
             forces=forces.tolist(),
             physicsClientId=client,
         )

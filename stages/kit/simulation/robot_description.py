@@ -1,16 +1,18 @@
-"""What is known of a robot: data/robots/<name>.toml and the URDF it names, put on a drivable pedestal."""
+"""What is known of a robot: a description (data/robots/<name>.toml, or a file of the user's) and the URDF it names, put
+on a pedestal that drives or stands."""
 
 from __future__ import annotations
 
-import tomllib
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from schemas.errors import MissingDependency, UsageError
+from schemas.errors import BadInput, MissingDependency, UsageError
+from schemas.outside import file_toml
 from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
 
 FOLDER = Path(__file__).resolve().parents[3] / "data" / "robots"
@@ -18,6 +20,9 @@ BASE_JOINTS = ("base_x", "base_y", "base_yaw")
 PEDESTAL_LINK = "pedestal"
 GROUND_CLEARANCE = 0.02
 """The pedestal hovers by this much: reconstructed floors are not flat to the millimetre."""
+JOINT_COUNTS = (6, 7)
+"""Fewest and most: fewer cannot reach every pose, with more the planner was not tried."""
+HINT = "docs/MOTION.md (Robots) lists what a description says"
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,8 @@ class RobotDescription:
     upper: np.ndarray
     arm_speed: float
     arm_acceleration: float
+    arm_forces: np.ndarray
+    """(J,) most that the motor of each joint gives [N m]."""
     carry: np.ndarray
     tip_overhang: float
     opening: float
@@ -47,29 +54,163 @@ class RobotDescription:
     """For things that would turn in the fingers [N]."""
     holding_moment: float
     """Largest moment about the fingers that such a hold bears [N m]."""
+    coupled_fingers: bool
+    """Whether a gear keeps the fingers at the same distance from the middle; else each has a motor of its own."""
     pedestal_height: float
     pedestal_radius: float
     base_speed: float
+    """0 for a pedestal that stands still."""
     base_turn_speed: float
 
+    @property
+    def drives(self) -> bool:
+        """Whether the base moves."""
+        return self.base_speed > 0
 
-def load_robot(name: str) -> RobotDescription:
-    """Read data/robots/<name>.toml; its URDF lies beside it or in pybullet_data.
+    @property
+    def speeds(self) -> np.ndarray:
+        """(3 + J,) highest speeds of base and arm; tiny ones where the base stands still, as times divide by them."""
+        base = np.maximum([self.base_speed, self.base_speed, self.base_turn_speed], 1e-9)
+        return np.concatenate([base, np.full(len(self.arm_joints), self.arm_speed)])
 
-    Raises UsageError (no such robot), MissingDependency (its URDF is not there).
+    @property
+    def accelerations(self) -> np.ndarray:
+        """(3 + J,) highest accelerations of base and arm."""
+        return np.concatenate([[1.0, 1.0, 2.0], np.full(len(self.arm_joints), self.arm_acceleration)])
+
+
+Positive = Annotated[float, Field(gt=0, le=1e4)]
+NotNegative = Annotated[float, Field(ge=0, le=1e4)]
+Angles = tuple[Annotated[float, Field(ge=-100, le=100)], ...]
+Names = tuple[str, ...]
+
+
+class _RobotFile(BaseModel):
+    """What a description has to say, each with its range; RobotDescription tells what each is."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: str
+    urdf: str
+    arm_base: str
+    arm_joints: Annotated[Names, Field(min_length=min(JOINT_COUNTS), max_length=max(JOINT_COUNTS))]
+    finger_joints: tuple[str, str]
+    hand_link: str
+    tool_link: str
+    finger_links: tuple[str, str]
+    lower: Angles
+    upper: Angles
+    arm_speed: Positive
+    arm_acceleration: Positive
+    arm_forces: tuple[Positive, ...]
+    carry: Angles
+    tip_overhang: NotNegative
+    opening: Positive
+    palm: tuple[Positive, Positive]
+    finger_force: Positive
+    firm_finger_force: Positive
+    holding_moment: Positive
+    coupled_fingers: bool = False
+    pedestal_height: Annotated[float, Field(gt=GROUND_CLEARANCE, le=3)]
+    pedestal_radius: Annotated[float, Field(gt=0, le=1)]
+    base_speed: NotNegative
+    base_turn_speed: NotNegative
+
+
+def description_files(robot: str) -> tuple[Path, ...]:
+    """Return the files that describe a robot, as far as they are the project's or the user's: its description, the one
+    that it is `like`, and its URDF. Those that are missing are left out, but for the first."""
+    path = description_path(robot)
+    if not path.is_file():
+        return (path,)
+    values = file_toml(path, error=UsageError, hint=HINT)
+    found = [path]
+    if isinstance(values.get("like"), str):
+        found.append(FOLDER / f"{values['like']}.toml")
+        values = (file_toml(found[1], error=UsageError, hint=HINT) if found[1].is_file() else {}) | values
+    found.append(path.parent / str(values.get("urdf", "")))
+    return tuple(found[:1] + [file for file in found[1:] if file.is_file()])
+
+
+def description_path(robot: str) -> Path:
+    """Return the description of a robot, given by the name of one of data/robots or by the path of a .toml file."""
+    return Path(robot) if robot.endswith(".toml") else FOLDER / f"{robot}.toml"
+
+
+def load_robot(robot: str) -> RobotDescription:
+    """Read a description, given by the name of one of data/robots or by the path of a .toml file. Its URDF lies beside
+    it or in pybullet_data; a description that is `like` another of data/robots says only what differs.
+
+    Raises UsageError (no such robot), BadInput (a description that is incomplete, out of range, or at odds with its
+    URDF), MissingDependency (its URDF is not there).
     """
-    path = FOLDER / f"{name}.toml"
+    path = description_path(robot)
     if not path.is_file():
         names = ", ".join(sorted(entry.stem for entry in FOLDER.glob("*.toml")))
-        raise UsageError(f"no robot is called {name!r}", hint=f"known: {names}")
-    values = tomllib.loads(path.read_text(encoding="utf-8"))
-    urdf = FOLDER / values.pop("urdf")
+        raise UsageError(f"no robot is called {robot!r}", hint=f"known: {names}, or a description of your own (.toml)")
+    values = file_toml(path, error=BadInput, hint=HINT)
+    folder = path.parent
+    if (like := values.pop("like", None)) is not None:
+        other = FOLDER / f"{like}.toml"
+        if not other.is_file():
+            raise BadInput(f"{path}: like = {like!r} is no robot of data/robots", hint=HINT)
+        folder = folder if "urdf" in values else FOLDER
+        values = file_toml(other, error=BadInput, hint=HINT) | values
+    try:
+        described = _RobotFile(**values).model_dump()
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise BadInput(f"{path}: {place}: {first['msg']}", hint=HINT) from None
+    urdf = folder / described["urdf"]
     if not urdf.is_file():
-        urdf = _installed(urdf.relative_to(FOLDER))
-    fields: dict[str, Any] = {"urdf": urdf, **values}
-    fields |= {key: np.array(fields[key], dtype=float) for key in ("lower", "upper", "carry")}
-    fields |= {key: tuple(fields[key]) for key in ("arm_joints", "finger_joints", "finger_links", "palm")}
-    return RobotDescription(**fields)
+        urdf = _installed(Path(described["urdf"]))
+    for key in ("lower", "upper", "arm_forces", "carry"):
+        if len(described[key]) != len(described["arm_joints"]):
+            wanted = len(described["arm_joints"])
+            raise BadInput(f"{path}: {key} has {len(described[key])} values for {wanted} arm joints", hint=HINT)
+        described[key] = np.array(described[key], dtype=float)
+    description = RobotDescription(**described | {"urdf": urdf})
+    _check_joints(description, path)
+    return description
+
+
+def _check_joints(robot: RobotDescription, path: Path) -> None:
+    """Raise BadInput where a description and its URDF do not fit each other."""
+    if np.any(robot.lower >= robot.upper) or np.any(robot.carry < robot.lower) or np.any(robot.carry > robot.upper):
+        raise BadInput(f"{path}: lower < upper and lower <= carry <= upper do not hold of every joint", hint=HINT)
+    root = read_urdf(robot.urdf)
+    kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
+    links = {link.get("name") for link in root.findall("link")}
+    for name in (robot.arm_base, robot.hand_link, robot.tool_link, *robot.finger_links):
+        if name not in links:
+            raise BadInput(f"{path}: {robot.urdf.name} has no link {name!r}", hint=HINT)
+    for names, allowed in ((robot.arm_joints, ("revolute", "continuous")), (robot.finger_joints, ("prismatic",))):
+        for name in names:
+            if kinds.get(name) not in allowed:
+                found = f"is {kinds[name]}" if name in kinds else "is not there"
+                raise BadInput(f"{path}: joint {name!r} of {robot.urdf.name} {found}, not {allowed[0]}", hint=HINT)
+    moving = [name for name in joints_between(root, robot.arm_base, robot.tool_link) if kinds[name] != "fixed"]
+    if moving != list(robot.arm_joints):
+        what = ", ".join(moving) or "none"
+        raise BadInput(f"{path}: from arm_base to tool_link move {what}: not arm_joints in their order", hint=HINT)
+
+
+def joints_between(root: ElementTree.Element, base: str, tip: str) -> list[str]:
+    """Return the names of the joints from link `base` to link `tip` of a URDF, in order; none where there is no way."""
+    by_child = {}
+    for joint in root.findall("joint"):
+        parent, child = joint.find("parent"), joint.find("child")
+        if parent is not None and child is not None:
+            by_child[child.get("link")] = (joint.get("name", ""), parent.get("link"))
+    names: list[str] = []
+    link: str | None = tip
+    while link != base:
+        if link not in by_child or len(names) > len(by_child):
+            return []
+        name, link = by_child[link]
+        names.append(name)
+    return names[::-1]
 
 
 def _installed(urdf: Path) -> Path:
@@ -80,7 +221,7 @@ def _installed(urdf: Path) -> Path:
         raise MissingDependency("the package pybullet is not installed", hint="run `make setup`") from None
     path = Path(pybullet_data.getDataPath()) / urdf
     if not path.is_file():
-        raise MissingDependency(f"{path}: the robot's URDF is missing", hint="install pybullet again")
+        raise MissingDependency(f"{urdf}: the robot's URDF lies neither beside its description nor in pybullet_data")
     return path
 
 

@@ -46,7 +46,7 @@ class Arm:
 
     def __init__(self, world: PhysicsWorld) -> None:
         self.world = world
-        self.description = load_robot("ur5")
+        self.description = load_robot("ur5_bench")
         self.chain = arm_chain(self.description)
         self.seconds = 0.0
         urdf = self.description.urdf

@@ -44,7 +44,7 @@ class PhysicsPictures:
         focal = 0.5 * width / float(np.tan(FIELD_OF_VIEW / 2))
         self._camera = Camera(width=width, height=height, fx=focal, fy=focal, cx=width / 2 - 0.5, cy=height / 2 - 0.5)
         self._view = look_at(EYE, TARGET)
-        self._robot = load_robot("ur5")
+        self._robot = load_robot("ur5_bench")
         self._urdf = parse_urdf(self._robot.urdf)
         self._links = link_shapes(self._robot.urdf.read_text(encoding="utf-8"), "visual")
         self._items = [

@@ -190,3 +190,15 @@ def test_a_robot_that_would_start_inside_something_unseen_does_not_start(tmp_pat
     failure = next(entry for entry in result.info.failures if entry.kind == "start_in_collision")
     assert failure.objects == ("bin_9",)
     assert failure.numbers["depth"] > 0.005
+
+
+def test_an_arm_that_does_not_drive_takes_what_it_reaches_from_where_it_stands(tmp_path: Path) -> None:
+    write_scene(tmp_path / "scene", kitchen())
+    with pytest.raises(UsageError, match="does not drive"):
+        plan(tmp_path, tmp_path / "scene", name="nowhere", robot="ur5_bench", goal=("holding(cup_5)",))
+    fixed = {"robot": "ur5_bench", "goal": ("holding(cup_5)",), "video_rate": 0.0}
+    near = plan(tmp_path, tmp_path / "scene", name="near", stand=(-1.3, -0.1, -90.0), **fixed).info
+    assert near.status == "executed", near.failures
+    assert [action.name for action in near.actions] == ["pick"]
+    far = plan(tmp_path, tmp_path / "scene", name="far", stand=(0.5, -1.0, 180.0), **fixed).info
+    assert far.status == "infeasible" and far.failures

@@ -55,7 +55,7 @@ def by_table(arm: np.ndarray) -> np.ndarray:
 
 
 def test_the_arm_moves_as_its_published_lengths_say() -> None:
-    chain = arm_chain(load_robot("ur5"))
+    chain = arm_chain(load_robot("ur5_bench"))
     random = np.random.default_rng(0)
     for _ in range(20):
         arm = random.uniform(-pi, pi, 6)

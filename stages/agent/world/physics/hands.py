@@ -126,7 +126,7 @@ def reachable(beliefs: Beliefs, base: np.ndarray, at: tuple[float, float, float]
     for pitch in (np.pi / 2, 1.1):
         pose = _pointing(float(np.arctan2(at[1] - base[1], at[0] - base[0])), pitch)
         pose[:3, 3] = (at[0], at[1], at[2] + 0.10)
-        if shoulder_distance(base, pose, beliefs.description) > planner.reach - 0.02:
+        if shoulder_distance(base, pose, beliefs.description, beliefs.chain) > planner.reach - 0.02:
             continue
         arm = planner.reachable(base, pose, tally, starts=3)
         if arm is not None and planner.free(base, arm, tally):
