@@ -172,12 +172,9 @@ class SceneMap:
             if apart <= self._same_thing
         )
         found: dict[int, str] = {}
-        for _, key, number in pairs:
-            if number not in found and key not in found.values():
-                found[number] = key
         for apart, key, number in pairs:
-            if apart <= TWICE * self._same_thing:
-                found.setdefault(number, key)
+            if number not in found and (key not in found.values() or apart <= TWICE * self._same_thing):
+                found[number] = key
         return [self.items[found[number]] if number in found else None for number in range(len(detections))]
 
     def carrier_of(self, item: Item) -> str:
