@@ -11,6 +11,7 @@ from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sw
 from stages.agent.goals import CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
+from stages.kit.rendering.segmenter_errors import quarter_turn
 
 SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
@@ -240,4 +241,4 @@ def edge_distance(piece: SeenFurniture, x: float, y: float) -> float:
 
 def quarter(base: Base, at: tuple[float, ...]) -> int:
     """Return the quarter turn, 0 to 3, from which a base pose looks at a position."""
-    return int(((atan2(base.y - at[1], base.x - at[0]) + pi / 4) % (2 * pi)) // (pi / 2)) % 4
+    return quarter_turn((base.x, base.y), at)

@@ -14,14 +14,17 @@ from schemas.interactive_scene import InteractiveScene, SceneBody
 from schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.physical_robot import PhysicalRobot
+from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 from stages.kit.simulation.robot import Configuration
-from stages.kit.simulation.world import load_scene, read_scene_bodies
+from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from stages.kit.stage import Context
 from stages.plan.assumptions import Belief, match_beliefs
 from stages.plan.believed_tree import TreeState
-from stages.plan.conduct import Conduct, Room, joint_pairs
+from stages.plan.conduct import Conduct, joint_pairs
 from stages.plan.correspondence import match_bodies
+from stages.plan.erring_robot import ErringRobot
 from stages.plan.execution_log import write_execution
+from stages.plan.eyes import Eyes, NoisyEyes, Room, TrueEyes
 from stages.plan.goal_checks import check_goal
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
@@ -35,6 +38,8 @@ from stages.plan.world_model import RobotState, WorldModel, body_planes
 
 RECORD_RATE = 10.0
 SETTLE_SECONDS = 1.0
+ROBOT_ERRORS = 5
+"""Stream of the seed."""
 START = -1
 """Index of what is observed before the first action."""
 LOOK = (
@@ -44,6 +49,11 @@ LOOK = (
 LOOK_AROUND = (
     "before planning anew it saw all bodies of the planned scene that can move, as they are in the room, and what they "
     "stand on"
+)
+NOISY = (
+    "localisation is off at every stop and joints stand beside their encoders; a look shows pose, joint values and "
+    "shape as they are from where the robot believes to stand, or nothing where the segmentation misses a body or "
+    "takes it for something else; picking and placing are planned anew from where the robot stands then"
 )
 PROPRIOCEPTION = "the pose of a held item in the hand was read from the simulation"
 GRIP = "items are held by friction of the two fingers alone; no constraint is added"
@@ -122,7 +132,7 @@ def execute(
     with load_scene(root) as world:
         world.anchor_friction()
         start = Configuration(order.state.base, order.state.arm, model.description.opening)
-        physical = PhysicalRobot(world, model.description, start, RECORD_RATE)
+        physical = _robot(world, model, start, parameters, context)
         failures = _start_failures(physical)
         physical.wait(SETTLE_SECONDS)
 
@@ -155,6 +165,7 @@ def execute(
             parameters.relocalize,
             parameters.execution_attempts,
             observe=observe,
+            eyes=_eyes(model, room, physical, joint_names, context),
         )
         if failures:
             conduct.steps = order.steps
@@ -176,7 +187,11 @@ def execute(
         for number, state in observed.items()
         if number >= 0
     }
-    used = (LOOK, PROPRIOCEPTION, GRIP) if parameters.relocalize else ("the planned motion was replayed", GRIP)
+    used: tuple[str, ...] = ("the planned motion was replayed", GRIP)
+    if parameters.relocalize:
+        used = (LOOK, PROPRIOCEPTION, GRIP)
+    if parameters.eyes == "noisy":
+        used += (NOISY,)
     return Outcome(
         conduct.steps,
         executed_in="reconstructed" if order.ground_truth is None else "ground_truth",
@@ -193,6 +208,24 @@ def execute(
         differences=_differences(model, believed, conduct.steps, observed, anew),
         arrays=executed_rows(physical.recording.snapshots),
     )
+
+
+def _robot(
+    world: PhysicsWorld, model: WorldModel, start: Configuration, parameters: PlanParameters, context: Context
+) -> PhysicalRobot:
+    if parameters.eyes == "true":
+        return PhysicalRobot(world, model.description, start, RECORD_RATE)
+    return ErringRobot(world, model.description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
+
+
+def _eyes(
+    model: WorldModel, room: Room, physical: PhysicalRobot, joint_names: dict[str, str], context: Context
+) -> Eyes:
+    true = TrueEyes(model, room, physical, joint_names)
+    if not isinstance(physical, ErringRobot):
+        return true
+    classes = tuple(sorted({record.class_name for record in model.records.values() if record.carriable}))
+    return NoisyEyes(true, physical, SegmenterErrors(SegmenterRates(), Luck(context.seed), classes))
 
 
 def _read_room(root: Path, order: Order) -> Room:
