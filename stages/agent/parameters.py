@@ -68,7 +68,7 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
 
 RUN = Stage(
     name="agent run",
-    version=3,
+    version=4,
     summary="Tell a mobile robot in words what to do in an apartment that it has never seen (COME-robot)",
     parameters=RunParameters,
     reads={
@@ -86,7 +86,7 @@ RUN = Stage(
 )
 REPLAY = Stage(
     name="agent replay",
-    version=3,
+    version=4,
     summary="Do an episode again with the programs that its brain wrote: the same bytes, nobody is asked",
     parameters=ReplayParameters,
     reads={"episode": AgentEpisode},
@@ -98,7 +98,7 @@ REPLAY = Stage(
 )
 EVALUATE = Stage(
     name="agent evaluate",
-    version=3,
+    version=4,
     summary="Compare arms of the agent over tasks and seeds in the fast world",
     parameters=EvaluateParameters,
     reads={},
