@@ -16,7 +16,13 @@ from urllib.parse import quote
 import numpy as np
 
 from benchmarks.reporting_seeds import Method
-from stages.kit.measurement.bootstrap import Interval, bootstrap_interval, figure_interval, paired_interval
+from stages.kit.measurement.bootstrap import (
+    Interval,
+    bootstrap_interval,
+    figure_interval,
+    paired_interval,
+    pooled_interval,
+)
 from stages.kit.stage import Parameters
 
 RESAMPLES = 2000
@@ -62,6 +68,24 @@ class Measure:
     unit: str = ""
     interval: bool = True
     """False for what resampling says nothing about: counts, and what is dear to compute."""
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """A figure that is a sum over a sum: intervals resample what each record adds, in one array."""
+
+    parts: Callable[[Any], tuple[float, float]]
+    """Of a record: what it adds above and below the line."""
+
+    def sums(self, records: Sequence[Any]) -> tuple[float, float]:
+        """Return the sums above and below the line."""
+        parts = [self.parts(record) for record in records]
+        return float(sum(above for above, _ in parts)), float(sum(below for _, below in parts))
+
+    def __call__(self, records: Sequence[Any]) -> float | None:
+        """Return the figure; None with nothing below the line."""
+        above, below = self.sums(records)
+        return above / below if below else None
 
 
 Measuring = Callable[[Bench, Sequence[Trial]], Iterable[tuple[Trial, Any]]]
@@ -201,6 +225,9 @@ class Results:
         if len(names) < LEAST_CLUSTERS:
             return None
         random = np.random.default_rng(SEED_OF_INTERVALS)
+        parts = self._parts(arm, case, measure, names)
+        if parts is not None:
+            return pooled_interval(parts, None, random, resamples=RESAMPLES)
         return figure_interval(self._figure(arm, case, measure, names), range(len(names)), random, resamples=RESAMPLES)
 
     def difference(self, first: str, second: str, case: str, measure: str) -> Interval | None:
@@ -209,6 +236,9 @@ class Results:
         names = [name for name in self._grouped(first, case) if name in other]
         if len(names) < LEAST_CLUSTERS:
             return None
+        parts, others = (self._parts(arm, case, measure, names) for arm in (first, second))
+        if parts is not None and others is not None:
+            return pooled_interval(parts, others, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES)
         figures = [self._figure(arm, case, measure, names) for arm in (first, second)]
         numbers = [(which, k) for which in (0, 1) for k in range(len(names))]
 
@@ -227,6 +257,11 @@ class Results:
                     groups.setdefault(self.experiment.cluster(trial.seed), []).append(record)
             self._clusters[arm, case] = groups
         return self._clusters[arm, case]
+
+    def _parts(self, arm: str, case: str, measure: str, names: Sequence[str]) -> np.ndarray | None:
+        """What each cluster adds above and below the line (N, 2), where the measure is pooled."""
+        of, groups = self.experiment.measures[measure].of, self._grouped(arm, case)
+        return np.array([of.sums(groups[name]) for name in names]) if isinstance(of, Pooled) else None
 
     def _figure(
         self, arm: str, case: str, measure: str, names: Sequence[str]
@@ -272,7 +307,12 @@ def ratio(pairs: Sequence[tuple[float, float]], of: Callable[..., Any] = np.mean
 
 def mean(name: str, unit: str = "", *, interval: bool = True) -> Measure:
     """Return the mean over trials of an entry of the record (of a dict, or an attribute)."""
-    return Measure(statistic(name, np.mean), unit, interval)
+
+    def parts(record: Any) -> tuple[float, float]:
+        value = entry(record, name)
+        return (0.0, 0.0) if value is None else (float(value), 1.0)
+
+    return Measure(Pooled(parts), unit, interval)
 
 
 def median(name: str, unit: str = "", *, interval: bool = True) -> Measure:

@@ -7,7 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Bench, Experiment, Measure, Results, Trial, count, mean
+from benchmarks.experiment import (
+    RESAMPLES,
+    SEED_OF_INTERVALS,
+    Bench,
+    Experiment,
+    Measure,
+    Pooled,
+    Results,
+    Trial,
+    count,
+    mean,
+)
 from benchmarks.tabulation import markdown
 from stages.agent.arms.registry import ARMS
 from stages.agent.judging import CAUSES, Score, score
@@ -15,10 +26,10 @@ from stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
 from stages.agent.trials import Setting, run_trial
 from stages.agent.world.failures import TABLE_3_4, Rates
 from stages.agent.world.floor import Floor
-from stages.kit.measurement.bootstrap import Interval, figure_interval
+from stages.kit.measurement.bootstrap import Interval, pooled_interval
 
-TUNING, REPORTING = (*range(200), *range(1000, 1100)), range(2000, 2100)
-"""Version 1 was reported on seeds 1000 to 1099: they were seen, and what went wrong there was worked on."""
+TUNING, REPORTING = (*range(1100), *range(2000, 2100)), range(4000, 4100)
+"""Version 1 was reported on seeds 1000 to 1099, version 3 on 2000 to 2099: they were seen."""
 RIVALS = ("open_loop", "bool_feedback", "thesis", "ours", "oracle")
 FAST = tuple(f"{task}/fast" for task in TASKS)
 MIXED = "mixed/fast"
@@ -87,19 +98,14 @@ def record_of(made: Score, *, impossible: bool) -> Record:
     )
 
 
-def share(part: str, whole: str) -> Callable[[Sequence[Record]], float | None]:
+def share(part: str, whole: str) -> Pooled:
     """Return a figure: pooled counts over pooled counts, in percent."""
-
-    def figure(records: Sequence[Record]) -> float | None:
-        total = sum(getattr(r, whole) for r in records)
-        return 100.0 * sum(getattr(r, part) for r in records) / total if total else None
-
-    return figure
+    return Pooled(lambda record: (100.0 * getattr(record, part), float(getattr(record, whole))))
 
 
-def percent(name: str) -> Callable[[Sequence[Record]], float | None]:
+def percent(name: str) -> Pooled:
     """Return a figure: the share of trials of which something is true."""
-    return lambda records: 100.0 * sum(getattr(r, name) for r in records) / len(records) if records else None
+    return Pooled(lambda record: (100.0 * getattr(record, name), 1.0))
 
 
 def failed(cause: str, which: int) -> Callable[[Sequence[Record]], float | None]:
@@ -123,9 +129,11 @@ def of_groups(
         for arm in arms:
             records = [record for case in cases for record in results.of(arm, case)]
             for name in ("success", "step_success", "recovery", "false_success") if records else ():
-                flat[f"{arm}/{group}/{name}"] = figure_interval(
-                    MEASURES[name].of, records, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES
-                )
+                of = MEASURES[name].of
+                assert isinstance(of, Pooled)
+                parts = np.array([of.parts(record) for record in records])
+                random = np.random.default_rng(SEED_OF_INTERVALS)
+                flat[f"{arm}/{group}/{name}"] = pooled_interval(parts, None, random, resamples=RESAMPLES)
             flat[f"{arm}/{group}/trials"] = float(len(records)) if records else None
             for cause in CAUSES if records and group == "possible" else ():
                 flat[f"{arm}/{group}/failures_{cause}_direct"] = failed(cause, 0)(records) or 0.0

@@ -98,7 +98,7 @@ REPLAY = Stage(
 )
 EVALUATE = Stage(
     name="agent evaluate",
-    version=3,
+    version=4,
     summary="Compare arms of the agent over tasks and seeds in the fast world",
     parameters=EvaluateParameters,
     reads={},

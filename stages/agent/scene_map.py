@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, pi
 
@@ -10,6 +11,7 @@ from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sw
 from stages.agent.goals import CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
+from stages.kit.rendering.segmenter_errors import quarter_turn
 
 SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
@@ -19,6 +21,8 @@ SURE = 0.8
 """A thing is taken to be on a small carrier within this share of its radius: nearer to the rim it may lean on it."""
 UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
+TWICE = 0.5
+"""Within this share of the distance of one thing a second detection of one look is of it as well."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
 Region = tuple[int | str, bool]
@@ -127,11 +131,25 @@ class SceneMap:
         return min(((not _faces(base, f), gap, key) for gap, key, f in near), default=(False, 0.0, ""))[2]
 
     def add(self, detection: Detection, place: str, region: Region) -> Item:
-        """Enter a detection: a vote of its region for the thing that lies there, or a new thing."""
-        item = self.at(detection.position, place, detection.radius)
-        if item is None:
-            key = self._name(detection.label)
-            item = self.items[key] = Item(key, detection.position, detection.color, detection.radius, place)
+        """Enter one detection."""
+        return self.enter((detection,), place, lambda _: region)[0]
+
+    def enter(
+        self, detections: Sequence[Detection], place: str, region_of: Callable[[Detection], Region]
+    ) -> list[Item]:
+        """Enter what one look showed: of each a vote of its region for the thing that lies there, or a new thing."""
+        items = self.matched(detections, place)
+        return [
+            self._vote(detection, item or self._new(detection, place), region_of(detection))
+            for detection, item in zip(detections, items, strict=True)
+        ]
+
+    def _new(self, detection: Detection, place: str) -> Item:
+        key = self._name(detection.label)
+        item = self.items[key] = Item(key, detection.position, detection.color, detection.radius, place)
+        return item
+
+    def _vote(self, detection: Detection, item: Item, region: Region) -> Item:
         no_class_of_its_width = CARRIERS if detection.radius < CARRIES else SMALL
         if not self.careful or detection.label not in no_class_of_its_width:
             item.votes[region] = detection.label
@@ -140,14 +158,25 @@ class SceneMap:
             item.used_votes[region] = detection.used
         return item
 
-    def at(self, position: Position, place: str, radius: float) -> Item | None:
-        """Return the thing of a place that a sighting of a radius [m] at a position is of."""
-        near = [
-            (_apart(i.position, position), i.key)
-            for i in self.items.values()
-            if i.place == place and not (i.label in CARRIERS and radius < UNLIKE * i.radius)
-        ]
-        return self.items[min(near)[1]] if near and min(near)[0] <= self._same_thing else None
+    def matched(self, detections: Sequence[Detection], place: str) -> list[Item | None]:
+        """Return the thing of a place that each detection of one look is of, or None.
+
+        Pairs are taken by distance, each thing once: fruit lies closer together on a plate than the eyes measure, and
+        two things that were seen side by side are two. A further detection right where a thing was found is of it too.
+        """
+        pairs = sorted(
+            (apart, key, number)
+            for number, d in enumerate(detections)
+            for key, i in self.items.items()
+            if i.place == place and not (i.label in CARRIERS and d.radius < UNLIKE * i.radius)
+            for apart in [_apart(i.position, d.position)]
+            if apart <= self._same_thing
+        )
+        found: dict[int, str] = {}
+        for apart, key, number in pairs:
+            if number not in found and (key not in found.values() or apart <= TWICE * self._same_thing):
+                found[number] = key
+        return [self.items[found[number]] if number in found else None for number in range(len(detections))]
 
     def carrier_of(self, item: Item) -> str:
         """Return the key of the small carrier on which a thing lies, or nothing."""
@@ -212,4 +241,4 @@ def edge_distance(piece: SeenFurniture, x: float, y: float) -> float:
 
 def quarter(base: Base, at: tuple[float, ...]) -> int:
     """Return the quarter turn, 0 to 3, from which a base pose looks at a position."""
-    return int(((atan2(base.y - at[1], base.x - at[0]) + pi / 4) % (2 * pi)) // (pi / 2)) % 4
+    return quarter_turn((base.x, base.y), at)

@@ -9,7 +9,7 @@ import numpy as np
 
 from schemas.interactive_scene import SceneBody
 from schemas.plan import BodyMatch, Failure
-from schemas.scene_parts import Joint, SurfacePlane
+from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
 from stages.kit.motion.failures import MotionFailed
@@ -19,25 +19,17 @@ from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.simulation.robot import base_pose
 from stages.plan.action import MotionRequest, action_named
 from stages.plan.carriers import NOTHING, carrier
-from stages.plan.correspondence import match_joint, renamed
+from stages.plan.correspondence import match_joint
+from stages.plan.eyes import Eyes, Room
 from stages.plan.level_carrying import LEVEL_PACE, levelled
 from stages.plan.pick_place import Budgets
 from stages.plan.refinement import DRIVE, Step, grasp_style, refine_action
-from stages.plan.world_model import RobotState, WorldModel, true_record
+from stages.plan.world_model import RobotState, Snapshot, WorldModel, hold_for_checks
 
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
 JOINT_TOLERANCE = 0.05
 """A joint further than this from where a motion should have left it is looked at again [rad or m]."""
-
-
-@dataclass(frozen=True)
-class Room:
-    """The room where the plan is executed, as files tell it; its physics is in the robot's world."""
-
-    records: dict[str, SceneBody]
-    texts: dict[str, str]
-    planes: dict[str, tuple[SurfacePlane, ...]]
 
 
 @dataclass
@@ -57,6 +49,8 @@ class Conduct:
     failures: list[Failure] = field(default_factory=list)
     observe: Callable[[int], object] = lambda number: None
     """Called with the index of its last step when an action has been carried out."""
+    eyes: Eyes | None = None
+    """What looks tell; a plan that is replayed needs none."""
     steps: list[Step] = field(default_factory=list)
     """The plan; what was planned anew stands in the place of what could not be carried out."""
 
@@ -133,6 +127,8 @@ class Conduct:
                 preferred = None if anchor is None else self._re_anchored(group[-1], anchor)
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style)
+                again = self.eyes is not None and self.eyes.again and action.tied_to is not None
+                before = self.model.snapshot() if again else None
                 steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
@@ -140,6 +136,8 @@ class Conduct:
                     break
                 continue
             try:
+                if before is not None and steps[0].name == DRIVE:
+                    steps, after = self._look_from_there(before, state, steps, request, origin)
                 for offset, step in enumerate(steps):
                     self.physical.action = number + min(offset, len(group) - 1)
                     self._execute(step)
@@ -164,6 +162,26 @@ class Conduct:
                 if action.when_unmet == "back":  # the tray was lost, or something is in the way of levelling it
                     return self._recovered(state, name, arguments), False
         return state, False
+
+    def _look_from_there(
+        self, before: Snapshot, state: RobotState, steps: list[Step], request: MotionRequest, origin: str
+    ) -> tuple[list[Step], RobotState]:
+        """Carry out the drive that an action begins with, look once more from there and return the steps from there on,
+        with the grasp or place of the planned ones where it still serves. `before`: the model before they were planned.
+        Raises MotionFailed."""
+        drive, step = steps[:2]
+        assert step.manipulation is not None
+        action, arguments = action_named(step.name), step.arguments
+        self._execute(drive)
+        there = replace(state, base=drive.segments[-1].path[-1, :3])
+        self.model.restore(before)
+        hold_for_checks(self.model, there)
+        anchor = self._anchor(step)
+        self._look(step.name, arguments)
+        assert anchor is not None and action.tied_to is not None
+        shift = self.model.pose(arguments[action.tied_to])[:3, 3] - anchor[:3, 3]
+        _, target = action.moved_along(self.model, arguments, step.manipulation, shift)
+        return refine_action(self.model, there, step.name, replace(request, preferred=(there.base, target)), origin)
 
     def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
         """Return the state after the way back, None (and a note) when the arm does not get there either."""
@@ -190,15 +208,15 @@ class Conduct:
             self._see(body, self.matched(body))
 
     def _see(self, body: str, here: str) -> None:
-        """Take over a body of the room: pose, joints and shape; what it stands on stays as believed."""
-        parent = self.model.records[body].parent
-        record = true_record(self.physical.world, here, self.room.records[here])
-        names = {there: planned for planned, there in self.joint_names.items() if planned.startswith(f"{body}__")}
-        record, text = renamed(record, self.room.texts[here], body, names)
+        """Take over a body of the room as the eyes see it; what it stands on stays as believed."""
+        assert self.eyes is not None
+        seen = self.eyes.seen(body, here)
+        if seen is None:
+            return
+        record, text, planes = seen
         believed = self.model.records[body]
-        kept = {"parent": parent, "movable": believed.movable, "furniture": believed.furniture}
-        record = record.model_copy(update=kept)
-        self.model.see(body, record, text, self.room.planes[here])
+        kept = {"parent": believed.parent, "movable": believed.movable, "furniture": believed.furniture}
+        self.model.see(body, record.model_copy(update=kept), text, planes)
 
     def look_around(self) -> None:
         """Take over everything that moves or has joints and has a counterpart in the room; of what is held its pose.

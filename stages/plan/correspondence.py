@@ -16,7 +16,8 @@ ALIKE = ({"table", "desk"}, {"cabinet", "wall_cabinet"})
 """Classes that segmentation and CAD matching confuse, and that serve the same purpose."""
 
 
-def _alike(first: str, second: str) -> bool:
+def alike(first: str, second: str) -> bool:
+    """Whether two classes may be of one thing."""
     return first == second or any({first, second} <= group for group in ALIKE)
 
 
@@ -25,7 +26,7 @@ def match_bodies(planned: dict[str, SceneBody], true: dict[str, SceneBody], radi
     pairs = []
     for name, record in planned.items():
         for other, candidate in true.items():
-            if _alike(record.class_name, candidate.class_name):
+            if alike(record.class_name, candidate.class_name):
                 away = float(np.linalg.norm(np.subtract(record.box.center, candidate.box.center)))
                 if away <= radius or (name == other and record.box == candidate.box):
                     pairs.append((away, name, other))

@@ -50,6 +50,12 @@ class PlanParameters(Parameters):
         description="Before each action the robot sees pose and shape of the bodies that the action names, as they "
         "are in the room of execution (stands for a look with a wrist camera); off: the planned motion is replayed",
     )
+    eyes: Literal["true", "noisy", "camera"] = Field(
+        "true",
+        description="What a look tells: the truth; noisy: the truth through a localisation and encoders that err and a "
+        "segmentation that misses things and takes them for others; camera: poses and joint values fitted to rendered "
+        "depth pictures through the same. The robot's own errors are there when a planned motion is replayed, too",
+    )
     match_radius: float = Field(
         0.5, gt=0, le=5, description="A body is the nearest of its class in the true room within this [m]"
     )

@@ -10,7 +10,7 @@ import trimesh
 from schemas.interactive_scene import SceneBody
 from schemas.scene_parts import Camera
 from stages.kit.geometry.transforms import apply, look_at
-from stages.kit.motion.recording import Snapshot
+from stages.kit.motion.recording import Snapshot, moving_links
 from stages.kit.rendering.light_map import AreaLight
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup
@@ -94,6 +94,12 @@ class RoomPictures:
             AreaLight((x - 0.9, y + 0.9, 8.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.18, 0.19, 0.21)),
         )
         return SceneRenderer(_joined([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49))
+
+    def sight(self, world: PhysicsWorld) -> SceneRenderer:
+        """Return what cameras in the room see now, the robot aside."""
+        links = moving_links(world)
+        moving = [_moved(soup, links[link]) for link, soup in self._moving.items() if link in links]
+        return SceneRenderer(_joined([*self._still, *self._shell, *moving]), shadows=False, antialias=False)
 
     def overview(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
         """Return (H, W, 3) uint8: the whole room from above and aside, without walls and ceiling."""

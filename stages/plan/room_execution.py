@@ -14,14 +14,18 @@ from schemas.interactive_scene import InteractiveScene, SceneBody
 from schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.physical_robot import PhysicalRobot
+from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 from stages.kit.simulation.robot import Configuration
-from stages.kit.simulation.world import load_scene, read_scene_bodies
+from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from stages.kit.stage import Context
 from stages.plan.assumptions import Belief, match_beliefs
 from stages.plan.believed_tree import TreeState
-from stages.plan.conduct import Conduct, Room, joint_pairs
+from stages.plan.camera_eyes import CameraEyes
+from stages.plan.conduct import Conduct, joint_pairs
 from stages.plan.correspondence import match_bodies
+from stages.plan.erring_robot import ErringRobot
 from stages.plan.execution_log import write_execution
+from stages.plan.eyes import Eyes, NoisyEyes, Room, TrueEyes
 from stages.plan.goal_checks import check_goal
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
@@ -35,6 +39,8 @@ from stages.plan.world_model import RobotState, WorldModel, body_planes
 
 RECORD_RATE = 10.0
 SETTLE_SECONDS = 1.0
+ROBOT_ERRORS, CAMERA_NOISE = 5, 6
+"""Streams of the seed."""
 START = -1
 """Index of what is observed before the first action."""
 LOOK = (
@@ -44,6 +50,16 @@ LOOK = (
 LOOK_AROUND = (
     "before planning anew it saw all bodies of the planned scene that can move, as they are in the room, and what they "
     "stand on"
+)
+NOISY = (
+    "localisation is off at every stop and joints stand beside their encoders; a look is from where the robot believes "
+    "to stand, and shows nothing where the segmentation misses a body or takes it for something else; picking and "
+    "placing are planned anew from where the robot stands then"
+)
+CAMERAS = (
+    "before each action the planned shapes of what it names were fitted to two rendered depth pictures, poses of what "
+    "can be carried and joint values of furniture; all else it knew from the planned scene. Whether an action had its "
+    "effect is told by the room"
 )
 PROPRIOCEPTION = "the pose of a held item in the hand was read from the simulation"
 GRIP = "items are held by friction of the two fingers alone; no constraint is added"
@@ -122,7 +138,7 @@ def execute(
     with load_scene(root) as world:
         world.anchor_friction()
         start = Configuration(order.state.base, order.state.arm, model.description.opening)
-        physical = PhysicalRobot(world, model.description, start, RECORD_RATE)
+        physical = _robot(world, model, start, parameters, context)
         failures = _start_failures(physical)
         physical.wait(SETTLE_SECONDS)
 
@@ -142,6 +158,7 @@ def execute(
             anew[number] = observed_state(world, matches, joint_names, physical.held)
             return replanning.plan(state, observed[START], anew[number], number)
 
+        pictures = RoomPictures(world, room.records, room.texts, model.description)
         observe(START)
         physical.recording.keyframe(START, "start")
         conduct = Conduct(
@@ -150,11 +167,12 @@ def execute(
             physical,
             matches,
             joint_names,
-            replace(budgets, size_uncertainty=0.0),
+            replace(budgets, size_uncertainty=budgets.size_uncertainty if parameters.eyes == "camera" else 0.0),
             random,
             parameters.relocalize,
             parameters.execution_attempts,
             observe=observe,
+            eyes=_eyes(Sight(model, room, physical, joint_names, pictures), parameters, context),
         )
         if failures:
             conduct.steps = order.steps
@@ -170,13 +188,17 @@ def execute(
         physical.recording.keyframe(len(conduct.steps) - 1, "end")
         final = observed_state(world, matches, joint_names, physical.held)
         with context.progress.step("pictures"):
-            draw(RoomPictures(world, room.records, room.texts, model.description), physical, parameters, context)
+            draw(pictures, physical, parameters, context)
     graphs = {
         number: graph_of_state(order.graph, observed[START], state, believed, model)
         for number, state in observed.items()
         if number >= 0
     }
-    used = (LOOK, PROPRIOCEPTION, GRIP) if parameters.relocalize else ("the planned motion was replayed", GRIP)
+    used: tuple[str, ...] = ("the planned motion was replayed", GRIP)
+    if parameters.relocalize:
+        used = (CAMERAS if parameters.eyes == "camera" else LOOK, PROPRIOCEPTION, GRIP)
+    if parameters.eyes != "true":
+        used += (NOISY,)
     return Outcome(
         conduct.steps,
         executed_in="reconstructed" if order.ground_truth is None else "ground_truth",
@@ -193,6 +215,38 @@ def execute(
         differences=_differences(model, believed, conduct.steps, observed, anew),
         arrays=executed_rows(physical.recording.snapshots),
     )
+
+
+def _robot(
+    world: PhysicsWorld, model: WorldModel, start: Configuration, parameters: PlanParameters, context: Context
+) -> PhysicalRobot:
+    if parameters.eyes == "true":
+        return PhysicalRobot(world, model.description, start, RECORD_RATE)
+    return ErringRobot(world, model.description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What eyes are made of."""
+
+    model: WorldModel
+    room: Room
+    physical: PhysicalRobot
+    joint_names: dict[str, str]
+    pictures: RoomPictures
+
+
+def _eyes(sight: Sight, parameters: PlanParameters, context: Context) -> Eyes:
+    model, physical = sight.model, sight.physical
+    true = TrueEyes(model, sight.room, physical, sight.joint_names)
+    if not isinstance(physical, ErringRobot):
+        return true
+    classes = tuple(sorted({record.class_name for record in model.records.values() if record.carriable}))
+    errors = SegmenterErrors(SegmenterRates(), Luck(context.seed), classes)
+    if parameters.eyes == "noisy":
+        return NoisyEyes(true, physical, errors)
+    noise = context.random(CAMERA_NOISE)
+    return CameraEyes(model, sight.room, sight.pictures, physical, errors, noise, parameters.match_radius)
 
 
 def _read_room(root: Path, order: Order) -> Room:

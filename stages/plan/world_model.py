@@ -119,6 +119,10 @@ class WorldModel:
             return self.world.pose(carrier) @ carrier_from_item
         return self.world.pose(name)
 
+    def text(self, name: str) -> str:
+        """Return the URDF text of a body."""
+        return self._texts[name]
+
     def joint_value(self, name: str, joint: str) -> float:
         """Return the believed value of a joint."""
         return self.world.joint_value(name, joint)

@@ -20,6 +20,8 @@ from stages.agent.scene_map import Item, quarter
 
 SURE_OF_USE = 2
 """Regions of views by which a thing has to be ahead in being clean or used."""
+SEEN_FROM = 2
+"""Regions of views from which every corner of furniture is looked at before what is not seen there counts as absent."""
 MOST_VIEWS = 6
 TRIES = 6
 """Executions within one call."""
@@ -63,7 +65,8 @@ class OwnSkills(CommonSkills):
         """Furniture -> base poses that failed, and what for."""
         self._off: list[Position] = []
         """Spots from which something rolled off."""
-        self._looked: dict[str, set[int]] = {}
+        self._stood: dict[str, list[Base]] = {}
+        """Furniture -> base poses from which it was looked at, as it is now."""
         self._explored = False
         self._told: set[str] = set()
         """Things of which the brain was told that they may be something else: it is done if it asks again."""
@@ -73,12 +76,14 @@ class OwnSkills(CommonSkills):
     def explore_local(self, place: str) -> ObjectMap:
         """Look from here; where that was done already, from another side, then at each thing that is not sure yet from
         near by. What was seen before stays."""
-        piece, looked = self.scene.furniture[place], self._looked.get(place, set())
-        again = self._use.other_sides and quarter(self._body.base, piece.centre) in looked
+        looked = self._sides(place)
+        again = self._use.other_sides and quarter(self._body.base, self.scene.furniture[place].centre) in looked
         if again and not self._go_round(place, looked):
             for item in [i for i in self.scene.items.values() if i.place == place]:
                 self._look(place, item)
         self._look(place)
+        if self._use.other_sides and len(self._sides(place)) > 1:
+            self._see_all_of(place)
         if self._use.agreement:
             for item in [i for i in self.scene.items.values() if i.place == place]:
                 if again or len(set(item.votes.values())) > 1:
@@ -113,14 +118,28 @@ class OwnSkills(CommonSkills):
         at = item.position if item is not None else (*piece.centre, piece.height)
         look = self._body.look(at, close=close)
         if not close:
-            self._looked.setdefault(place, set()).add(look.sector)
-        seen = {self.scene.add(d, place, (quarter(base, d.position), close)).key for d in look.detections}
+            self._stood.setdefault(place, []).append(base)
+        seen = {
+            found.key
+            for found in self.scene.enter(look.detections, place, lambda d: (quarter(base, d.position), close))
+        }
         should = [item] if item is not None else [i for i in self.scene.items.values() if i.place == place]
         for each in should:
             if each.key not in seen:
                 each.votes[quarter(base, each.position), close] = None
                 if len(each.sides(seen=False)) > len(each.sides(seen=True)):
                     self.scene.items.pop(each.key, None)
+
+    def _see_all_of(self, place: str) -> None:
+        """Look from further sides until every corner of furniture was in sight from two regions of views: where an end
+        of a long table was looked at from one region alone, nothing there is no evidence."""
+        piece = self.scene.furniture[place]
+        (x, y), (w, d) = piece.centre, piece.size
+        corners = [(x + i * w / 2, y + j * d / 2) for i in (-1, 1) for j in (-1, 1)]
+        while any(len({quarter(base, corner) for base in self._stood[place]}) < SEEN_FROM for corner in corners):
+            if not self._go_round(place, self._sides(place)):
+                return
+            self._look(place)
 
     def _confirm(self, item: Item) -> None:
         """Take views of a thing until one class is enough ahead. Views of one region say the same, and by the error
@@ -147,6 +166,11 @@ class OwnSkills(CommonSkills):
         fresh = (b for _, b in poses if (quarter(b, item.position), True) not in item.votes)
         return next((base for base in fresh if self._body.reaches(base, item.position)), None)
 
+    def _sides(self, place: str) -> set[int]:
+        """Return the quarter turns from which furniture was looked at."""
+        centre = self.scene.furniture[place].centre
+        return {quarter(base, centre) for base in self._stood.get(place, [])}
+
     def _go_round(self, place: str, seen: set[int]) -> bool:
         """Drive to another side of furniture; False where none can be got to."""
         return any(
@@ -170,7 +194,7 @@ class OwnSkills(CommonSkills):
     def navigate(self, target: SceneObject) -> Outcome:
         """Drive before furniture, to a side from which it was not looked at yet as long as there is one."""
         place = target.key if target.key in self.scene.furniture else self.scene.items[target.key].place
-        seen = self._looked.get(place, set()) if self._use.other_sides else set()
+        seen = self._sides(place) if self._use.other_sides else set()
         poses = other_sides(self.scene, place, self._body.base, seen, self._body.stand_off) or drivable(
             self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off)
         )
@@ -284,7 +308,7 @@ class OwnSkills(CommonSkills):
                 item.position = near[0].position
                 self.scene.items[item.key] = item
                 return True
-        self._looked[item.place] = {quarter(self._body.base, item.position)}
+        self._stood[item.place] = [self._body.base]
         return False
 
     def place(self, target: SceneObject) -> Outcome:
@@ -324,9 +348,8 @@ class OwnSkills(CommonSkills):
         over = self.scene.at_carrier(at, place)
         for close in (True, False):
             look = self._body.look(at, close=close)
-            new = [
-                d for d in look.detections if d.label in wanted and self.scene.at(d.position, place, d.radius) is None
-            ]
+            known = self.scene.matched(look.detections, place)
+            new = [d for d, other in zip(look.detections, known, strict=True) if d.label in wanted and other is None]
             near = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new]
             away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
             if seen is not None and away < BESIDE:
@@ -338,7 +361,7 @@ class OwnSkills(CommonSkills):
         self._off.append(at)
         if item.key in self.scene.items:
             return Outcome(False, "not_there", f"{item.key} lies beside {label}, not on it")
-        self._looked[place] = {quarter(self._body.base, at)}  # what was seen from other sides was before this
+        self._stood[place] = [self._body.base]  # what was seen from other sides was before this
         return Outcome(False, "lost", f"{item.key} is not seen on {label}")
 
     def pull(self, key: str, *, opening: bool) -> Outcome:

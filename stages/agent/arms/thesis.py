@@ -20,8 +20,8 @@ class ThesisSkills(CommonSkills):
         piece = self.scene.furniture[place]
         look = self._body.look((*piece.centre, piece.height), close=False)
         seen = set()
-        for detection in look.detections:
-            item = self.scene.add(detection, place, (look.sector, False))
+        items = self.scene.enter(look.detections, place, lambda _: (look.sector, False))
+        for detection, item in zip(look.detections, items, strict=True):
             item.votes = {(look.sector, False): detection.label}
             seen.add(item.key)
         self.scene.items = {k: item for k, item in self.scene.items.items() if item.place != place or k in seen}

@@ -19,6 +19,8 @@ from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneO
 
 MOST_FAILURES = 3
 """Of one step of one thing before it is left alone."""
+SEVERAL = 2
+"""Of the things that a middle is of: of one alone, the middle is where it stands."""
 MOST_TROUBLES = 30
 """Of a session before it is given up."""
 
@@ -111,6 +113,8 @@ class RulesBrain:
             if last.error.kind == "unknown_object":
                 self._things.pop(self._asked[1], None)
                 self._look_again = True
+            if self._asked[0] == "navigate":
+                self._asked = ("", "")  # it did not drive: what is in front is not what was asked for
 
     def _heard(self, called: Called) -> None:
         key, value = self._asked[1], called.value
@@ -352,6 +356,9 @@ class RulesBrain:
         if thing is None:
             return self._search(what, starts)
         target = self._carrier(onto)
+        alone = how == "place_among" and len(self._fitting(onto)) < SEVERAL
+        if target is not None and alone and self._style.skilled and self._held is None:
+            raise _GiveUp(f"one {onto.text} is all that was surely seen: it has no middle")
         if target is None:
             return self._search(onto, []) if onto.labels[0] not in FURNITURE else self._no_way(onto)
         return self._deliver(thing, what, target, how)

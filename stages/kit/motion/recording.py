@@ -47,13 +47,7 @@ class Recording:
     def take(self, action: int) -> int:
         """Take a snapshot now and return its index."""
         configuration = self.robot.configuration()
-        links = {name: pose for name, pose in _robot_links(self.robot).items()}
-        for name, body in self.world.bodies.items():
-            if body.record.movable:
-                links[name] = self.world.pose(name)
-            for joint in body.record.joints:
-                if joint.part in body.links:
-                    links[joint.part] = self.world.link_pose(name, joint.part)
+        links = _robot_links(self.robot) | moving_links(self.world)
         self.snapshots.append(
             Snapshot(round(self.world.time, 6), action, configuration.body, configuration.opening, links)
         )
@@ -62,6 +56,18 @@ class Recording:
     def keyframe(self, action: int, label: str) -> None:
         """Take a snapshot and mark it as a key frame."""
         self.keyframes.append((self.take(action), label))
+
+
+def moving_links(world: PhysicsWorld) -> dict[str, np.ndarray]:
+    """Return the world poses (4, 4) of movable bodies and of moving parts, as they are now."""
+    links = {}
+    for name, body in world.bodies.items():
+        if body.record.movable:
+            links[name] = world.pose(name)
+        for joint in body.record.joints:
+            if joint.part in body.links:
+                links[joint.part] = world.link_pose(name, joint.part)
+    return links
 
 
 def _robot_links(robot: Robot) -> dict[str, np.ndarray]:

@@ -9,7 +9,9 @@ grasps): 5 other things in view, 3 of 8 false detections survived a look from ne
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import atan2, pi
 
 import numpy as np
 
@@ -35,6 +37,12 @@ class SegmenterRates:
     """That a thing is not seen from one side, near or far. 0 where what hides a thing is simulated."""
     missed: float = MISSED / GRASPS / 2
     """That a thing is not detected from one region of views."""
+
+
+def quarter_turn(eye: Sequence[float], at: Sequence[float]) -> int:
+    """Return the quarter turn, 0 to 3, from which something at a position is looked at: a region of views. The first
+    two numbers of both count [m]."""
+    return int(((atan2(eye[1] - at[1], eye[0] - at[0]) + pi / 4) % (2 * pi)) // (pi / 2)) % 4
 
 
 class Luck:

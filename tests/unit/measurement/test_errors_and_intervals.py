@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from stages.evaluate.point_labels import nearest_labels
 from stages.kit.drawing.palette import hex_color, instance_color
 from stages.kit.drawing.plots import plot_bars, plot_graphs
 from stages.kit.drawing.tree_layout import tree_layout
-from stages.kit.measurement.bootstrap import bootstrap_interval, figure_interval, paired_interval
+from stages.kit.measurement.bootstrap import bootstrap_interval, figure_interval, paired_interval, pooled_interval
 from stages.kit.measurement.pose_error import (
     align_rigidly,
     associate,
@@ -133,6 +135,25 @@ def test_bootstrap_covers_the_truth():
         interval = bootstrap_interval(random.exponential(size=40), random, level=0.9, resamples=300)
         held += interval.low <= 1.0 <= interval.high
     assert 0.80 <= held / 200 <= 0.95
+
+
+def test_pooled_intervals_are_those_of_the_figure_called_for_every_draw() -> None:
+    """Sums over sums in one array: the same draws, and those with nothing below the line left out."""
+    random = np.random.default_rng(4)
+    first, second = (np.stack([random.random(12), random.integers(0, 2, 12)], axis=1) for _ in range(2))
+
+    def figure(rows: Sequence[np.ndarray]) -> float | None:
+        above, below = np.sum(rows, axis=0)
+        return float(above / below) if below else None
+
+    draws = {"resamples": 300}
+    called = figure_interval(figure, list(first), np.random.default_rng(3), **draws)
+    pooled = pooled_interval(first, None, np.random.default_rng(3), **draws)
+    assert astuple(pooled) == pytest.approx(astuple(called))
+    called = paired_interval(figure, list(first), list(second), np.random.default_rng(3), **draws)
+    pooled = pooled_interval(first, second, np.random.default_rng(3), **draws)
+    assert astuple(pooled) == pytest.approx(astuple(called))
+    assert pooled_interval(np.zeros((3, 2)), None, np.random.default_rng(3), **draws) is None
 
 
 def test_bootstrap_is_repeatable_and_handles_little_data():

@@ -16,7 +16,8 @@ from stages.kit.motion.segments import Manipulation
 from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from stages.plan import conduct as conduct_module
 from stages.plan.actions.place import MOST_TILT, Place
-from stages.plan.conduct import Conduct, Room
+from stages.plan.conduct import Conduct
+from stages.plan.eyes import Room, TrueEyes
 from stages.plan.pick_place import Budgets
 from stages.plan.refinement import Step
 from stages.plan.world_model import RobotState, WorldModel
@@ -295,7 +296,8 @@ def looking(scene: Path, kitchen_model: WorldModel) -> Iterator[Conduct]:
     with load_scene(scene) as world:
         physical = SimpleNamespace(world=world, held=None, action=-1)
         joints = {"fridge_2__hinge": "fridge_2__hinge"}
-        yield Conduct(model, room, physical, matches, joints, BUDGETS, np.random.default_rng(0), True, 1)  # type: ignore[arg-type]
+        eyes = TrueEyes(model, room, physical, joints)  # type: ignore[arg-type]
+        yield Conduct(model, room, physical, matches, joints, BUDGETS, np.random.default_rng(0), True, 1, eyes=eyes)  # type: ignore[arg-type]
     model.restore(before)
 
 

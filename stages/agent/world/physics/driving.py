@@ -10,12 +10,11 @@ from stages.agent.body import Base, Felt
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.agent.world.physics.seen import Seen
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.robot_errors import stop_error
 from stages.kit.motion.segments import Segment
 from stages.kit.simulation.engine import engine
 from stages.kit.simulation.robot import Configuration
 
-LOCALISATION, TURNED = 0.008, 0.006
-"""Standard deviation of where the base thinks that it stands [m], [rad], drawn at every stop."""
 STEP = 0.05
 """Between poses of the base at which collisions are looked for [m]."""
 
@@ -34,7 +33,7 @@ class Driving:
         if way is not None:
             if not np.allclose(self._robot.arm, self._robot.description.carry):
                 self._robot.arm_to(self._robot.description.carry)
-            error = self._robot.random.normal(0, 1, 3) * (LOCALISATION, LOCALISATION, TURNED)
+            error = stop_error(self._robot.random)
             points = [np.array([*point, 0.0]) - self._robot.error for point in way[1:-1]]
             ease = [self._seen.obstacles.at_ease(*point) for point in way[1:-1]]
             for turns in (ease, [False] * len(ease), [True] * len(ease)):

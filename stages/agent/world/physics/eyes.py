@@ -7,43 +7,26 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
 from schemas.scene_parts import Camera
 from stages.agent.world.physics.shapes import COLORS, STAIN
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.point_clouds import clusters
-from stages.kit.geometry.transforms import apply
-from stages.kit.rendering.depth_noise import disturb_depth
-from stages.kit.rendering.ray_casting import SceneRenderer
+from stages.kit.rendering.object_views import Picture, cloud
 
 HEAD = Camera(width=160, height=120, fx=100.0, fy=100.0, cx=79.5, cy=59.5)
 WRIST = Camera(width=240, height=180, fx=175.0, fy=175.0, cx=119.5, cy=89.5)
 NEAR_BY = Camera(width=240, height=180, fx=350.0, fy=350.0, cx=119.5, cy=89.5)
 """The middle of the wrist camera's full resolution, of which looks at a whole surface take every second pixel."""
-LEAST_PIXELS, LEAST_POINTS = 25, 16
-"""Of a mask and of an object (ConceptGraphs)."""
-VOXEL, LINK, OVERLAP = 0.025, 0.05, 0.5
-"""Edge of a cell in which two clouds overlap, distance of points of one cluster [m], and the share from which they are
-one (ConceptGraphs)."""
+LEAST_POINTS = 16
+"""Of an object (ConceptGraphs)."""
+VOXEL, OVERLAP = 0.025, 0.5
+"""Edge of a cell in which two clouds overlap [m], and the share from which they are one (ConceptGraphs)."""
 COINCIDE = 0.03
 """Corners of the boxes of one thing that was taken for two classes are this near to each other [m]."""
 NEIGHBOURS = 14
 """Points of which a surface normal is made."""
 STAINED = 0.04
 """Share of a mask that is brown on a used cup."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """What a camera took: colour (H, W, 3) uint8, noisy z-depth (H, W) [m], and the true instances (H, W), which a
-    segmentation backend other than the oracle does not look at."""
-
-    color: np.ndarray
-    depth: np.ndarray
-    instance: np.ndarray
-    camera: Camera
 
 
 @dataclass(frozen=True)
@@ -96,25 +79,6 @@ class Surface:
         return bool(
             np.all(np.abs(self.low - other.low) < COINCIDE) and np.all(np.abs(self.high - other.high) < COINCIDE)
         )
-
-
-def take(
-    renderer: SceneRenderer, camera: Camera, world_from_camera: np.ndarray, random: np.random.Generator
-) -> Picture:
-    """Take a picture with the noise of a depth camera."""
-    seen = renderer.render(camera, world_from_camera)
-    reflectance = seen.albedo.mean(axis=2)
-    depth = disturb_depth(seen.depth, seen.incidence, reflectance, np.zeros_like(reflectance), camera, random)
-    return Picture(seen.color, depth, seen.instance, camera)
-
-
-def cloud(picture: Picture, mask: np.ndarray, map_from_camera: np.ndarray) -> np.ndarray:
-    """Return the points (N, 3) of a mask (H, W) in the map frame: its largest cluster; none where too few are left."""
-    inner = binary_erosion(mask) & (picture.depth > 0)
-    if inner.sum() < LEAST_PIXELS:
-        return np.zeros((0, 3))
-    points = apply(map_from_camera, back_project(picture.depth, picture.camera)[inner].astype(float))
-    return points[clusters(points, LINK) == 0]
 
 
 def seen_in(picture: Picture, masks: list[Mask], map_from_camera: np.ndarray, eye: np.ndarray) -> list[Surface]:

@@ -9,11 +9,12 @@ import numpy as np
 from stages.agent.body import Base, Detection, Look, Position, Sweep
 from stages.agent.scene_map import quarter
 from stages.agent.world.physics import head
-from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Segmenter, Surface, fuse, seen_in, take
+from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Segmenter, Surface, fuse, seen_in
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply, inverse, look_at
+from stages.kit.rendering.object_views import take
 
 VIEW = np.array([0.0, -0.9, 0.0, -2.2, 0.0, 2.1, 0.785])
 """Arm that holds the wrist camera over a surface in front, looking down by 45 degrees [rad]."""

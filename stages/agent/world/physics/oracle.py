@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.agent.world.physics.eyes import LEAST_PIXELS, Mask, Picture
+from stages.agent.world.physics.eyes import Mask
 from stages.agent.world.physics.room import Room
+from stages.kit.rendering.object_views import LEAST_PIXELS, Picture
 from stages.kit.rendering.segmenter_errors import SegmenterErrors
 
 

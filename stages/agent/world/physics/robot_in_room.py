@@ -20,13 +20,12 @@ from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward
 from stages.kit.motion.physical_robot import PhysicalRobot
+from stages.kit.motion.robot_errors import encoder_errors
 from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.rendering.segmenter_errors import Luck
 from stages.kit.simulation.robot import Configuration, base_pose
 from stages.kit.simulation.robot_description import load_robot
 
-JOINTS = 0.001
-"""Standard deviation of each joint's encoder [rad], drawn once."""
 TOOL_FROM_CAMERA = np.array([[0, -1, 0, 0.06], [1, 0, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]], float)
 LOOK_SECONDS = 3.0
 """**Assumed**: of a motion of the arm to a view."""
@@ -42,7 +41,7 @@ class RobotInRoom:
         self.random = np.random.default_rng([seed, 83])
         self.description = load_robot("panda")
         self.beliefs = Beliefs(self.description)
-        self.joint_error = self.random.normal(0, JOINTS, 7)
+        self.joint_error = encoder_errors(self.random)
         self.error = np.zeros(3)
         """Of localisation: what is believed less what is true, as of the last stop."""
         x, y, yaw = room.apartment.start

@@ -9,11 +9,12 @@ import numpy as np
 from stages.agent.body import Position, SeenFurniture
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.world.physics import head
-from stages.agent.world.physics.eyes import Picture, Surface
+from stages.agent.world.physics.eyes import Surface
 from stages.agent.world.physics.hands import Box
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply
+from stages.kit.rendering.object_views import Picture
 
 FOUND_WITHIN = 0.12
 """A surface this near to a position is meant by it [m]."""

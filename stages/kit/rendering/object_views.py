@@ -1,0 +1,50 @@
+"""Pictures of a simulated depth camera, and the points of a mask in them: how robots in simulation see things."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_erosion
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.cameras import back_project
+from stages.kit.geometry.point_clouds import clusters
+from stages.kit.geometry.transforms import apply
+from stages.kit.rendering.depth_noise import disturb_depth
+from stages.kit.rendering.ray_casting import SceneRenderer
+
+LEAST_PIXELS = 25
+"""Of a mask (ConceptGraphs)."""
+LINK = 0.05
+"""Distance of points of one cluster [m] (ConceptGraphs)."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a camera took: colour (H, W, 3) uint8, noisy z-depth (H, W) [m], and the true instances (H, W), which a
+    segmentation backend other than the oracle does not look at."""
+
+    color: np.ndarray
+    depth: np.ndarray
+    instance: np.ndarray
+    camera: Camera
+
+
+def take(
+    renderer: SceneRenderer, camera: Camera, world_from_camera: np.ndarray, random: np.random.Generator
+) -> Picture:
+    """Take a picture with the noise of a depth camera."""
+    seen = renderer.render(camera, world_from_camera)
+    reflectance = seen.albedo.mean(axis=2)
+    depth = disturb_depth(seen.depth, seen.incidence, reflectance, np.zeros_like(reflectance), camera, random)
+    return Picture(seen.color, depth, seen.instance, camera)
+
+
+def cloud(picture: Picture, mask: np.ndarray, map_from_camera: np.ndarray) -> np.ndarray:
+    """Return the points (N, 3) of a mask (H, W) in the map frame: its largest cluster; none where too few are left."""
+    inner = binary_erosion(mask) & (picture.depth > 0)
+    if inner.sum() < LEAST_PIXELS:
+        return np.zeros((0, 3))
+    points = apply(map_from_camera, back_project(picture.depth, picture.camera)[inner].astype(float))
+    return points[clusters(points, LINK) == 0]

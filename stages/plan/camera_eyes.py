@@ -1,0 +1,119 @@
+"""A look through cameras: rendered depth pictures, masks that may be missed or wrong, and the planned shape fitted to
+the points of a mask. What is estimated is where a thing stands and how far a joint is open; shapes stay as planned."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.transforms import apply, inverse, look_at
+from stages.kit.rendering.object_views import LEAST_PIXELS, cloud, take
+from stages.kit.rendering.segmenter_errors import SegmenterErrors, quarter_turn
+from stages.kit.simulation.shapes import link_shapes, surface_points
+from stages.plan.correspondence import alike
+from stages.plan.erring_robot import ErringRobot
+from stages.plan.eyes import CELL, NEAR_BY, Room, Seen
+from stages.plan.pictures import RoomPictures
+from stages.plan.pose_fit import fit_joint, fit_upright
+from stages.plan.world_model import WorldModel, moved_record
+
+CAMERA = Camera(width=240, height=180, fx=260.0, fy=260.0, cx=119.5, cy=89.5)
+EYES = ((0.0, 1.35), (0.2, 0.85))
+"""How far before the middle of the base and how high the cameras are [m]: the head's, and one that the hand holds up,
+which is not there while the hand holds something. **Assumed**: the arm gets there and back."""
+SAME = 0.1
+"""Clouds of two cameras this near to each other are of one thing [m]."""
+LEAST_POINTS = 40
+POINTS = 1500
+"""Of a shape that is fitted."""
+
+
+class CameraEyes:
+    """The eyes of a robot that errs. `radius`: how far from where it is believed a thing of its class is it [m]."""
+
+    again = True
+
+    def __init__(
+        self,
+        model: WorldModel,
+        room: Room,
+        pictures: RoomPictures,
+        robot: ErringRobot,
+        errors: SegmenterErrors,
+        random: np.random.Generator,
+        radius: float,
+    ) -> None:
+        self._model, self._room, self._pictures, self._robot = model, room, pictures, robot
+        self._errors, self._random, self._radius = errors, random, radius
+        self._names = dict(enumerate(room.records, start=1))
+        """Instance number of a picture -> body of the room."""
+
+    def seen(self, body: str, here: str) -> Seen | None:
+        """Return the planned body where the pictures show it; None where they do not, and for what neither is carried
+        nor has joints. `here` is not used: which thing it is, its class and place say."""
+        record = self._model.records[body]
+        if not record.carriable and not record.joints:
+            return None
+        points = self._look_for(body, record.class_name)
+        if len(points) < LEAST_POINTS:
+            return None
+        text, planes = self._model.text(body), self._model.planes[body]
+        pose, joints = self._model.pose(body), {j.name: self._model.joint_value(body, j.name) for j in record.joints}
+        if record.carriable:
+            pose = fit_upright(points, apply(pose, self._model.points(body, POINTS))) @ pose
+        else:
+            joints = self._opened(body, points, joints)
+        return moved_record(record, pose, joints), text, planes
+
+    def _opened(self, body: str, points: np.ndarray, joints: dict[str, float]) -> dict[str, float]:
+        """Return the joint values at which the points (N, 3) fit furniture where it is believed, joint by joint."""
+        model, found = self._model, dict(joints)
+        shapes = {
+            link: surface_points(meshes, POINTS, np.random.default_rng(0))[0]
+            for link, meshes in link_shapes(model.text(body)).items()
+        }
+        for joint in model.records[body].joints:
+
+            def points_at(value: float, name: str = joint.name) -> np.ndarray:
+                with model.joints_at(body, found | {name: value}):
+                    return np.concatenate([apply(model.world.link_pose(body, k), own) for k, own in shapes.items()])
+
+            found[joint.name] = fit_joint(points, points_at, joint.lower, joint.upper)
+        return found
+
+    def _look_for(self, body: str, class_name: str) -> np.ndarray:
+        """Return the points (N, 3) of the mask of its class that is nearest to where a body is believed, map frame."""
+        map_from_true = self._robot.map_from_true()
+        believed = np.mean(self._model.world.bounds(body), axis=0)
+        target = apply(inverse(map_from_true), believed[None])[0]
+        base = self._robot.robot.configuration().base
+        ahead = np.array([np.cos(base[2]), np.sin(base[2])])
+        renderer = self._pictures.sight(self._robot.world)
+        found = np.zeros((0, 3))
+        for forward, height in EYES[: 1 if self._robot.held is not None else None]:
+            eye = np.array([*(base[:2] + forward * ahead), height])
+            pose = look_at(eye, target)
+            picture = take(renderer, CAMERA, pose, self._random)
+            clouds = [
+                points
+                for number in np.unique(picture.instance)
+                if self._made_out(int(number), picture.instance == number, class_name)
+                and len(points := cloud(picture, picture.instance == number, map_from_true @ pose))
+            ]
+            goal = np.median(found, axis=0) if len(found) else believed
+            away = [float(np.linalg.norm(np.median(points, axis=0) - goal)) for points in clouds]
+            if clouds and min(away) < (SAME if len(found) else self._radius):
+                found = np.concatenate([found, clouds[int(np.argmin(away))]])
+        return found
+
+    def _made_out(self, number: int, mask: np.ndarray, class_name: str) -> bool:
+        """Whether the segmentation takes an instance of a picture for something of a class."""
+        name = self._names.get(number, "")
+        if not name or mask.sum() < LEAST_PIXELS:
+            return False
+        at = self._robot.world.pose(name)[:2, 3]
+        base = self._robot.robot.configuration().base
+        view = (quarter_turn(base.tolist(), at.tolist()), bool(np.hypot(*(base[:2] - at)) < NEAR_BY))
+        if self._errors.misses(name, hash(tuple(np.rint(at / CELL).astype(int).tolist())), *view):
+            return False
+        return alike(self._errors.class_of(name, self._room.records[name].class_name, *view), class_name)

@@ -1,0 +1,110 @@
+"""What looks tell: the truth, the truth through errors, and shapes fitted to pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.kit.motion.segments import Segment
+from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
+from stages.kit.simulation.robot import Configuration
+from stages.kit.simulation.robot_description import load_robot
+from stages.kit.simulation.world import load_scene, read_scene_bodies
+from stages.plan.camera_eyes import CameraEyes
+from stages.plan.erring_robot import ErringRobot
+from stages.plan.eyes import NoisyEyes, Room, TrueEyes
+from stages.plan.pictures import RoomPictures
+from stages.plan.pose_fit import fit_joint, fit_upright
+from stages.plan.world_model import WorldModel
+
+NEVER = SegmenterErrors(SegmenterRates(confusable=0.0, hidden=0.0, missed=0.0), Luck(0), ())
+ALWAYS = SegmenterErrors(SegmenterRates(missed=1.0), Luck(0), ())
+
+
+def box_surface(random: np.random.Generator, count: int, sides: int = 5) -> np.ndarray:
+    """Points on the sides (+x, -y, top, -x, +y) of a box of 12 x 6 x 20 cm around the origin."""
+    points = random.uniform(-1, 1, (count, 3)) * (0.06, 0.03, 0.1)
+    side = np.arange(count) % sides
+    for k, (axis, value) in enumerate(((0, 0.06), (1, -0.03), (2, 0.1), (0, -0.06), (1, 0.03))):
+        points[side == k, axis] = value
+    return points
+
+
+def test_a_shape_is_fitted_to_the_side_that_was_seen() -> None:
+    """Three of five sides with 2 mm of noise, 4 cm and 0.15 rad away, with strays."""
+    random = np.random.default_rng(0)
+    truth = transform_from_yaw(0.15, np.array([0.03, -0.02, 0.015]))
+    seen = apply(truth, box_surface(random, 900, sides=3)) + random.normal(0, 0.002, (900, 3))
+    seen[:40] += (0.0, 0.0, -0.12)
+    found = fit_upright(seen, box_surface(random, 3000))
+    assert np.linalg.norm((found - truth)[:3, 3]) < 0.004
+    assert abs(np.arctan2(found[1, 0], found[0, 0]) - 0.15) < 0.03
+
+
+def test_a_door_is_found_as_far_open_as_it_stands() -> None:
+    def door(angle: float) -> np.ndarray:
+        along, up = np.meshgrid(np.linspace(0, 0.5, 30), np.linspace(0, 1, 30))
+        return np.stack([along * np.cos(angle), along * np.sin(angle), up], axis=-1).reshape(-1, 3)
+
+    noise = np.random.default_rng(1).normal(0, 0.003, (900, 3))
+    assert fit_joint(door(0.83) + noise, door, 0.0, 2.0) == pytest.approx(0.83, abs=0.03)
+
+
+@pytest.fixture
+def sight(scene: Path, kitchen_model: WorldModel) -> Iterator[SimpleNamespace]:
+    """The kitchen as believed, and one in which the robot stands before its table with a known error."""
+    before = kitchen_model.snapshot()
+    bodies = read_scene_bodies(scene)
+    room = Room(
+        {name: record for name, (record, _) in bodies.items()},
+        {name: text for name, (_, text) in bodies.items()},
+        {name: () for name in bodies},
+    )
+    with load_scene(scene) as world:
+        robot = load_robot("panda")
+        start = Configuration(np.array([-1.3, -0.2, -np.pi / 2]), robot.carry, robot.opening)
+        erring = ErringRobot(world, robot, start, 1.0, np.random.default_rng(0))
+        erring._error = np.array([0.01, -0.02, 0.0])
+        yield SimpleNamespace(model=kitchen_model, room=room, world=world, robot=erring)
+    kitchen_model.restore(before)
+
+
+def test_noisy_eyes_see_from_where_the_robot_believes_to_stand_or_miss(sight: SimpleNamespace) -> None:
+    true = TrueEyes(sight.model, sight.room, sight.robot, {})
+    exact = np.array(true.seen("cup_5", "cup_5")[0].world_from_body)
+    seen = NoisyEyes(true, sight.robot, NEVER).seen("cup_5", "cup_5")
+    assert seen is not None
+    assert np.array(seen[0].world_from_body)[:3, 3] - exact[:3, 3] == pytest.approx([0.01, -0.02, 0.0], abs=1e-3)
+    assert NoisyEyes(true, sight.robot, ALWAYS).seen("cup_5", "cup_5") is None
+
+
+def test_camera_eyes_fit_what_is_carried_and_know_no_truth(sight: SimpleNamespace) -> None:
+    """The bottle stands on the table, not where it is believed; what is missed or fixed is not seen."""
+    sight.model.world.set_pose("bottle_7", transform_from_yaw(0.0, np.array([-1.25, -1.05, 0.75])))
+    sight.world.set_pose("bottle_7", transform_from_yaw(0.4, np.array([-1.3, -1.1, 0.75])))
+    pictures = RoomPictures(sight.world, sight.room.records, sight.room.texts, load_robot("panda"))
+
+    def eyes(errors: SegmenterErrors) -> CameraEyes:
+        return CameraEyes(sight.model, sight.room, pictures, sight.robot, errors, np.random.default_rng(0), 0.5)
+
+    seen = eyes(NEVER).seen("bottle_7", "")
+    assert seen is not None
+    pose = inverse(sight.robot.map_from_true()) @ np.array(seen[0].world_from_body)
+    assert pose[:3, 3] == pytest.approx([-1.3, -1.1, 0.75], abs=0.015)
+    assert eyes(ALWAYS).seen("bottle_7", "") is None
+    assert eyes(NEVER).seen("table_3", "") is None
+
+
+def test_a_robot_that_errs_stops_beside_where_it_was_sent_and_goes_back_as_believed(sight: SimpleNamespace) -> None:
+    arm = load_robot("panda").carry
+    rows = np.array([[-1.29, -0.22, -np.pi / 2, *arm], [-1.29, 0.3, -np.pi / 2, *arm]])
+    sight.robot.follow(Segment(rows, 0.0), None)
+    off = rows[-1, :3] - sight.robot.robot.configuration().base
+    assert 0.001 < np.abs(off[:2]).max() < 0.04
+    assert sight.robot.way_back()[-1, :3] == pytest.approx(rows[-1, :3], abs=1e-9)
+    assert sight.robot.map_from_true()[:2, 3] == pytest.approx(off[:2], abs=0.02)
