@@ -44,7 +44,9 @@ LEAST_EDGE = 0.5
 NEAR = 0.03
 """What lies so near to a surface that faces its way is explained [m]."""
 EXPLAINED = 0.75
-"""Share of what was seen, and of what of it looks up, that a built-in explains."""
+"""Share of what was seen that a built-in explains."""
+LEVEL_KEPT, SAME_LEVEL = 0.9, 0.02
+"""Share of what was seen and looks up that lies so near [m] to surface of a built-in that does."""
 MOST_FILLED, DEEP = 0.1, 0.05
 """Share of a built-in's surface that may lie deeper than this [m] in space that was seen to be empty: the undersides of
 boards, which hardly a camera sees, are guessed."""
@@ -68,8 +70,8 @@ class Fit:
 
     explained: float
     """Share of the surface that lies near."""
-    explained_up: float
-    """The same of what looks up."""
+    level_kept: float
+    """Share of what looks up that lies near surface that does."""
     distance: float
     """Mean distance from the surface, cut off at `TRUNCATION` [m]."""
     filled: float
@@ -146,8 +148,10 @@ def _why_not(fit: Fit, boxes: int) -> str:
     """Return why a fit is none, or nothing."""
     if boxes > MOST_BOXES:
         return f"it takes {boxes} boxes"
-    if fit.explained < EXPLAINED or fit.explained_up < EXPLAINED:
-        return f"boxes explain {min(fit.explained, fit.explained_up):.0%} of it"
+    if fit.explained < EXPLAINED:
+        return f"boxes explain {fit.explained:.0%} of it"
+    if fit.level_kept < LEVEL_KEPT:
+        return f"boxes keep {fit.level_kept:.0%} of its level surface"
     return f"{fit.filled:.0%} of its boxes would fill space seen to be empty" if fit.filled > MOST_FILLED else ""
 
 
@@ -171,7 +175,7 @@ def fit_of(cells: Cells, patches: Patches, empty_depth: Callable[[np.ndarray], n
     depth = empty_depth(points)
     return Fit(
         explained=_share(near, patches.areas),
-        explained_up=_share(near[looks_up], level) if level.sum() >= LEAST_LEVEL else 1.0,
+        level_kept=_share(distance[looks_up] < SAME_LEVEL, level) if level.sum() >= LEAST_LEVEL else 1.0,
         distance=float(np.average(distance, weights=patches.areas)),
         filled=_share(depth > DEEP, areas),
         empty_depth=float(np.average(np.minimum(depth, TRUNCATION), weights=areas)),

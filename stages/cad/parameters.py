@@ -130,7 +130,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=6,
+    version=7,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={

@@ -101,7 +101,7 @@ def choose_and_write(
             for placement in arranged.placements.values():
                 placed = placed_pieces(placement, surfaces[placement.shape.model.id])
                 pieces += [*placed, footing(placed)]
-            left = [graph.node(name).instance for name in built]
+            left = [graph.node(name).instance for name in built if not arranged.placements[name].shape.model.joints]
             nameless = surroundings_of(panoptic_map, pieces, left, method.parameters)
     with context.progress.step("writing"):
         if nameless is not None:
