@@ -145,6 +145,15 @@ bench-surface: setup ## Seen surface that is in the map, at any angle, beside Op
 bench-moving: setup ## Joints of doors and drawers that a log shows in two states, beside registration (QUICK=1: one room)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) moving --out $(OUTPUTS)/experiments/bench-moving$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: bench-built-ins
+# Two minutes of one core a room, once it is there.
+bench-built-ins: setup ## What stands for counters and cabinets that no model fits, beside box and mesh (QUICK=1: one room)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) built_ins --out $(OUTPUTS)/experiments/bench-built-ins$(if $(QUICK),-quick) $(ASKED)
+
+.PHONY: gap
+gap: setup ## Boxes of a real scan, outlines in a real bin, boxes of generated rooms after `make bench-built-ins`
+	$(EXPERIMENT) gap --built $(OUTPUTS)/experiments/bench-built-ins --data $(REAL_DATA) --out $(OUTPUTS)/experiments/gap $(ASKED)
+
 .PHONY: bench-edits
 bench-edits: setup ## Edits by hand, applied again to maps fused with other parameters (QUICK=1: four rooms)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) edits --out $(OUTPUTS)/experiments/bench-edits$(if $(QUICK),-quick) $(ASKED)

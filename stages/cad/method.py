@@ -40,6 +40,11 @@ class CadMethod(Protocol):
         ...
 
     @property
+    def builds_in(self) -> bool:
+        """Whether a thing that no model fits may become a run of boxes that is made for it."""
+        ...
+
+    @property
     def asks_grounds(self) -> bool:
         """Whether joints of a model that nothing in the map speaks for are held."""
         ...

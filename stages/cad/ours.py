@@ -52,6 +52,11 @@ class Ours:
         return self.parameters.surroundings
 
     @property
+    def builds_in(self) -> bool:
+        """As the options say."""
+        return self.parameters.built_ins
+
+    @property
     def asks_grounds(self) -> bool:
         """A class name says what such things can do, not that this one does."""
         return True

@@ -114,6 +114,9 @@ class CadParameters(Parameters):
         description="ours: things (nodes, as fridge_3) and classes that somebody knows to move as their models do; "
         "joints of others need a ground: seen to move, open, a handle, a seam",
     )
+    built_ins: bool = Field(
+        True, description="ours: a thing that no model fits becomes a run of boxes made for it, where that explains it"
+    )
     surroundings: bool = Field(
         True, description="ours: what the map shows and nothing has a name for becomes a static body of the scene"
     )

@@ -15,6 +15,8 @@ from schemas.errors import BadInput, UsageError
 from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import load_vocabulary
 from stages.cad.arranging import Arrangement
+from stages.cad.building_in import built_in_instead, colliding_built_ins, yielded
+from stages.cad.built_ins import is_built_in, may_be_built_in
 from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
 from stages.cad.choosing import adjust, select
 from stages.cad.coloring import part_colors
@@ -59,8 +61,8 @@ def run(
     method = METHODS[parameters.method](parameters)
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):
-        shortlists = find_candidates(contact_graph.info, panoptic_map, library, surfaces, method, context)
-    moved = () if articulations is None else articulations.info.articulations
+        moved = () if articulations is None else articulations.info.articulations
+        shortlists = find_candidates(contact_graph.info, panoptic_map, library, surfaces, method, context, moved)
     return choose_and_write(contact_graph.info, panoptic_map, library, shortlists, surfaces, method, context, moved)
 
 
@@ -82,9 +84,16 @@ def choose_and_write(
         layout = context.output / "layout"
         obstacles = obstacles_of(graph, layout, context.output / "meshes")
         solids = {name: convex_solid(pieces) for name, pieces in obstacles.items()}
+        if yielding := colliding_built_ins(graph, chosen, surfaces, solids, method.parameters):
+            chosen = {name: placement for name, placement in chosen.items() if name not in yielding}
+            shortlists = {name: yielded(entry) if name in yielding else entry for name, entry in shortlists.items()}
+            copy_meshes(graph, chosen, panoptic_map, context)
+            obstacles = obstacles_of(graph, layout, context.output / "meshes")
+            solids = {name: convex_solid(pieces) for name, pieces in obstacles.items()}
         arranged, conflicts_after = adjust(
             graph, chosen, shortlists, surfaces, solids, floor_levels(graph, layout), method
         )
+    built = [name for name, placement in arranged.placements.items() if is_built_in(placement.shape.model)]
     nameless: EntityMesh | None = None
     if method.keeps_surroundings:
         with context.progress.step("surroundings"):
@@ -92,7 +101,8 @@ def choose_and_write(
             for placement in arranged.placements.values():
                 placed = placed_pieces(placement, surfaces[placement.shape.model.id])
                 pieces += [*placed, footing(placed)]
-            nameless = surroundings_of(panoptic_map, pieces, method.parameters)
+            left = [graph.node(name).instance for name in built if not arranged.placements[name].shape.model.joints]
+            nameless = surroundings_of(panoptic_map, pieces, left, method.parameters)
     with context.progress.step("writing"):
         if nameless is not None:
             write_surroundings(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
@@ -106,7 +116,8 @@ def choose_and_write(
     decisions = [replacement.decision for replacement in scene.replacements]
     errors = [placement.alignment_error for placement in arranged.placements.values()]
     summary = {
-        "cad": decisions.count("cad"),
+        "cad": decisions.count("cad") - len(built),
+        "built_in": len(built),
         "mesh": decisions.count("mesh"),
         "layout": decisions.count("layout"),
         "conflicts_before": scene.conflicts_before,
@@ -127,8 +138,10 @@ def find_candidates(
     surfaces: dict[str, ModelSurface],
     method: CadMethod,
     context: Context,
+    moved: Sequence[Articulation] = (),
 ) -> dict[str, Shortlist]:
-    """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`."""
+    """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`. Models of
+    built-ins are written into the output. `moved`: what the log shows in two states."""
     models = library.info.models
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
     free_space = method.free_space(panoptic_map)
@@ -155,14 +168,23 @@ def find_candidates(
             context.random(VERTICES, node.instance),
         )
         target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
-        shortlists[node.id] = shortlist(target, method)
+        found = shortlist(target, method)
+        if not found.placements and method.builds_in and may_be_built_in(node):
+            found = built_in_instead(found, target, mesh, moved, method.parameters, context.output / "models")
+        shortlists[node.id] = found
     return shortlists
 
 
 def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) -> None:
-    """Copy the folders of the chosen models, so that the scene needs no library."""
-    for model_id in sorted({placement.shape.model.id for placement in arranged.placements.values()}):
-        shutil.copytree(model_folder(library, model_id), context.output / "models" / model_id)
+    """Copy the folders of the chosen models, so that the scene needs no library; built-ins that lost their place go."""
+    models = {placement.shape.model.id: placement.shape.model for placement in arranged.placements.values()}
+    folder = context.output / "models"
+    for written in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if written.name not in models:
+            shutil.rmtree(written)
+    for model_id, model in sorted(models.items()):
+        if not is_built_in(model):
+            shutil.copytree(model_folder(library, model_id), folder / model_id)
 
 
 def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: PanopticMap, context: Context) -> None:

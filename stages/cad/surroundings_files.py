@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,14 @@ from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
 
 
-def surroundings_of(panoptic_map: PanopticMap, pieces: list[Piece], parameters: CadParameters) -> EntityMesh | None:
+def surroundings_of(
+    panoptic_map: PanopticMap, pieces: list[Piece], left: Sequence[int], parameters: CadParameters
+) -> EntityMesh | None:
     """Return what the map shows that belongs to nothing, None when there is no such.
 
-    `pieces`: convex pieces of what the scene holds. Raises BadInput for a map whose labels do not fit its mesh.
+    `pieces`: convex pieces of what the scene holds; `left`: instances whose surface counts as nobody's where no piece
+    is (what lay on a counter that was mapped as one lump with it). Raises BadInput for a map whose labels do not
+    fit its mesh.
     """
     path = panoptic_map.path("mesh_labels.npz")
     if not path.is_file() or not panoptic_map.path("mesh.ply").is_file():
@@ -30,7 +35,7 @@ def surroundings_of(panoptic_map: PanopticMap, pieces: list[Piece], parameters: 
         raise BadInput(f"{path}: {len(instance)} labels for {len(mesh.vertices)} vertices", hint="make the map again")
     return nameless_surface(
         mesh,
-        instance,
+        np.where(np.isin(instance, left), 0, instance),
         pieces,
         clearance=parameters.surroundings_clearance,
         smallest_area=parameters.surroundings_area,

@@ -31,6 +31,11 @@ class Thesis:
         return False
 
     @property
+    def builds_in(self) -> bool:
+        """It knows the library's models alone."""
+        return False
+
+    @property
     def asks_grounds(self) -> bool:
         """What the model can do, the thing can."""
         return False

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+import cv2
 import numpy as np
 
 from schemas.errors import BadInput
@@ -27,6 +28,8 @@ GRAVITY_FRAMES = 60
 """Frames whose depth is looked at to find the floor."""
 PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
 LARGE_STEP = 1.0
+LIT_EVERY, DARK = 10, 8.0
+"""Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
 StreamName = Literal["color", "depth", "right", "labels", "pose"]
 
 
@@ -62,6 +65,8 @@ class _Written:
     pose_cameras: list[str] = field(default_factory=list)
     """Camera of each frame that has a pose."""
     median_depths: list[float] = field(default_factory=list)
+    brightness: list[float] = field(default_factory=list)
+    """Mean of every tenth picture, 0 to 255."""
     streams: set[StreamName] = field(default_factory=set)
 
     @property
@@ -161,6 +166,8 @@ def _write_frames(
 
 
 def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
+    if loaded.color is not None and len(written.times) % LIT_EVERY == 0:
+        written.brightness.append(brightness_of(loaded.color))
     written.times.append(time)
     written.cameras.append(camera_name)
     streams: dict[StreamName, object] = {
@@ -256,6 +263,14 @@ def _pose_notes(parameters: IngestParameters) -> list[str]:
     return notes
 
 
+def brightness_of(picture: np.ndarray | bytes) -> float:
+    """Return the mean of a picture (H, W, 3) uint8, or of a JPEG's or PNG's bytes, 0 to 255."""
+    if isinstance(picture, bytes):
+        small = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_REDUCED_GRAYSCALE_8)
+        return 255.0 if small is None else float(small.mean())
+    return float(picture[::8, ::8].mean())
+
+
 def _warnings(source: LogSource, written: _Written) -> list[str]:
     """What looks odd about the frames that were written."""
     notes = []
@@ -264,6 +279,11 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
         notes.append(
             f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? "
             "`scenewright inspect` tells"
+        )
+    if written.brightness and (lit := float(np.median(written.brightness))) < DARK:
+        notes.append(
+            f"WARNING: the pictures are all but black ({lit:.0f} of 255): a lens cap, or night; what is mapped has the "
+            "shape that depth gives, and names say nothing"
         )
     poses = np.array(written.poses).reshape(-1, 4, 4)
     names = np.array(written.pose_cameras, dtype=str)
