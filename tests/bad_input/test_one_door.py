@@ -70,6 +70,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/engine/batch/results.py": {"model_validate_json": PARSED, "os.open": WRITES},
     "stages/engine/batch/scene_log.py": {"open": MADE},
     "stages/engine/batch/scene_run.py": {"os.open": WRITES},
+    "stages/engine/batch/storage.py": {"model_validate_json": SERVICE},
     "stages/engine/chain.py": {"json.loads": MADE},
     "stages/engine/collection.py": {"os.open": WRITES},
     "stages/engine/keys.py": {"json.loads": MADE},

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from uuid import uuid4
 
 from schemas.errors import MachineFailure, MissingDependency, ScenewrightError, UsageError
-from schemas.manifest import MANIFEST_NAME, Manifest
+from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
 from stages.engine.batch.artifacts import manifests
 from stages.engine.batch.scene_log import clean
 
@@ -71,7 +71,9 @@ def stored_digest(url: str, step: str, timeout: float) -> str | None:
 
     def look(files: Any, root: str) -> str | None:
         try:
-            manifest = Manifest.model_validate_json(files.cat_file(f"{root}/{step}/{MANIFEST_NAME}"))
+            manifest = Manifest.model_validate_json(
+                files.cat_file(f"{root}/{step}/{MANIFEST_NAME}", end=LARGEST_MANIFEST)
+            )
             whole = all(files.size(f"{root}/{step}/{file.path}") == file.bytes for file in manifest.files)
         except (FileNotFoundError, NotADirectoryError, ValueError):
             return None
