@@ -17,7 +17,8 @@ else:
     PolicyName = Literal[names_in(policies)]
 THESIS_TIMES = "tableware/thesis_times.json"
 PHYSICS_TIMES = "tableware/physics_times.json"
-"""Below data/: times of actions, and chances, fitted to the thesis's tables; times of the arm in physics."""
+ARM_FILES = ("robots/ur5_bench.toml", "robots/ur5.toml", "robots/ur5.urdf")
+"""Below data/: times of actions, and chances, fitted to the thesis's tables; times of the arm in physics, and what describes that arm."""
 ChancesName = Literal["exact", "thesis", "thesis_spills", "thesis_failures"]
 
 

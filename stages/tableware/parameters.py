@@ -16,7 +16,7 @@ from stages.kit.stage import Optionally, Parameters, Stage
 from stages.tableware import policies
 from stages.tableware.detect_parameters import DETECT, DISHES_FILE
 from stages.tableware.found_by_place import names_in
-from stages.tableware.options import PHYSICS_TIMES, THESIS_TIMES, ActionTimes, PolicyName, TierName
+from stages.tableware.options import ARM_FILES, PHYSICS_TIMES, THESIS_TIMES, ActionTimes, PolicyName, TierName
 
 
 class SceneParameters(Parameters):
@@ -141,7 +141,11 @@ SIMULATE = Stage(
     writes=TablewareTrial,
     libraries=("numpy", "numba", "pybullet", "trimesh", "embreex", "opencv-python-headless", "pillow"),
     module="simulate_stage",
-    data_files=lambda parameters: (THESIS_TIMES, PHYSICS_TIMES),
+    data_files=lambda parameters: (
+        THESIS_TIMES,
+        PHYSICS_TIMES,
+        *(ARM_FILES if parameters.simulator == "physics" else ()),
+    ),
     check=check_simulate,
     example="scenewright tableware simulate --scene outputs/tidy/scene --policy ours --out outputs/tidy/trial",
 )
