@@ -57,6 +57,8 @@ class Told:
     """(V,) which of them each vertex of the map belongs to, 0 none."""
     parent: Mapping[str, tuple[str, str]]
     """Name -> what carries it, and how."""
+    as_good: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Name -> what carries it as well, or may: such a support is not wrong."""
 
 
 @dataclass
@@ -176,8 +178,9 @@ def supports_right(graph: ContactGraphFile, found: Mapping[str, int], told: Told
         parent, _ = told.parent[node.name]
         mine = ids.get(found.get(node.name, -1))
         link = graph.parent_link(mine) if mine is not None else None
-        wanted = SCENE_NODE if parent == SCENE_NODE else ids.get(found.get(parent, -1))
-        if link is None or link.source != wanted:
+        carriers = (parent, *told.as_good.get(node.name, ()))
+        wanted = {SCENE_NODE if name == SCENE_NODE else ids.get(found.get(name, -1)) for name in carriers}
+        if link is None or link.source not in wanted:
             wrong.append(node.name)
     return wrong, total
 
