@@ -165,7 +165,7 @@ def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pa
     """Return a table with a figure a row: label = ["experiment", "key of ours", "key beside it"...].
 
     Where all rows must stand on one screen each is label = {figures = [as above], simulated = "in few words", rival =
-    "a name in few words, where that of the arm is long"}; what the method may know stands on the linked page alone then.
+    "a name in few words, where that of the arm is long"}; what the method may know stands on the linked page alone.
     """
     rows: list[list[str]] = []
     above = ""
