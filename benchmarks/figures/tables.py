@@ -162,10 +162,17 @@ def about(experiment: Experiment) -> str:
 
 
 def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pages: Mapping[str, str]) -> str:
-    """Return a table with a figure a row: label = ["experiment", "key of ours", "key beside it"...]."""
+    """Return a table with a figure a row: label = ["experiment", "key of ours", "key beside it"...].
+
+    Where all rows must stand on one screen each is label = {figures = [as above], simulated = "in few words", rival =
+    "a name in few words, where that of the arm is long"}; what the method may know stands on the linked page alone.
+    """
     rows: list[list[str]] = []
     above = ""
-    for label, (name, ours, *beside) in spec.items():
+    brief = all(isinstance(row, Mapping) for row in spec.values())
+    for label, row in spec.items():
+        said: Mapping[str, Any] = row if isinstance(row, Mapping) else {"figures": row}
+        name, ours, *beside = said["figures"]
         experiment = experiments.get(name)
         if experiment is None:
             raise FiguresError(f"no docs/results/{name}.json")
@@ -174,7 +181,7 @@ def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pa
         digits = digits_for([figure, *others])
         unit = f" [{figure.unit}]" if figure.unit not in ("", "count") else ""
         rivals = [
-            f"{experiment.shown(key.split('/')[0])} {cell(other, digits)}"
+            f"{said.get('rival') or experiment.shown(key.split('/')[0])} {cell(other, digits, brief)}"
             for key, other in zip(beside, others, strict=True)
         ]
         linked = f"[{label}]({pages[name]})" if name in pages else label
@@ -182,14 +189,14 @@ def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pa
         about_it = "″" if name == above else f"{clause_of(experiment, 'simulated')}; {clause_of(experiment, 'knows')}"
         above = name
         date = str(experiment.about["date"])
-        rows.append([linked + unit, cell(figure, digits), "; ".join(rivals) or "–", cases, about_it, date])
-    header = ["figure", "ours", "beside it", "cases", "what was simulated; what the method may know", "measured"]
+        told = said.get("simulated", about_it)
+        rows.append([linked + unit, cell(figure, digits, brief), "; ".join(rivals) or "–", cases, told, date])
+    what = "simulated" if brief else "what was simulated; what the method may know"
+    header = ["figure", "ours", "beside it", "cases", what, "measured"]
     return markdown_table(header, rows, len(header))
 
 
-def cell(figure: Figure, digits: int) -> str:
-    return (
-        with_interval(figure, digits)
-        if figure.has_interval
-        else f"{number(figure.value, digits)} (interval not measured)"
-    )
+def cell(figure: Figure, digits: int, brief: bool = False) -> str:
+    if figure.has_interval:
+        return with_interval(figure, digits)
+    return f"{number(figure.value, digits)} {'[–]' if brief else '(interval not measured)'}"

@@ -292,6 +292,11 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
         notes.append(f"WARNING: the camera jumps {step:.2f} m between two frames")
     if written.times and not written.poses:
         notes.append("frames have no poses")
+    if written.times and "color" not in written.streams:
+        notes.append(
+            "WARNING: frames have no colour: what is mapped has the shape that depth gives, names are guessed from "
+            "shape alone, and steps that need pictures refuse"
+        )
     if written.times and "depth" not in written.streams:
         notes.append("frames have no depth")
     if source.other_cameras:

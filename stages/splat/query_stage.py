@@ -65,6 +65,7 @@ def run(
         summary["best"] = round(kept[0].probability, 3)
         summary["center"] = [round(v, 3) for v in info.regions[kept[0].region].box.center]
     if unread:
+        context.logger.warning("the encoder has never read %s: what is found for it is a guess", ", ".join(unread))
         summary["unread"] = " ".join(unread)
     return Answers(context.output, outcome="ok" if kept else "absent", summary=summary)
 

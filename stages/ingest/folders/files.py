@@ -73,6 +73,11 @@ def images_by_number(folder: Path, suffixes: tuple[str, ...], prefix: str = "") 
     return dict(sorted(images.items()))
 
 
+def images_of_subfolder(folder: Path | None, suffixes: tuple[str, ...]) -> dict[str, Path]:
+    """Return `images_by_stem` of a folder, nothing where the log has no such folder. Raises BadInput."""
+    return {} if folder is None else images_by_stem(folder, suffixes)
+
+
 def first_subfolder(root: Path, names: tuple[str, ...]) -> Path | None:
     """Return the first of the named subfolders that exists."""
     return next((root / name for name in names if (root / name).is_dir()), None)
@@ -116,17 +121,18 @@ def file_bytes(path: Path, stream: str) -> bytes:
 
 
 def image_loader(
-    color: Path | None, depth: Path | None, camera: Camera, units_per_metre: float
+    color: Path | None, depth: Path | None, camera: Camera, units_per_metre: float, *, has_color: bool = True
 ) -> Callable[[], LoadedFrame]:
-    """Return a function that reads and checks both images of a frame."""
+    """Return a function that reads and checks both images of a frame; `has_color`: whether the log has colour at all,
+    without which a frame of it is unusable then."""
 
     def load() -> LoadedFrame:
-        if color is None:
+        if color is None and has_color:
             raise Unusable("missing_color")
         if depth is None:
             raise Unusable("missing_depth")
         return LoadedFrame(
-            color=usable_color(file_bytes(color, "color"), camera),
+            color=None if color is None else usable_color(file_bytes(color, "color"), camera),
             depth=usable_depth(file_bytes(depth, "depth"), camera, units_per_metre),
         )
 

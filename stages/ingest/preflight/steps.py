@@ -17,9 +17,10 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "graph": ("usable frames", "depth", "poses"),
     "cad": ("usable frames", "depth", "poses"),
     "urdf": ("usable frames", "depth", "poses"),
-    "run reconstruct": ("usable frames", "depth", "poses", "colour"),
+    "run reconstruct": ("usable frames", "depth", "poses"),
 }
-"""Step -> what the log must have for it, through the steps before it. `run reconstruct` uses the detector."""
+"""Step -> what the log must have for it, through the steps before it. `run reconstruct` takes another segmenter where a
+log has no colour for the detector."""
 SUBSTITUTES = {"depth": ("disparity", "a stereo pair with a baseline"), "poses": ("poses", "colour")}
 """What a log lacks -> (step that makes it, what that step needs)."""
 

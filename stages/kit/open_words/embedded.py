@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from schemas.errors import BadInput
+from schemas.errors import BadInput, UsageError
 from stages.kit.formats.network_file import put_tensors, write_network
 from stages.kit.formats.safetensors_file import read_safetensors
 from stages.kit.open_words.two_towers import SIDE, WIDTH, TwoTowers, tokens, words_of
@@ -63,7 +63,14 @@ class EmbeddedEncoder:
         return np.concatenate(found)
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
-        """Return (M, width) float32 unit vectors of texts."""
+        """Return (M, width) float32 unit vectors of texts. Raises UsageError for one in other letters than it reads:
+        its vector would be that of no word at all."""
+        for text in texts:
+            if any(map(str.isalnum, text)) and not words_of(text):
+                raise UsageError(
+                    f"{text!r:.80} has no word that our own encoder reads: English, in the letters a to z",
+                    hint="ask in English, or with an encoder of that language (--encoder huggingface, or service)",
+                )
         with torch.inference_mode():
             return self._network.word(tokens(texts)).numpy()
 

@@ -163,6 +163,25 @@ def test_headlines_link_the_page_and_say_what_was_simulated_once(tmp_path: Path)
     assert "| [fence](b.md) [s] | 12 (interval not measured) | – | 2 cases | ″ | 2026-01-02 |" in text
 
 
+def test_headlines_for_one_screen_say_it_in_few_words(tmp_path: Path) -> None:
+    spec = (
+        '"wall" = { figures = ["brushes", "ours/wall/time", "theirs/wall/time"], simulated = "paint", rival = "B" }\n'
+        '"fence" = { figures = ["brushes", "ours/fence/time"], simulated = "″" }\n'
+    )
+    text = render(f"<!-- headlines\n{spec}-->\n<!-- /headlines -->", brushes(tmp_path), {"brushes": "b.md"})
+    assert "| figure | ours | beside it | cases | simulated | measured |" in text
+    assert "| [wall](b.md) [s] | 3.25 [3.0, 3.5] | B 8.50 [–] | 4 cases | paint | 2026-01-02 |" in text
+    assert "| [fence](b.md) [s] | 12 [–] | – | 2 cases | ″ | 2026-01-02 |" in text
+
+
+def test_the_index_of_results_is_one_screen() -> None:
+    table = re.search(r"^\| figure .*?(?=<!-- /headlines)", (RESULTS / "index.md").read_text(), re.M | re.S)
+    assert table is not None
+    rows = table[0].splitlines()[2:]
+    assert len(rows) <= 24, "one row a system, so that all stand on one screen"
+    assert max(len(re.sub(r"\]\([^)]*\)", "]", row)) for row in rows) <= 160, "a row is one line"
+
+
 @pytest.mark.parametrize(
     "text",
     [

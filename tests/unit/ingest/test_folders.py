@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,17 @@ def test_frames_come_out_as_they_went_in(tmp_path: Path, layout: str) -> None:
             assert np.abs(frame.color.astype(int) - color).max() < 12  # JPEG; a swap of red and blue is > 100
             np.testing.assert_allclose(frame.world_from_camera, pose, atol=1e-6)
             np.testing.assert_allclose(frame.world_from_camera, poses[frame.index], atol=1e-8)
+
+
+def test_without_colour_one_line_says_so(tmp_path: Path) -> None:
+    log = write_posed_images(tmp_path / "log", frames(3))
+    shutil.rmtree(log / "color")
+    sequence = ingest(log, tmp_path / "out", **INTRINSICS)
+    assert sequence.outcome == "ok" and sequence.info.streams == ("depth", "pose")
+    (line,) = [note for note in sequence.info.notes if "no colour" in note]
+    assert line.startswith("WARNING") and "shape" in line
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        assert reader.read(0).color is None and reader.read(0).depth is not None
 
 
 def test_assumptions_are_recorded(tmp_path: Path) -> None:

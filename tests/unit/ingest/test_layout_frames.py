@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -71,6 +72,33 @@ def test_frames_come_out_as_they_went_in(tmp_path: Path, name: str) -> None:
     for frame, entry, (color, depth, pose) in zip(found, source.entries, recorded, strict=True):
         np.testing.assert_allclose(frame.depth / 1000, depth, atol=layout.depth_tolerance)
         assert np.abs(frame.color.astype(int) - color).max() < 12  # JPEG; a swap of red and blue is > 100
+        np.testing.assert_allclose(entry.world_from_camera, pose, atol=1e-6)
+
+
+def colourless(log: Path) -> Path:
+    """Take everything that is colour out of a log."""
+    for name in ("color", "rgb", "image"):
+        shutil.rmtree(log / name, ignore_errors=True)
+    for path in (*log.glob("*.color.jpg"), log / "rgb.txt"):
+        path.unlink(missing_ok=True)
+    return log
+
+
+@pytest.mark.parametrize(
+    "name", ["7scenes", "redwood", "posed-images", "tum", "scenenn", "scenenn, plain names", "scannet", "images"]
+)
+def test_a_log_without_colour_has_the_same_depth_and_poses(tmp_path: Path, name: str) -> None:
+    layout = LAYOUTS[name]
+    recorded = frames(3)
+    log = colourless(layout.write(tmp_path / "log", recorded, **layout.written))
+    source, found = loaded_frames(log, **layout.options)
+    assert source.format == layout.format
+    assert source.camera == CAMERA
+    assert not any(stream.role == "color" for stream in source.streams)
+    assert len(found) == 3
+    for frame, entry, (_, depth, pose) in zip(found, source.entries, recorded, strict=True):
+        assert frame.color is None
+        np.testing.assert_allclose(frame.depth / 1000, depth, atol=layout.depth_tolerance)
         np.testing.assert_allclose(entry.world_from_camera, pose, atol=1e-6)
 
 

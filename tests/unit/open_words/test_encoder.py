@@ -62,6 +62,15 @@ def test_texts_that_ask_for_nothing_are_refused(text: str, message: str) -> None
     assert checked_text("  red \n mug ") == "red mug"
 
 
+def test_words_in_other_letters_are_refused_and_foreign_ones_named(encoder: EmbeddedEncoder) -> None:
+    for text in ("красная кружка", "红色杯子"):
+        with pytest.raises(UsageError, match="English") as error:
+            encoder.texts((text, "object"))
+        assert len(str(error.value)) < 200
+    assert encoder.unread("rote Tasse") == ("rote", "tasse")
+    assert encoder.texts(("rote Tasse",)).shape == (1, encoder.width)
+
+
 def test_an_encoder_of_another_width_is_one_line(encoder: EmbeddedEncoder) -> None:
     with pytest.raises(BadInput, match="512 wide.*64 wide") as error:
         check_width(encoder, 512, "clip", "language")

@@ -68,6 +68,10 @@ def find_images(root: Path) -> FolderImages | None:
     color = next((name for name in COLOR_FOLDERS if (root / name).is_dir() and _any_image(root / name)), None)
     if color is not None:
         return _of_folders(root, color, None)
+    if not _any_image(root) and (depth := _depth_folder(root)) is not None:
+        depths = images_by_stem(root / depth, DEPTH_ENDINGS)
+        blank: tuple[None, ...] = (None,) * len(depths)
+        return FolderImages(tuple(depths), blank, tuple(depths.values()), blank, 0, {"depth": depth})
     marked = _marked(root)
     if marked is not None:
         return marked
@@ -90,9 +94,18 @@ def has_images(root: Path) -> str | None:
     if color is not None:
         depth = next((name for name in DEPTH_FOLDERS if (root / name).is_dir()), None)
         return f"{color}/ and {depth}/" if depth else f"{color}/"
+    if not _any_image(root) and (depth := _depth_folder(root)) is not None:
+        return f"{depth}/ and no colour"
     if len(files_of(root, VIDEO_SUFFIXES)) == 1 and not _any_image(root):
         return "one video file"
     return "image files" if _any_image(root) else None
+
+
+def _depth_folder(root: Path) -> str | None:
+    """Return the name of a folder of depth that holds some."""
+    return next(
+        (name for name in DEPTH_FOLDERS if (root / name).is_dir() and files_of(root / name, DEPTH_ENDINGS)), None
+    )
 
 
 def _any_image(folder: Path) -> bool:

@@ -214,7 +214,7 @@ def _loader(
             left, second = _halves(_decoded(color, "color"), eyes)
             return LoadedFrame(left, _depth() if has_depth else None, right=second)
         return LoadedFrame(
-            _picture(color, eyes.left, "color"),
+            _picture(color, eyes.left, "color") if any(images.colors) else None,
             _depth() if has_depth else None,
             right=None if eyes.right is None else _picture(right, eyes.right, "right"),
         )

@@ -1,4 +1,4 @@
-"""Folders of posed images: color|rgb|image/, depth/, pose.txt with a line `tx ty tz qx qy qz qw` an image.
+"""Folders of posed images: color|rgb|image/ (or none), depth/, pose.txt with a line `tx ty tz qx qy qz qw` an image.
 
 The poses are world_from_camera (as in slambook2's diningroom); intrinsics come from options. Folders with a
 calibration file, or with other pose lines, are the plain images of layouts/images.
@@ -21,6 +21,7 @@ from stages.ingest.folders.files import (
     first_subfolder,
     image_loader,
     images_by_stem,
+    images_of_subfolder,
     natural_key,
     stream,
     text_stream,
@@ -38,19 +39,18 @@ def matches(root: Path) -> str | None:
     """Return the rule that matched, or None."""
     color = first_subfolder(root, COLOR_FOLDERS)
     poses = next((name for name in POSES if (root / name).is_file()), None)
-    if color is None or poses is None or not (root / "depth").is_dir():
+    if poses is None or not (root / "depth").is_dir():
         return None
     if calibration_file(root) is not None or columns_of(root / poses) in (8, 12, 13, 16, 17):
         return None
-    return f"folder with {color.name}/, depth/ and {poses}: posed images"
+    return f"folder with {f'{color.name}/, ' if color else ''}depth/ and {poses}: posed images"
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
     """List the frames of a posed image folder. Raises BadInput when poses or intrinsics are not to be had."""
     color_folder = first_subfolder(root, COLOR_FOLDERS)
     pose_file = next(root / name for name in POSES if (root / name).is_file())
-    assert color_folder is not None
-    colors = images_by_stem(color_folder, COLOR_SUFFIXES)
+    colors = images_of_subfolder(color_folder, COLOR_SUFFIXES)
     depths = images_by_stem(root / "depth", DEPTH_SUFFIXES)
     rows = number_rows(pose_file, 7)
     stems = sorted(colors.keys() | depths.keys(), key=natural_key)
@@ -61,7 +61,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     entries = []
     for index, (stem, (line, numbers)) in enumerate(zip(stems, rows, strict=True)):
         pose, problem = _pose(numbers, f"{pose_file}: line {line}")
-        loader = image_loader(colors.get(stem), depths.get(stem), camera, units)
+        loader = image_loader(colors.get(stem), depths.get(stem), camera, units, has_color=bool(colors))
         entries.append(Entry(stem, index / parameters.frame_rate, pose, loader, problem))
     notes = (
         "intrinsics given by option",
@@ -70,7 +70,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         "poses assumed: tx ty tz qx qy qz qw, world_from_camera",
     )
     streams = (
-        stream(color_folder.name, "color", colors.values()),
+        *((stream(color_folder.name, "color", colors.values()),) if color_folder else ()),
         stream("depth", "depth", depths.values()),
         text_stream(pose_file.name, "pose", len(rows)),
     )

@@ -15,6 +15,7 @@ from stages.ingest.folders.files import (
     first_subfolder,
     image_loader,
     images_by_stem,
+    images_of_subfolder,
     overridden,
     read_json,
     stream,
@@ -36,38 +37,38 @@ def matches(root: Path) -> str | None:
     if not (root / "depth").is_dir() or not (root / TRAJECTORY).is_file():
         return None
     color = first_subfolder(root, COLOR_FOLDERS)
-    return f"folder with {color.name}/, depth/ and {TRAJECTORY}: Redwood/Open3D" if color else None
+    return f"folder with {f'{color.name}/, ' if color else ''}depth/ and {TRAJECTORY}: Redwood/Open3D"
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
     """List the frames of a Redwood folder. Raises BadInput for a damaged trajectory or intrinsics."""
     color_folder = first_subfolder(root, COLOR_FOLDERS)
-    assert color_folder is not None
-    colors = list(images_by_stem(color_folder, COLOR_SUFFIXES).values())
+    colors = list(images_of_subfolder(color_folder, COLOR_SUFFIXES).values())
     depths = list(images_by_stem(root / "depth", DEPTH_SUFFIXES).values())
     poses = read_open3d_log(root / TRAJECTORY)
     camera, notes = _camera(root, depth_image_size(depths))
     camera, given = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, 1000.0)
-    if len(colors) != len(depths):
+    if colors and len(colors) != len(depths):
         raise BadInput(
             f"{root}: {len(colors)} colour and {len(depths)} depth images are not pairs",
             hint="the format pairs them by order, so one missing image would shift all that follow",
         )
     if len(poses) > len(depths):
         raise BadInput(f"{root / TRAJECTORY}: {len(poses)} poses for {len(depths)} images")
+    paired: list[Path | None] = [*colors] if colors else [None] * len(depths)
     entries = tuple(
         Entry(
             name=depth.name,
             time=index / parameters.frame_rate,
             world_from_camera=poses[index] if index < len(poses) else None,
-            load=image_loader(color, depth, camera, units),
+            load=image_loader(color, depth, camera, units, has_color=bool(colors)),
         )
-        for index, (color, depth) in enumerate(zip(colors, depths, strict=True))
+        for index, (color, depth) in enumerate(zip(paired, depths, strict=True))
     )
     notes = (*notes, *given, unit_note, f"times assumed: {parameters.frame_rate:g} frames per second")
     streams = (
-        stream(color_folder.name, "color", colors),
+        *((stream(color_folder.name, "color", colors),) if color_folder else ()),
         stream("depth", "depth", depths),
         text_stream(TRAJECTORY, "pose", len(poses)),
     )

@@ -54,10 +54,11 @@ def matches(path: Path) -> str | None:
     """Return the rule that matched, or None."""
     if path.is_file():
         return "file with the ending .sens: ScanNet container" if path.suffix.lower() == ".sens" else None
-    if all((path / name).is_dir() for name in ("color", "depth", "pose")):
+    if all((path / name).is_dir() for name in ("depth", "pose")):
         intrinsics = next((name for name in (*INTRINSIC_FILES, INFO) if (path / name).is_file()), None)
         if intrinsics or (path / "intrinsic").is_dir():
-            return f"folder with color/, depth/, pose/ and {intrinsics or 'intrinsic/'}: ScanNet export"
+            seen = "color/, " if (path / "color").is_dir() else ""
+            return f"folder with {seen}depth/, pose/ and {intrinsics or 'intrinsic/'}: ScanNet export"
     if any(path.glob("*.sens")) and not (path / "depth").is_dir():
         return "folder with a .sens file: ScanNet container"
     return None
@@ -70,7 +71,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
             f"{path}: ScanNet's .sens containers are not read",
             hint="export color/, depth/, pose/ and intrinsic/ with the data set's SensReader, then give that folder",
         )
-    colors = images_by_number(path / "color", COLOR_SUFFIXES)
+    colors = images_by_number(path / "color", COLOR_SUFFIXES) if (path / "color").is_dir() else {}
     depths = images_by_number(path / "depth", DEPTH_SUFFIXES)
     poses = images_by_number(path / "pose", (".txt",))
     calibration = _calibration(path, depth_image_size(depths.values()), color_image_size(colors.values()))
@@ -79,8 +80,9 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     entries = []
     for number in sorted(colors.keys() | depths.keys()):
         pose, problem = _pose(poses.get(number))
-        load = _loader(colors.get(number), depths.get(number), calibration.color, camera, units)
-        if calibration.color != camera:
+        color_camera = calibration.color if colors else None
+        load = _loader(colors.get(number), depths.get(number), color_camera, camera, units)
+        if color_camera is not None and calibration.color != camera:
             load = registered_loader(load, camera, calibration.color, np.eye(4))
         entries.append(Entry(f"frame {number}", number / parameters.frame_rate, pose, load, problem))
     stray = len(poses.keys() - colors.keys() - depths.keys())
@@ -92,7 +94,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         *((f"{stray} poses belong to no image",) if stray else ()),
     )
     streams = (
-        stream("color", "color", colors.values()),
+        *((stream("color", "color", colors.values()),) if colors else ()),
         stream("depth", "depth", depths.values()),
         text_stream("pose", "pose", len(poses)),
     )
@@ -101,15 +103,17 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
 
 
 def _loader(
-    color: Path | None, depth: Path | None, color_camera: Camera, depth_camera: Camera, units: float
+    color: Path | None, depth: Path | None, color_camera: Camera | None, depth_camera: Camera, units: float
 ) -> Callable[[], LoadedFrame]:
+    """Return a function that reads a frame's images; without a colour camera the log has no colour."""
+
     def load() -> LoadedFrame:
-        if color is None:
+        if color is None and color_camera is not None:
             raise Unusable("missing_color")
         if depth is None:
             raise Unusable("missing_depth")
         return LoadedFrame(
-            usable_color(file_bytes(color, "color"), color_camera),
+            None if color is None or color_camera is None else usable_color(file_bytes(color, "color"), color_camera),
             usable_depth(file_bytes(depth, "depth"), depth_camera, units),
         )
 
@@ -158,7 +162,7 @@ def _calibration(root: Path, depth_size: tuple[int, int] | None, color_size: tup
         cameras[name] = resized_camera(stated, size, f"{where}: {name}")
     identity = all(np.isfinite(matrix).all() and np.allclose(matrix, np.eye(4), atol=1e-6) for matrix in extrinsics)
     notes = [f"intrinsics read from {where.relative_to(root)}"]
-    if cameras["color"] != cameras["depth"]:
+    if color_size is not None and cameras["color"] != cameras["depth"]:
         notes.append(
             f"colour {cameras['color'].width}x{cameras['color'].height} resampled into the depth camera "
             f"{cameras['depth'].width}x{cameras['depth'].height}"

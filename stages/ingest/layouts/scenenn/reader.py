@@ -45,19 +45,19 @@ LATEST_MICROSECONDS = 9 * 10**15
 def matches(root: Path) -> str | None:
     """Return the rule that matched, or None. trajectory.log alone is the Redwood layout."""
     color = first_subfolder(root, COLOR_FOLDERS)
-    if color is None or not (root / "depth").is_dir() or not (root / TRAJECTORY).is_file():
+    if not (root / "depth").is_dir() or not (root / TRAJECTORY).is_file():
         return None
     sign = next((name for name in (TIMES, *INTRINSICS) if (root / name).is_file()), None)
     if sign is None and any(root.glob("depth/depth[0-9]*.png")):
         sign = "depth/depth<number>.png"
-    return f"folder with {color.name}/, depth/, {TRAJECTORY} and {sign}: SceneNN" if sign else None
+    seen = f"{color.name}/, " if color else ""
+    return f"folder with {seen}depth/, {TRAJECTORY} and {sign}: SceneNN" if sign else None
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
     """List the frames of a SceneNN folder. Raises BadInput for damaged trajectory, times or unknown intrinsics."""
     color_folder = first_subfolder(root, COLOR_FOLDERS)
-    assert color_folder is not None
-    colors = images_by_number(color_folder, COLOR_SUFFIXES)
+    colors = images_by_number(color_folder, COLOR_SUFFIXES) if color_folder else {}
     depths = images_by_number(root / "depth", DEPTH_SUFFIXES)
     numbers = sorted(colors.keys() | depths.keys())
     first = min(1, numbers[0]) if numbers else 0
@@ -74,7 +74,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             name=f"frame {number}",
             time=times.get(number, 0) * 1e-6 if times else (number - first) / parameters.frame_rate,
             world_from_camera=poses.get(number),
-            load=image_loader(colors.get(number), depths.get(number), camera, units),
+            load=image_loader(colors.get(number), depths.get(number), camera, units, has_color=bool(colors)),
             problem="missing_time" if times and number not in times else None,
         )
         for number in numbers
@@ -90,7 +90,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     )
     stamps = {number: microseconds * 1000 for number, microseconds in times.items()}
     streams = (
-        stream(color_folder.name, "color", colors.values(), _stamps(colors, stamps)),
+        *((stream(color_folder.name, "color", colors.values(), _stamps(colors, stamps)),) if color_folder else ()),
         stream("depth", "depth", depths.values(), _stamps(depths, stamps)),
         text_stream(TRAJECTORY, "pose", len(poses)),
     )

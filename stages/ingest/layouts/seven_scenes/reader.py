@@ -50,11 +50,12 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     units, unit_note = depth_units(parameters, 1000.0)
     theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
     register = parameters.register_color and theirs
+    has_color = any("color" in images for images in files.values())
     entries = []
     for number in sorted(files):
         images = files[number]
         pose, problem = _pose(images.get("pose"))
-        load = image_loader(images.get("color"), images.get("depth"), camera, units)
+        load = image_loader(images.get("color"), images.get("depth"), camera, units, has_color=has_color)
         if register:
             load = registered_loader(load, camera, COLOR_CAMERA, COLOR_FROM_DEPTH)
         entries.append(
@@ -75,7 +76,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     )
     cameras = (SourceCamera("camera", camera, registered=register or not theirs),)
     streams = (
-        stream("*.color", "color", [images["color"] for images in files.values() if "color" in images]),
+        *((stream("*.color", "color", [i["color"] for i in files.values() if "color" in i]),) if has_color else ()),
         stream("*.depth", "depth", [images["depth"] for images in files.values() if "depth" in images]),
         stream("*.pose.txt", "pose", [images["pose"] for images in files.values() if "pose" in images]),
     )

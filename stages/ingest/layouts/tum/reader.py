@@ -68,6 +68,8 @@ def matches(root: Path) -> str | None:
         more = f" and {DEPTH_LIST}" if (root / DEPTH_LIST).is_file() else ", no depth"
         return f"folder with {COLOR_LIST}{more}: TUM RGB-D"
     pairs = next((name for name in ASSOCIATIONS if (root / name).is_file()), None)
+    if pairs is None and (root / DEPTH_LIST).is_file():
+        return f"folder with {DEPTH_LIST}, no colour: TUM RGB-D"
     return f"folder with {pairs}: TUM RGB-D" if pairs else None
 
 
@@ -83,11 +85,12 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     recorded, notes = _camera(root, size, parameters, icl_nuim)
     recorded, given = overridden_recording(recorded, parameters)
     units, unit_note = depth_units(parameters, UNITS_PER_METRE)
-    form = FrameFormat(recorded, recorded.camera, True, bool(depths.paths), units)
+    form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), units)
     tolerance = round(parameters.maximum_time_difference * 1e9)
-    partners = mutual_nearest(colors.stamps, depths.stamps, tolerance)
+    seen = colors if colors.paths else depths
+    partners = mutual_nearest(seen.stamps, depths.stamps, tolerance)
     entries = []
-    for stamp, path, partner in zip(colors.stamps, colors.paths, partners, strict=True):
+    for stamp, path, partner in zip(seen.stamps, seen.paths, partners, strict=True):
         missing = bool(depths.paths) and partner < 0
         depth = depths.paths[partner] if partner >= 0 else None
         # The shape of the scene comes from the depth image, so its time is that of the frame.
@@ -96,7 +99,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if pose is not None and icl_nuim:
             pose = MIRROR @ pose @ MIRROR
         problem = "no_depth_within_tolerance" if missing else None
-        load = frame_loader(FrameFiles(path, depth), form)
+        load = frame_loader(FrameFiles(path if colors.paths else None, depth), form)
         entries.append(Entry(str(path.relative_to(root)), moment * 1e-9, pose, load, problem))
     unpaired = len(depths.paths) - int((partners >= 0).sum())
     notes = (
@@ -107,7 +110,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         *((f"{unpaired} depth images are paired with no colour image",) if unpaired else ()),
         *(_icl_notes(parameters) if icl_nuim else ()),
     )
-    streams = [stream("rgb", "color", colors.paths, colors.stamps)]
+    streams = [stream("rgb", "color", colors.paths, colors.stamps)] if colors.paths else []
     if depths.paths:
         streams.append(stream("depth", "depth", depths.paths, depths.stamps))
     if poses:
@@ -118,10 +121,13 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
 
 def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
     """Return the colour and depth images; a list in which stamp and name alternate serves where the two are missing."""
-    if (root / COLOR_LIST).is_file():
-        depths = _read_list(root, DEPTH_LIST, unit) if (root / DEPTH_LIST).is_file() else _sorted([], [])
-        return _read_list(root, COLOR_LIST, unit), depths
-    path = next(root / name for name in ASSOCIATIONS if (root / name).is_file())
+    path = next((root / name for name in ASSOCIATIONS if (root / name).is_file()), None)
+    if path is None or (root / COLOR_LIST).is_file():
+        colors, depths = (
+            _read_list(root, name, unit) if (root / name).is_file() else _sorted([], [])
+            for name in (COLOR_LIST, DEPTH_LIST)
+        )
+        return colors, depths
     columns: tuple[tuple[list[int], list[Path]], ...] = (([], []), ([], []))
     for where, fields in _rows(path):
         if len(fields) != 4:
