@@ -109,7 +109,7 @@ def test_the_robot_sees_by_the_masks_and_by_nothing_true(address: str, monkeypat
 
 
 def test_words_of_services_become_those_of_the_robot() -> None:
-    names = ("dining table", "Couch", "mug", "apple", "teddy-bear", "object")
+    names = ("dining table", "Couch", "wine_glass", "apple", "teddy bear", "object")
     assert [word_of(name) for name in names] == ["table", "sofa", "cup", "apple", "teddy bear", "object"]
 
 

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.vocabulary import load_vocabulary
 from stages.agent.goals import FURNITURE, THINGS
 from stages.agent.world.physics.eyes import Mask
 from stages.kit.formats.frames import Frame
-from stages.kit.labels import class_of_word, plain
 from stages.kit.rendering.object_views import LEAST_PIXELS, Picture
 from stages.kit.services.segmentation_client import connect, read_info
 from stages.kit.services.segmentation_protocol import SEGMENT_PATH, SegmentRequest, encode_request, parse_reply
 
-Kind = Literal["thing", "furniture", ""]
 CAMERA = "robot"
+ALIASES = ("coco", "nyu40", "scannet", "ade20k")
+"""Other vocabularies whose names data/vocabulary.toml lists."""
 
 
 def word_of(category: str) -> str:
-    """Return what the robot calls a category of a service: by its name, else by the vocabulary's class of it; a name
-    that the robot has no word for stays as it is."""
-    name = plain(category)
-    known = (*THINGS, *FURNITURE)
-    return name if name in known or class_of_word(name) not in known else class_of_word(name)
+    """Return what the robot calls a category of a service: by its name, else by the vocabulary's class of which it is
+    an alias; a name that the robot has no word for stays as it is."""
+    name = " ".join(category.replace("_", " ").lower().split())
+    classes = (load_vocabulary().by_alias(name, source) for source in ALIASES)
+    words = (name, *(entry.name for entry in classes if entry is not None))
+    return next((word for word in words if word in THINGS or word in FURNITURE), name)
 
 
 class AskedSegmenter:
-    """The masks of the service at an address, of the colour and depth of a picture alone: it never sees what is true.
+    """The masks of the service at an address, of colour, depth and the believed pose alone: nothing true.
 
     Raises MissingDependency when no service answers, BadInput for something else that answers, or a bad reply;
     MachineFailure when it stops answering.
