@@ -17,8 +17,8 @@ from stages.kit.configuration import parameters_for, read_config
 from stages.kit.digests import external_digest
 from stages.kit.formats.frames import Frame
 from stages.kit.library_versions import library_version
+from stages.kit.services.segmentation_protocol import SegmentRequest
 from stages.kit.stage import External, Optionally
-from stages.segment.backends.service.protocol import SegmentRequest
 from stages.segment.backends.service.server import SegmentationServer, revision_of, segment_request
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.parameters import STAGE, SegmentParameters

@@ -71,6 +71,8 @@ class EpisodeFile(Model):
     failures: float
     """Factor of the rates at which executions fail, and of those of the eyes."""
     perception: float
+    segmenter: str = Field("", exclude_if=lambda identity: not identity)
+    """What the segmentation service says it is whose masks the robot saw by. Absent: an oracle with errors."""
     most_turns: int = Field(ge=1)
     end: str
     """`done`, `give_up`, `ask`; `turns`, `time`, `repeats`: a limit; `brain`: no usable answer."""

@@ -99,8 +99,10 @@ def write_episode(
     language: Callable[[], LanguageRecord | None],
     label: str,
     width: int,
+    segmenter: str = "",
 ) -> AgentEpisode:
-    """Run a trial and write it down. `language` says, when it is over, what was asked of a model."""
+    """Run a trial and write it down. `language` says, when it is over, what was asked of a model; `segmenter` is what
+    the service that was asked for masks says it is."""
     watching = Watching()
     session, world = run_trial(setting, arm, brain, one_program=one_program, watch=watching.see)
     made = score(setting.goals, impossible, session, world)
@@ -115,6 +117,7 @@ def write_episode(
         simulation=setting.world,
         failures=scales[0],
         perception=scales[1],
+        segmenter=segmenter,
         most_turns=setting.limits.turns,
         end=session.end,
         said=session.words,

@@ -5,20 +5,40 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from schemas.agent_episode import AgentEpisode, AgentEvaluation
 from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from stages.kit.language.options import LanguageParameters
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from stages.kit.services.address import SEGMENTATION, check_address
+from stages.kit.stage import NOT_SHOWN, External, Optionally, Parameters, Stage
 
 ArmName = Literal["open_loop", "bool_feedback", "thesis", "ours", "oracle"]
 RECIPE, SHAPES, ROBOT = "agent/apartment.toml", "agent/things.toml", "robots/panda.toml"
 
 
-class RunParameters(LanguageParameters):
+class EyesParameters(Parameters):
+    """Who names what the cameras of the physics world see."""
+
+    segmenter: str = Field(
+        "",
+        description="Address of a segmentation service, any backend of `segment` (`scenewright models serve`), whose "
+        "masks are all that the robot sees by in physics; empty: an oracle with errors",
+    )
+
+    @field_validator("segmenter")
+    @classmethod
+    def _names_a_service(cls, address: str) -> str:
+        try:
+            return check_address(address, form=SEGMENTATION) if address else ""
+        except ValueError as error:
+            raise PydanticCustomError(NOT_SHOWN, "{reason}", {"reason": str(error)}) from None
+
+
+class RunParameters(LanguageParameters, EyesParameters):
     """Options of `agent run`. The apartment follows from the task and --seed, or is --world."""
 
     task: str = Field("place_fruit", description="Name of a built-in task, or what you want in words (docs/AGENT.md)")
@@ -35,7 +55,7 @@ class RunParameters(LanguageParameters):
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the picture [px]")
 
 
-class ReplayParameters(Parameters):
+class ReplayParameters(EyesParameters):
     """Options of `agent replay`."""
 
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the picture [px]")
@@ -60,6 +80,13 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError("--scene and --truth go together", hint="what the robot knows, and the room it is in")
     if inputs.get("scene") is not None and inputs.get("world") is not None:
         raise UsageError("--world and --scene are two rooms", hint="give one of them")
+    if parameters.segmenter and parameters.simulation != "physics":
+        raise UsageError("--segmenter: nothing takes pictures in the fast world", hint="give --simulation physics too")
+    if parameters.segmenter and (parameters.arm == "oracle" or parameters.perception != 1.0):
+        raise UsageError(
+            "--segmenter errs as it does: --arm oracle and --perception say how a simulated one errs",
+            hint="leave one of them out",
+        )
     if parameters.brain == "rules" and (inputs.get("transcript") is not None or parameters.language != "scripted"):
         raise UsageError("--brain rules asks no language model", hint="give --brain language too")
     if parameters.brain == "language" and parameters.language == "scripted":
@@ -80,6 +107,7 @@ RUN = Stage(
     writes=AgentEpisode,
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="run_stage",
+    versions="segmenter_identity",
     data_files=lambda parameters: (RECIPE, SHAPES, ROBOT) if parameters.simulation == "physics" else (RECIPE,),
     check=check_run,
     example='scenewright agent run --task "Put all the fruit onto the plate." --seed 3 --out outputs/agent/episode',
@@ -93,6 +121,7 @@ REPLAY = Stage(
     writes=AgentEpisode,
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="replay_stage",
+    versions="segmenter_identity",
     data_files=lambda parameters: (RECIPE, SHAPES, ROBOT),
     example="scenewright agent replay --episode outputs/agent/episode --out outputs/agent/again",
 )

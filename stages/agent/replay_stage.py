@@ -11,6 +11,7 @@ from stages.agent.arms.registry import ARMS
 from stages.agent.brains.open_loop import OpenLoopBrain
 from stages.agent.episodes import RecordedBrain, write_episode
 from stages.agent.parameters import ReplayParameters
+from stages.agent.segmenter_identity import identity_of
 from stages.agent.session import Limits
 from stages.agent.tasks import TASKS
 from stages.agent.trials import Setting, goals_of
@@ -23,6 +24,12 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
     file = episode.info
     if file.arm not in ARMS or (file.task and file.task not in TASKS):
         raise BadInput(f"{episode.root}: no arm {file.arm!r}, or no task {file.task!r}", hint="run it again")
+    identity = identity_of(parameters.segmenter)
+    if identity != file.segmenter:
+        raise BadInput(
+            f"{episode.root}: seen by {file.segmenter or 'the oracle with errors'}, not by {identity or 'it'}",
+            hint="give --segmenter with the address of that service" if file.segmenter else "leave --segmenter out",
+        )
     task = TASKS.get(file.task)
     setting = Setting(
         episode.apartment,
@@ -33,6 +40,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         Limits(turns=file.most_turns),
         world=file.simulation,
         known=Apartment.read(episode.path("known.json")) if episode.path("known.json").is_file() else None,
+        segmenter=parameters.segmenter,
     )
     made = write_episode(
         context.output,
@@ -46,6 +54,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         language=lambda: file.language,
         label=file.brain,
         width=parameters.image_width,
+        segmenter=identity,
     )
     if episode.path("transcript.jsonl").is_file():
         shutil.copyfile(episode.path("transcript.jsonl"), context.output / "transcript.jsonl")

@@ -14,6 +14,7 @@ from stages.agent.brains.brain import Brain
 from stages.agent.brains.language import LanguageBrain
 from stages.agent.episodes import write_episode
 from stages.agent.parameters import RunParameters
+from stages.agent.segmenter_identity import identity_of
 from stages.agent.session import Limits
 from stages.agent.tasks import TASKS, make_apartment, make_household
 from stages.agent.trials import Setting, goals_of, rules_brain
@@ -56,6 +57,7 @@ def run(
         Limits(turns=parameters.turns),
         world=parameters.simulation,
         known=known,
+        segmenter=parameters.segmenter,
     )
     chat = _chat(parameters, transcript, context) if parameters.brain == "language" else None
     brain: Brain = LanguageBrain(words, chat) if chat is not None else rules_brain(setting, parameters.arm)
@@ -74,6 +76,7 @@ def run(
             language=lambda: chat.record if chat is not None else None,
             label=brain.label,
             width=parameters.image_width,
+            segmenter=identity_of(parameters.segmenter),
         )
 
 

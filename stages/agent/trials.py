@@ -43,6 +43,8 @@ class Setting:
     world: WorldName = "fast"
     known: Apartment | None = None
     """What was mapped of it before the robot came, as far as it is right."""
+    segmenter: str = ""
+    """Address of the segmentation service that the eyes ask in physics; empty: the oracle with errors."""
 
 
 def goals_of(words: str) -> tuple[Goal, ...]:
@@ -56,7 +58,7 @@ def goals_of(words: str) -> tuple[Goal, ...]:
 def open_world(setting: Setting, arm: str) -> World:
     """Return the world of a trial: its eyes are prompted with the classes that the goals name. Close it.
 
-    Raises UsageError for goals with doors in physics.
+    Raises UsageError for goals with doors in physics, and as AskedSegmenter does for a segmentation service.
     """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
     if setting.world == "physics":
@@ -67,7 +69,12 @@ def open_world(setting: Setting, arm: str) -> World:
             isinstance(goal, Move) and goal.start in DOORS for goal in setting.goals
         ):
             raise UsageError("doors of the physics world do not move", hint="give --simulation fast")
-        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed)
+        segmenter = None
+        if setting.segmenter:
+            from stages.agent.world.physics.asked import AskedSegmenter
+
+            segmenter = AskedSegmenter(setting.segmenter, setting.seed)
+        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed, segmenter)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 
 

@@ -13,8 +13,7 @@ from schemas.scene_parts import Camera
 from stages.kit.formats.frames import Frame
 from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.labels import LABEL_FILES, LABELS_FOLDER, read_label_file
-from stages.segment.backends.onnx.sidecar import read_sidecar
-from stages.segment.backends.service.protocol import (
+from stages.kit.services.segmentation_protocol import (
     Category,
     Reply,
     ReplySegment,
@@ -27,6 +26,7 @@ from stages.segment.backends.service.protocol import (
     parse_reply,
     parse_request,
 )
+from stages.segment.backends.onnx.sidecar import read_sidecar
 from tests.fuzz.harness import Harness, as_file
 
 CATEGORIES = {3: Category(id=3, name="chair"), 7: Category(id=7, name="wall", isthing=0)}

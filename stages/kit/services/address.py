@@ -5,6 +5,9 @@ from __future__ import annotations
 import ipaddress
 from urllib.parse import urlsplit
 
+SEGMENTATION = "http://HOST:PORT of a segmentation service"
+"""How the address of one reads, for help and errors."""
+
 
 def check_address(address: str, *, form: str) -> str:
     """Return the address without its closing slash; `form` says in errors how one reads.

@@ -28,13 +28,13 @@ from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.formats.run_lengths import decode_rle, encode_rle
 from stages.kit.progress import SilentProgress
+from stages.kit.services.segmentation_protocol import PROTOCOL
 from stages.kit.stage import Context
 from stages.segment.backends.masks.formats import npz_stacks
 from stages.segment.backends.masks.given import GivenFrame, GivenMask, Picture, ReadSettings
 from stages.segment.backends.masks.matching import match_pictures
 from stages.segment.backends.masks.overlapping import flatten
 from stages.segment.backends.service import reply_cache
-from stages.segment.backends.service.protocol import PROTOCOL
 from stages.segment.geometric import pixels_at
 from stages.segment.parameters import SegmentParameters, check
 from stages.segment.stage import run

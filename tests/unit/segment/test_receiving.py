@@ -21,8 +21,8 @@ from stages.kit.formats.frames import Frame
 from stages.kit.services import receiving
 from stages.kit.services.connection import Connection, GivenUp
 from stages.kit.services.receiving import BoundedServer
+from stages.kit.services.segmentation_protocol import LARGEST_PART, SegmentRequest, encode_request, split_multipart
 from stages.segment.backends.service import server
-from stages.segment.backends.service.protocol import LARGEST_PART, SegmentRequest, encode_request, split_multipart
 from tests.unit.segment.test_service import reference_server, serving
 
 OK = b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n"

@@ -29,9 +29,7 @@ from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.progress import SilentProgress
 from stages.kit.services.connection import Connection
-from stages.kit.stage import Context
-from stages.segment.backends.service import reply_cache
-from stages.segment.backends.service.protocol import (
+from stages.kit.services.segmentation_protocol import (
     PROTOCOL,
     Category,
     SegmentRequest,
@@ -41,6 +39,8 @@ from stages.segment.backends.service.protocol import (
     parse_request,
     split_multipart,
 )
+from stages.kit.stage import Context
+from stages.segment.backends.service import reply_cache
 from stages.segment.backends.service.server import SegmentationServer
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.parameters import STAGE, SegmentParameters

@@ -10,6 +10,7 @@ from schemas.apartment import Apartment, Furniture
 from stages.agent.body import Base, Detection, Felt, Look, Position, Sweep
 from stages.agent.world.events import Event
 from stages.agent.world.failures import Rates
+from stages.agent.world.physics.asked import AskedSegmenter
 from stages.agent.world.physics.driving import Driving
 from stages.agent.world.physics.handling import Handling
 from stages.agent.world.physics.looking import Looking
@@ -23,7 +24,8 @@ from stages.kit.rendering.segmenter_errors import SegmenterErrors
 class PhysicsBody:
     """One episode's world in pybullet. `sought`: classes that the eyes are asked for. `close` it.
 
-    What hides a thing is in the way of the camera, so that hiding is not drawn.
+    What hides a thing is in the way of the camera, so that hiding is not drawn; where the masks are a `segmenter`'s,
+    no error of the eyes is: they are its own.
     """
 
     same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.9, True
@@ -31,18 +33,28 @@ class PhysicsBody:
     """Two are had from one stop, a third is not: where it is driven to for one, all that was measured before is off by
     both stops' errors."""
 
-    def __init__(self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int) -> None:
-        rates = replace(rates, hidden=0.0)
+    def __init__(
+        self,
+        apartment: Apartment,
+        sought: tuple[str, ...],
+        rates: Rates,
+        seed: int,
+        segmenter: AskedSegmenter | None = None,
+    ) -> None:
+        rates = replace(rates, hidden=0.0) if segmenter is None else replace(rates, hidden=0.0, feedback=0.0)
         self.apartment, self._room = apartment, Room(apartment)
         self._robot = RobotInRoom(self._room, rates, seed)
-        errors = SegmenterErrors(rates, self._robot.luck, sought)
+        self._asked = segmenter
+        eyes = segmenter or NoisyOracle(self._room, SegmenterErrors(rates, self._robot.luck, sought))
         seen = Seen(self._robot, self.clearance)
         self._driving = Driving(self._robot, seen)
-        self._looking = Looking(self._robot, seen, NoisyOracle(self._room, errors), sought)
+        self._looking = Looking(self._robot, seen, eyes, sought)
         self._handling = Handling(self._robot, seen, self._looking)
 
     def close(self) -> None:
-        """End both pybullet worlds."""
+        """End both pybullet worlds, and the connection to a segmenter."""
+        if self._asked is not None:
+            self._asked.close()
         self._robot.close()
         self._room.close()
 

@@ -38,13 +38,17 @@ class Mask:
 
 
 class Segmenter(Protocol):
-    """A segmentation backend. `view` names the region of views."""
+    """A segmentation backend."""
 
     missed: set[str]
     """Things of which an oracle knows that they were in a picture and are not among its masks."""
 
-    def masks(self, picture: Picture, view: tuple[object, ...]) -> list[Mask]:
-        """Return the things of a picture."""
+    def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
+        """Return the furniture of a picture that the head took, from the pose (4, 4) where it believes to be."""
+        ...
+
+    def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
+        """Return the things of a picture. `view` names the region of views."""
         ...
 
 

@@ -47,12 +47,10 @@ class Looking:
             points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
             there = head.steady(picture.depth).reshape(-1)
             clouds.append(points[there])
-            numbers = picture.instance.reshape(-1)
-            for number in np.unique(numbers[there]):
-                name = self._robot.room.named.get(int(number), "")
-                own = there & (numbers == number) & (picture.depth.reshape(-1) < head.SURE)
-                if name in self._robot.room.furniture and own.sum() >= head.LEAST:
-                    head.enter(self._seen.pieces, self._robot.room.furniture[name].label, points[own])
+            for entry in self._segmenter.furniture(picture, map_from_true @ pose):
+                own = there & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
+                if own.sum() >= head.LEAST:
+                    head.enter(self._seen.pieces, entry.label, points[own])
             self._robot.seconds_aside += PICTURE_SECONDS
         free, occupied = head.cells_of(np.concatenate(clouds), apply(map_from_true, eye[None])[0])
         sweep = Sweep(free, occupied, tuple(self._seen.furniture()))
@@ -76,7 +74,7 @@ class Looking:
             camera = self._aimed(seen_pose, at, close)
             if not close:  # a thing fills a picture from near by
                 self._seen.keep_top(picture, camera, piece)
-            masks = self._segmenter.masks(picture, (sector, close))
+            masks = self._segmenter.masks(picture, camera, (sector, close))
             found += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{turn:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
@@ -116,12 +114,11 @@ class Looking:
         true = self._robot.true_base()
         eye = np.array([true[0], true[1], head.HEIGHT])
         tool = self._robot.driver.robot.tool_pose()[:3, 3]
-        picture = take(self._robot.room.renderer(eye), WRIST, look_at(eye, tool), self._robot.random)
+        pose = look_at(eye, tool)
+        picture = take(self._robot.room.renderer(eye), WRIST, pose, self._robot.random)
+        masks = self._segmenter.masks(picture, pose, ("hand", view))
         near = [
-            (float(np.linalg.norm(s.middle - tool)), k, s)
-            for k, s in enumerate(
-                seen_in(picture, self._segmenter.masks(picture, ("hand", view)), look_at(eye, tool), eye)
-            )
+            (float(np.linalg.norm(s.middle - tool)), k, s) for k, s in enumerate(seen_in(picture, masks, pose, eye))
         ]
         seen = min(near, default=None)
         held = seen[2] if seen is not None and seen[0] < FOUND_WITHIN else None

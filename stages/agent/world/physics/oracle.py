@@ -18,7 +18,16 @@ class NoisyOracle:
         self.missed: set[str] = set()
         """Things that were in a picture and are not among its masks."""
 
-    def masks(self, picture: Picture, view: tuple[object, ...]) -> list[Mask]:
+    def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
+        """Return the masks of furniture, without errors."""
+        names = {int(number): self._room.named.get(int(number), "") for number in np.unique(picture.instance)}
+        return [
+            Mask(self._room.furniture[name].label, picture.instance == number)
+            for number, name in names.items()
+            if name in self._room.furniture
+        ]
+
+    def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
         """Return the masks of things. `view`: ("hand", number), or (quarter turn, near)."""
         found = []
         for number in np.unique(picture.instance):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from stages.kit.labels import LABEL_TABLES
+from stages.kit.services.address import SEGMENTATION
 from stages.kit.stage import Parameters
 from stages.segment.registry import BackendDeclaration
 
@@ -29,5 +30,5 @@ BACKEND = BackendDeclaration(
     parameters=ServiceParameters,
     data_files=lambda parameters: LABEL_TABLES,
     versions="identity",
-    address="http://HOST:PORT of a segmentation service",
+    address=SEGMENTATION,
 )

@@ -6,30 +6,27 @@ import logging
 
 import numpy as np
 
-from schemas.errors import BadInput, MachineFailure, MissingDependency
+from schemas.errors import BadInput, MachineFailure
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
 from stages.kit.labels import Label, LabelSet, match_labels, read_label_file
 from stages.kit.services.connection import Connection
-from stages.segment.backends.service import ServiceParameters
-from stages.segment.backends.service.protocol import (
-    INFO_PATH,
+from stages.kit.services.segmentation_client import connect, read_info
+from stages.kit.services.segmentation_protocol import (
     SEGMENT_PATH,
     Category,
     Reply,
     SegmentRequest,
     ServiceInfo,
     encode_request,
-    parse_info,
     parse_reply,
 )
+from stages.segment.backends.service import ServiceParameters
 from stages.segment.backends.service.reply_cache import ReplyCache, prune
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.naming import NamedSegment, name_segments
 from stages.segment.panoptic import PanopticFrame, PanopticMask
-
-REFUSED_HINT = "is this a segmentation service? see docs/SEGMENTATION.md"
 
 logger = logging.getLogger("scenewright")
 
@@ -48,7 +45,7 @@ class ServiceBackend:
         sequence, self._reader = request.log()
         own, vocabulary = request.own(ServiceParameters), load_vocabulary()
         labels = read_label_file(request.labels) if request.labels else None
-        connection = connect(request.parameters.backend, own)
+        connection = connected(request.parameters.backend, own)
         self._connection, self._vocabulary = connection, vocabulary
         self._seed, self._minimum_pixels = request.seed, request.parameters.small_object_pixels
         expected = own.service_model
@@ -122,28 +119,9 @@ class ServiceBackend:
         return name_segments(ids, named, self._vocabulary, minimum_pixels=self._minimum_pixels)
 
 
-def connect(address: str, own: ServiceParameters) -> Connection:
+def connected(address: str, own: ServiceParameters) -> Connection:
     """Return a connection to the service at `address`; nothing is asked yet."""
-    return Connection(
-        address, timeout=own.request_timeout, retries=own.retries, retry_wait=own.retry_wait, refused_hint=REFUSED_HINT
-    )
-
-
-def read_info(connection: Connection) -> ServiceInfo:
-    """Return what a service says of itself. Raises MissingDependency when none answers, BadInput for something else."""
-    try:
-        answer = connection.get(INFO_PATH)
-    except MachineFailure as error:
-        raise MissingDependency(
-            f"no segmentation service answers: {error.message}",
-            hint="start one (scenewright models serve --backend ... --port ...), or check the address",
-        ) from None
-    try:
-        return parse_info(answer.body, answer.content_type)
-    except BadInput as error:
-        raise BadInput(
-            f"{connection.address}{INFO_PATH}: {error.message}", hint="is this a segmentation service?"
-        ) from None
+    return connect(address, timeout=own.request_timeout, retries=own.retries, retry_wait=own.retry_wait)
 
 
 def _is_vocabulary(categories: dict[int, Category], vocabulary: Vocabulary) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from stages.kit.services.segmentation_client import read_identity
 from stages.segment.backends.service import ServiceParameters
-from stages.segment.backends.service.backend import connect, read_info
+from stages.segment.backends.service.backend import connected
 from stages.segment.parameters import SegmentParameters
 
 LABEL = "2"
@@ -17,13 +18,5 @@ def versions(parameters: SegmentParameters) -> dict[str, str]:
     """
     assert isinstance(parameters, ServiceParameters)
     address = parameters.backend
-    model = parameters.service_model or _asked(address, parameters)
+    model = parameters.service_model or read_identity(connected(address, parameters))
     return {f"service {address}": model, "service label": LABEL}
-
-
-def _asked(address: str, own: ServiceParameters) -> str:
-    connection = connect(address, own)
-    try:
-        return read_info(connection).identity
-    finally:
-        connection.close()

@@ -16,7 +16,7 @@ from schemas.errors import ScenewrightError
 from schemas.vocabulary import load_vocabulary
 from stages.kit.digests import sha256_of_text
 from stages.kit.services.receiving import BoundedHandler, BoundedServer
-from stages.segment.backends.service.protocol import (
+from stages.kit.services.segmentation_protocol import (
     HEALTH_PATH,
     INFO_PATH,
     PROTOCOL,

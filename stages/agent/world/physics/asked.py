@@ -1,0 +1,73 @@
+"""A segmentation service as the eyes of the robot: any backend of `segment` behind HTTP (docs/SEGMENTATION.md)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.vocabulary import load_vocabulary
+from stages.agent.goals import FURNITURE, THINGS
+from stages.agent.world.physics.eyes import Mask
+from stages.kit.formats.frames import Frame
+from stages.kit.rendering.object_views import LEAST_PIXELS, Picture
+from stages.kit.services.segmentation_client import connect, read_info
+from stages.kit.services.segmentation_protocol import SEGMENT_PATH, SegmentRequest, encode_request, parse_reply
+
+CAMERA = "robot"
+ALIASES = ("coco", "nyu40", "scannet", "ade20k")
+"""Other vocabularies whose names data/vocabulary.toml lists."""
+
+
+def word_of(category: str) -> str:
+    """Return what the robot calls a category of a service: by its name, else by the vocabulary's class of which it is
+    an alias; a name that the robot has no word for stays as it is."""
+    name = " ".join(category.replace("_", " ").lower().split())
+    classes = (load_vocabulary().by_alias(name, source) for source in ALIASES)
+    words = (name, *(entry.name for entry in classes if entry is not None))
+    return next((word for word in words if word in THINGS or word in FURNITURE), name)
+
+
+class AskedSegmenter:
+    """The masks of the service at an address, of colour, depth and the believed pose alone: nothing true.
+
+    Raises MissingDependency when no service answers, BadInput for something else that answers, or a bad reply;
+    MachineFailure when it stops answering.
+    """
+
+    def __init__(self, address: str, seed: int) -> None:
+        self._connection = connect(address)
+        self.info = read_info(self._connection)
+        self.missed: set[str] = set()
+        """Nobody knows."""
+        self._seed, self._asked = seed, 0
+        self._categories = {category.id: category for category in self.info.categories}
+        self._words = {category.id: word_of(category.name) for category in self.info.categories}
+
+    def close(self) -> None:
+        """End the connection."""
+        self._connection.close()
+
+    def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
+        """Return the masks that the service names as furniture."""
+        return [entry for entry in self._ask(picture, map_from_camera) if entry.label in FURNITURE]
+
+    def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
+        """Return the masks of all other things of the service, also those without a word of the robot's."""
+        return [entry for entry in self._ask(picture, map_from_camera) if entry.label not in FURNITURE]
+
+    def _ask(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
+        frame = Frame(self._asked, 0.0, picture.color, picture.depth, None, map_from_camera, CAMERA)
+        self._asked += 1
+        body, content_type = encode_request(SegmentRequest(frame, picture.camera, self._seed), self.info.streams)
+        answer = self._connection.post(SEGMENT_PATH, body, content_type)
+        shape = (picture.depth.shape[0], picture.depth.shape[1])
+        try:
+            reply = parse_reply(answer.body, answer.content_type, shape, self._categories)
+        except BadInput as error:
+            raise BadInput(f"{self._connection.address}: reply: {error.message}", hint="mend the service") from None
+        found = [
+            Mask(self._words[segment.category_id], reply.ids == number)
+            for number, segment in sorted(reply.segments.items())
+            if segment.is_thing
+        ]
+        return [entry for entry in found if entry.mask.sum() >= LEAST_PIXELS]
