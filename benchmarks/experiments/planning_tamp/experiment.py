@@ -1,7 +1,7 @@
 """Tasks by name in generated rooms: in the exact scene, and in scenes reconstructed from images, executed in physics.
 
-Figures are `<task>/<case>/<measure>`, `all/<case>/<measure>` over all tasks, and `ours/<case>/<measure>` over those
-that are not dropped from the headline. Seconds are of CPU, one process; rooms of a case are the same for every task.
+Figures are `ours/<case>/<measure>` over all tasks and `<task>/<case>/<measure>`. Seconds are of CPU, one process; rooms
+of a case are the same for every task.
 """
 
 from __future__ import annotations
@@ -33,9 +33,6 @@ from stages.kit.tasks.task_planner import plan_task
 from stages.plan.tasks import TaskName
 
 TASKS: tuple[TaskName, ...] = get_args(TaskName)
-DROPPED = frozenset({"stack-and-carry"})
-"""Tasks that are run and have their own figures, and are not in those of `ours`: why a tray with two things fails in a
-third of the reconstructed rooms has not been found."""
 EXACT = "tamp_exact"
 LOOKS: dict[str, dict[str, object]] = {
     "tamp_reconstructed": {},
@@ -172,8 +169,7 @@ def figures(results: Sequence[RoomResult]) -> dict[str, float]:
     able = {(result.task, result.seed) for result in results if result.reason not in ("no_goal", "no_room")}
     for result in results:
         if result.reason != "no_room":
-            for pooled in ("all",) if result.task in DROPPED else ("all", "ours"):
-                arms.setdefault(f"{pooled}/{result.case}", []).append(result)
+            arms.setdefault(f"ours/{result.case}", []).append(result)
             arms.setdefault(f"{result.task}/{result.case}", []).append(result)
     for key, own in sorted(arms.items()):
         posed = [result for result in own if (result.task, result.seed) in able]
