@@ -69,6 +69,7 @@ def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: 
     MachineFailure when one of them dies, and what a frame raises there.
     """
     _, reader = request.log()
+    others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(
         workers, multiprocessing.get_context("spawn"), _open, (replace(request, reader=None), streams, os.getpid())
     )
@@ -81,6 +82,9 @@ def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: 
         while waiting:
             yield waiting.popleft().result()
     except BrokenProcessPool:
+        # The pool ends those that it knew of when one died; one that was just being started it would wait for for ever.
+        for left in set(multiprocessing.active_children()) - others:
+            left.kill()
         raise MachineFailure(
             "a process that segments frames was killed", hint="memory may be short: OMP_NUM_THREADS=1 needs one process"
         ) from None

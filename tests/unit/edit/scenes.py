@@ -31,8 +31,11 @@ def write_urdf_of(folder: Path) -> None:
     write_model_folder(folder, model, sorted(parts, key=lambda part: model.parts.index(part.name)))
 
 
-def scene_room(root: Path) -> dict[str, Path]:
-    """A table with a box on it, a fridge, and a cabinet that no model fits: library, map, graph and CAD scene."""
+def scene_room(root: Path, built_ins: bool = False) -> dict[str, Path]:
+    """A table with a box on it, a fridge, and a cabinet that no model fits: library, map, graph and CAD scene.
+
+    Without `built_ins` the cabinet keeps its mesh.
+    """
     library = write_library(
         root / "library",
         {
@@ -55,7 +58,7 @@ def scene_room(root: Path) -> dict[str, Path]:
     classes = {1: "floor", 2: "table", 3: "fridge", 4: "box", 5: "cabinet"}
     made = write_map(root / "map", seen_surface(meshes, [*EYES, (0.9, -0.6, 1.2)], noise=0.003), classes)
     graph = run_graph(made, parameters=GraphParameters(), context=context(root / "graph"))
-    run_cad(graph, made, library, parameters=CadParameters(), context=context(root / "cad"))
+    run_cad(graph, made, library, parameters=CadParameters(built_ins=built_ins), context=context(root / "cad"))
     made_of = {
         "library": ("cad_library", ()),
         "map": ("panoptic_map", ()),

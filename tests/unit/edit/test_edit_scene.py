@@ -106,6 +106,20 @@ def test_a_thing_is_moved_with_what_it_carries(room: dict[str, Path], tmp_path: 
     assert link is not None and link.plane is not None and abs(link.gap or 0.0) < 0.01
 
 
+def test_a_built_in_is_moved_as_models_are(tmp_path: Path) -> None:
+    room = scene_room(tmp_path / "room", built_ins=True)
+    before = CadScene(room["cad"]).graph.node("cabinet_5")
+    assert before.model_id == "cabinet_5_built_in"
+    scene = edited(room, tmp_path, ["move", "cabinet_5", "--shift", "0.1", "0", "0"])
+    assert statuses(scene) == ["applied"]
+    after = scene.graph.node("cabinet_5")
+    shift = np.subtract(np.array(after.world_from_model)[:3, 3], np.array(before.world_from_model)[:3, 3])
+    assert np.allclose(shift, (0.1, 0.0, 0.0), atol=2e-3)
+    out = tmp_path / "urdf"
+    assert scenewright(["urdf", "--cad-scene", str(scene.root), "--out", str(out), "--settle-seconds", "0"]) == 0
+    assert "cabinet_5" in {body.name for body in InteractiveScene(out).info.bodies}
+
+
 def test_a_heading_of_another_model_is_a_conflict(room: dict[str, Path], tmp_path: Path) -> None:
     scene = edited(
         room,
