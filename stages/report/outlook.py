@@ -134,19 +134,22 @@ def _contact_graph(facts: Facts) -> Outlook:
     if uncertain > MANY_UNCERTAIN * max(objects, 1):
         advice.append("come closer to where things touch what carries them")
     if dropped:
-        doubtful.append(f"{dropped} pieces of the map were too little or too vague to be things and are left out")
+        doubtful.append(f"pieces of the map that were too little or too vague to be things and are left out: {dropped}")
     return Outlook(tuple(sound), tuple(doubtful), tuple(missing), tuple(advice))
 
 
 def _cad_scene(facts: Facts) -> Outlook:
-    models, meshes, error = facts.count("cad"), facts.count("mesh"), facts.number("alignment_error_median")
+    models, built, meshes = (facts.count(name) for name in ("cad", "built_in", "mesh"))
+    things, error = models + built + meshes, facts.number("alignment_error_median")
     sound, doubtful, missing, advice = [], [], [], []
     if models:
         fit = f", the middle one within {1000 * error:.0f} mm of what was seen" if error else ""
-        sound.append(f"{models} of {models + meshes} things have a CAD model{fit}")
+        sound.append(f"{models} of {things} things have a CAD model{fit}")
+    if built:
+        sound.append(f"boxes that were made for {built} of {things} things, which no model fits, stand for them")
     if meshes:
-        doubtful.append(f"{meshes} of {models + meshes} things keep their scanned mesh: no doors, nothing behind them")
-    if meshes > MANY_MESHES * (models + meshes):
+        doubtful.append(f"{meshes} of {things} things keep their scanned mesh: no doors, nothing behind them")
+    if meshes > MANY_MESHES * things:
         advice.append("walk around what matters, closer; add models of your own things (scenewright library add)")
     if facts.number("surroundings_m2") >= 1:
         missing.append(f"what {facts.number('surroundings_m2'):.1f} m² of mapped surface belong to")
@@ -165,7 +168,7 @@ def _interactive_scene(facts: Facts) -> Outlook:
     if facts.outcome == "nothing_movable":
         return Outlook(doubtful=(f"acting in it: {reason}",), advice=("masks that tell things from furniture",))
     sound = () if collisions else ("nothing stands more than 5 mm in anything else",)
-    advice = "scenewright urdf settle SCENE names every body that does not stay or lies in another"
+    advice = "ask scenewright urdf settle SCENE: it names every body that does not stay or lies in another"
     return Outlook(sound, doubtful=(f"physics: {reason}",), advice=(advice,))
 
 

@@ -33,6 +33,7 @@ def test_each_fault_is_named_with_what_to_do() -> None:
         (changed("contact_graph", floor="none"), "the floor", "record the floor"),
         (changed("contact_graph", uncertain=5), "what 5 of 10 things stand on", "come closer"),
         (changed("cad_scene", cad=1, mesh=9), "9 of 10 things keep their scanned mesh", "walk around"),
+        (changed("cad_scene", cad=1, mesh=9, built_in=2), "9 of 12 things keep their scanned mesh", "walk around"),
         (changed("interactive_scene", "unsettled", reason="cup_1 moves 755 mm"), "cup_1 moves 755 mm", "urdf settle"),
         (changed("interactive_scene", "nothing_movable", reason="no body is free"), "no body is free", "masks"),
     ]
