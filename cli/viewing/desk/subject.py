@@ -1,0 +1,93 @@
+"""What can be put right of an artifact: it is held as the edits leave it, as every edit is applied to what those before
+it left, so that who clicks on a thing means it as it is now."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Generic, TypeVar
+
+from cli.edit_node_command import NO_MODEL, NOTHING
+from schemas.artifact import Artifact
+from schemas.edits import Anchor, AnyEdit, AppliedEdit, Edit
+from schemas.errors import UsageError
+from stages.edit.anchoring import Fitting
+from stages.edit.applying import State, Table, apply_edits
+from stages.edit.map_state import Thing
+from stages.edit.parameters import EditMapParameters
+from stages.kit.viewing.canvas import Canvas
+
+FITTING = Fitting(**EditMapParameters.model_validate({}).model_dump())
+"""As the steps take it unless they are told otherwise."""
+Held = TypeVar("Held", bound=State)
+
+
+class Subject(ABC, Generic[Held]):
+    """An artifact that edits are of, and what they come to."""
+
+    all_edits: ClassVar[Table[Any]]
+    option: ClassVar[str]
+    """Of the step that applies them, as it is typed."""
+
+    def __init__(self, artifact: Artifact, taken: frozenset[type[Edit]]) -> None:
+        self.artifact = artifact
+        self.table: Table[Held] = {kind: change for kind, change in self.all_edits.items() if kind not in taken}
+        self.state = self.begun()
+        self.first = {thing.name: thing.instance for thing in self.state.things()}
+        """What things were called before all edits: what is shown may call them so still."""
+
+    @abstractmethod
+    def begun(self) -> Held:
+        """Return the state before all edits."""
+
+    @abstractmethod
+    def draw(self, canvas: Canvas) -> None:
+        """Draw it as the edits leave it."""
+
+    @abstractmethod
+    def anchor_of(self, thing: Thing) -> Anchor:
+        """Return the anchor of a thing as it is now."""
+
+    def restart(self) -> None:
+        """Forget the edits."""
+        self.state = self.begun()
+
+    def apply(self, edits: Sequence[AnyEdit]) -> list[AppliedEdit]:
+        """Apply edits to what those before them left."""
+        return apply_edits(self.state, edits, FITTING, self.table)
+
+    def thing(self, name: object) -> Thing:
+        """Return the thing that is, or was called so. Raises UsageError."""
+        things = self.state.things()
+        called = next((thing.instance for thing in things if thing.name == name), self.first.get(str(name)))
+        if called is None:
+            raise UsageError(f"there is no thing {str(name)!r:.80} here", hint="click on one")
+        found = next((thing for thing in things if thing.instance == called), None)
+        if found is None:
+            raise UsageError(f"{name} is not there any more: an edit took it away", hint="delete that edit first")
+        return found
+
+    def fields(self, what: str, form: Sequence[Mapping[str, Any]], asked: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the fields of an edit out of what a page asks for, where things are named. Raises UsageError."""
+        values: dict[str, Any] = {"what": what}
+        for field in form:
+            name, kind, given = field["name"], field["kind"], asked.get(field["name"])
+            if given is None or (given in (NOTHING, NO_MODEL) and given in field.get("choices", ())):
+                continue
+            if kind == "thing" and given not in field.get("choices", ()):
+                given = self._said(self.thing(given))
+            elif kind == "things" and isinstance(given, list):
+                given = [self._said(self.thing(one)) for one in given]
+            values[name] = given
+        return values
+
+    def _said(self, thing: Thing) -> dict[str, Any]:
+        return self.anchor_of(thing).model_dump(mode="json", by_alias=True)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a page asks for edits with, as JSON: `things`, by name, and `models`."""
+        return {"things": {}, "models": []}
+
+    def command(self) -> str:
+        """Return the command that applies the edits, without their file."""
+        return f"scenewright edit {self.option} {self.artifact.root}"
