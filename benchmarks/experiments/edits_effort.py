@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean
-from benchmarks.experiments.edits.effort import Told, TrueNode, put_room_right
+from benchmarks.experiments.edits.effort import Told, TrueNode, is_layout, put_room_right
 from benchmarks.experiments.real_supports import ANNOTATIONS, LOGS
 from benchmarks.experiments.real_supports import seeds_of as seeds_of_log
 from benchmarks.generated_rooms import STEPS, make_library, make_room
@@ -23,7 +23,6 @@ from benchmarks.steps import opened, step
 from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import TREE_RELATIONS
 from schemas.sequence import Sequence as SequenceArtifact
-from schemas.vocabulary import load_vocabulary
 from stages.edit.map_state import read_state
 from stages.evaluate.point_labels import nearest_labels
 from stages.kit.geometry.boxes import upright_box
@@ -118,11 +117,6 @@ def told_by(annotation: SupportAnnotation, vertices: np.ndarray) -> Told:
         parent={relation.child: (relation.parent, relation.relation) for relation in annotation.relations},
         as_good={relation.child: (*relation.also, *relation.uncertain) for relation in annotation.relations},
     )
-
-
-def is_layout(class_name: str) -> bool:
-    """Whether things of a class are parts of the building."""
-    return load_vocabulary().by_name(class_name).node == "layout"
 
 
 MEASURES: dict[str, Measure] = {

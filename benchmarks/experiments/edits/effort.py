@@ -14,14 +14,19 @@ import numpy as np
 from benchmarks.experiments.edits.making import WIDER
 from benchmarks.steps import opened, step
 from cli.viewing.desk.desk import Desk
-from schemas.cad_scene import CadScene
+from schemas.cad_scene import SURROUNDINGS, CadScene
 from schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile
 from schemas.interactive_scene import InteractiveScene
 from schemas.scene_parts import Box
-from schemas.vocabulary import load_vocabulary
+from schemas.vocabulary import UNNAMED, load_vocabulary
 from stages.edit.anchoring import written_box
+from stages.edit.graph_edits import and_below
 from stages.edit.map_state import MapState
 from stages.kit.geometry.boxes import box_yaw, gravity_aligned_box, points_in_box
+from stages.kit.simulation.engine import engine
+from stages.kit.simulation.world import load_scene
+from stages.urdf.scene_penetration import resting_overlaps
+from stages.urdf.settle_report import COLLISION_DEPTH
 
 MENTAL, POINT_AND_CLICK, KEY = 1.35, 1.3, 0.28
 """Seconds of the keystroke-level model (Card, Moran and Newell 1980): to decide, to point and click, to type a
@@ -35,6 +40,8 @@ FEWEST = 40
 """Vertices of a part that is worth an edit."""
 ROUNDS = 4
 """How often physics is asked."""
+CLEARANCE = 0.002
+"""What is pushed out of something comes to lie so far from it [m]."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +134,9 @@ def put_map_right(editor: Editor, told: Told) -> dict[str, int]:
             main = max(counts, key=lambda k: counts[k])
             for k, count in counts.items():
                 node = told.nodes.get(k)
-                if k == main or node is None or not node.wanted or count < FEWEST:
+                if node is None or not node.wanted or count < FEWEST:
+                    continue
+                if k == main and count >= MOST * counts.total():
                     continue
                 if count >= MOST * int((told.owner == k).sum()):
                     editor.ask("split", of=thing.name, part=_around(node.box), **{"class": node.class_name})
@@ -140,7 +149,8 @@ def put_map_right(editor: Editor, told: Told) -> dict[str, int]:
             parts.setdefault(main, []).append(thing.name)
         elif counts[0] >= SPURIOUS * counts.total() and load_vocabulary().by_name(thing.class_name).movable:
             editor.ask("delete", of=thing.name)
-    found: dict[str, int] = {}
+        elif thing.class_name not in {UNNAMED, *(told.nodes[k].class_name for k in counts if k)}:
+            editor.ask("rename", of=thing.name, **{"class": UNNAMED})
     for k, node in told.nodes.items():
         names = parts.get(k, [])
         if len(names) > 1:
@@ -152,10 +162,7 @@ def put_map_right(editor: Editor, told: Told) -> dict[str, int]:
             bare = points_in_box(node.box, state.surface.vertices) & (state.instance == 0)
             surface = "seen" if bare.sum() >= FEWEST else "box"
             editor.ask("add", box=_around(node.box), surface=surface, **{"class": node.class_name})
-    for instance, counts in owners(editor.state, told).items():
-        main, most = counts.most_common(1)[0]
-        if instance and main and most >= MOST * counts.total():
-            found.setdefault(told.nodes[main].name, instance)
+    found = _named(editor.state, told)
     for thing in editor.state.things():  # what was drawn is where its box is
         for node in told.nodes.values():
             if node.name not in found and np.allclose(thing.box.center, node.box.center, atol=2 * WIDER):
@@ -196,13 +203,40 @@ def put_graph_right(editor: Editor, found: Mapping[str, int], told: Told) -> Non
 
 
 def put_scene_right(editor: Editor, scene: InteractiveScene) -> bool:
-    """Hold what physics moves, or what lies in something else; whether anything was done."""
-    settling, movable = scene.settling, {body.name for body in scene.info.bodies if body.movable}
+    """Hold what physics moves, and push out of each other what lies in each other; whether anything was done."""
+    settling = scene.settling
     assert settling is not None
     moved = [body.name for body in settling.bodies if body.leaves is not None or body.fell_through]
-    moved += [word for trouble in settling.troubles for word in trouble.split() if word in movable]
     asked = [editor.ask("mark", of=name, **{"as": "fixed"}) for name in dict.fromkeys(moved)]
+    pushed: set[str] = set()
+    for name, way in ways_out(scene):
+        node = next((node for node in editor.state.graph.nodes if node.id == name), None)
+        if node is None or node.box is None or name in pushed:
+            continue
+        pushed |= and_below(editor.state.graph, name)
+        to = (np.asarray(node.box.center) + way).tolist()
+        asked.append(editor.ask("move", of=name, to=to, carried=True))
     return any(asked)
+
+
+def ways_out(scene: InteractiveScene) -> list[tuple[str, np.ndarray]]:
+    """Return which bodies lie in others and how each gets out (3,) [m], the deepest first: the smaller one of two
+    moves, parts of the building and what nobody named do not."""
+    ways = []
+    vocabulary = load_vocabulary()
+    with load_scene(scene.root) as world:
+        for pair in resting_overlaps(world, COLLISION_DEPTH):
+            one, other = world.bodies[pair.first], world.bodies[pair.second]
+            points = engine.getClosestPoints(one.body_id, other.body_id, 0.0, physicsClientId=world.client)
+            deepest = min(points, key=lambda point: point[8])
+            out = np.asarray(deepest[7]) * (CLEARANCE - deepest[8])  # the way of `one`: the normal points to it
+            loose = [
+                (float(np.prod(np.subtract(*world.bounds(body.name)[::-1]))), body.name, way)
+                for body, way in ((one, out), (other, -out))
+                if not vocabulary.by_name(body.record.class_name).is_layout and body.name != SURROUNDINGS
+            ]
+            ways += [(name, way) for _, name, way in sorted(loose, key=lambda entry: entry[:2])[:1]]
+    return ways
 
 
 def chain(folder: Path, panoptic_map: Path, library: Path, graph: Path | None = None) -> tuple[Path, Path, Path]:
@@ -257,10 +291,21 @@ def put_room_right(folder: Path, panoptic_map: Path, library: Path, told: Told) 
 
 
 def _named(state: MapState, told: Told) -> dict[str, int]:
-    """Return true name -> the thing of the map that most of its surface is in, where that is it."""
+    """Return true name -> the thing of the map that is it; of a part of the building, the one that has most of it, as a
+    map may have all walls in one."""
     found: dict[str, int] = {}
     for instance, counts in owners(state, told).items():
         main, most = counts.most_common(1)[0]
         if instance and main and most >= MOST * counts.total():
             found.setdefault(told.nodes[main].name, instance)
+    for k, node in told.nodes.items():
+        if node.name not in found and is_layout(node.class_name):
+            held = state.instance[: len(told.owner)][told.owner == k]
+            if held.any():
+                found[node.name] = int(np.bincount(held[held > 0]).argmax())
     return found
+
+
+def is_layout(class_name: str) -> bool:
+    """Whether things of a class are parts of the building."""
+    return load_vocabulary().by_name(class_name).node == "layout"
