@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from schemas.scene_parts import Box, Relation
-from schemas.vocabulary import SemanticClass
+from schemas.vocabulary import UNNAMED, SemanticClass
 from stages.graph.beside import relations_beside
 from stages.graph.corrected_support import HIDDEN_TOP_DISTANCE, candidates_for
 from stages.graph.hanging import hanging_candidate
@@ -102,11 +102,12 @@ def fragments(entities: list[Entity]) -> dict[str, str]:
     """Return entities that can only be pieces of another one: name -> name of the whole.
 
     Furniture of one class does not interpenetrate, so a chair whose box lies within the box of a larger chair is a
-    part of it that the map failed to merge. Small things of one class do lie in each other (bowls, boxes).
+    part of it that the map failed to merge. Small things of one class do lie in each other (bowls, boxes), and what
+    nobody named need be of no one class: a coffee machine lies within the box of what stands around it.
     """
     whole_of: dict[str, str] = {}
     for piece in entities:
-        if piece.movable or piece.node_type == "layout":
+        if piece.movable or piece.node_type == "layout" or piece.class_name == UNNAMED:
             continue
         for whole in entities:
             if whole.class_name != piece.class_name or len(whole.points) <= len(piece.points):

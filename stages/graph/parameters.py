@@ -87,7 +87,7 @@ class GraphParameters(Parameters):
 
 STAGE = Stage(
     name="graph",
-    version=9,
+    version=10,
     summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},

@@ -155,7 +155,7 @@ def put_map_right(editor: Editor, told: Told) -> dict[str, int]:
         names = parts.get(k, [])
         if len(names) > 1:
             editor.ask("merge", of=names)
-        if names and node.wanted and not names[0].startswith(f"{node.class_name}_"):
+        if names and not names[0].startswith(f"{node.class_name}_"):
             editor.ask("rename", of=names[0], **{"class": node.class_name})
         if not names and node.wanted:
             state = editor.state

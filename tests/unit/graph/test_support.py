@@ -11,6 +11,7 @@ from schemas.scene_parts import SurfacePlane
 from stages.graph import thesis
 from stages.graph.corrected_support import candidates_for, hull_overlap, prefer_the_highest
 from stages.graph.nodes import Entity, Patch, is_horizontal, level_patch
+from stages.graph.ours import fragments
 from stages.graph.parameters import GraphParameters
 from stages.graph.support import Candidate, height_gap, support_score
 from stages.graph.touching import seam_share, smaller_share
@@ -220,3 +221,16 @@ def test_what_juts_out_hides_the_top_of_what_carries_it(gap, parent):
     # Furniture lacks legs instead: a desk that is seen over a bin stands on the floor.
     desk = solid("desk_3", (0.45, 0.45, low + 0.03), (0.65, 0.65, low + 0.05), class_name="desk", movable=False)
     assert candidates_for(desk, [table, post, desk], GraphParameters())[0].parent == "table_1"
+
+
+def test_furniture_within_furniture_of_its_class_is_a_piece_and_what_nobody_named_is_none():
+    def pair(class_name, movable=False):
+        whole = entity(f"{class_name}_1", box_from_bounds((0, 0, 0), (1, 1, 1)), class_name=class_name, movable=movable)
+        piece = entity(
+            f"{class_name}_2", box_from_bounds((0.1, 0.1, 0.1), (0.5, 0.5, 0.5)), class_name=class_name, movable=movable
+        )
+        return [replace(whole, points=np.zeros((9, 3))), replace(piece, points=np.zeros((4, 3)))]
+
+    assert fragments(pair("sofa")) == {"sofa_2": "sofa_1"}
+    assert fragments(pair("bowl", movable=True)) == {}
+    assert fragments(pair("object")) == {}
