@@ -3,8 +3,9 @@
 Same frames, same poses, every eighth held out. The clock starts with the first picture: those that follow arrive by
 their stamps, training goes on all the while, and a step costs the processor time that it takes (one thread). Cases
 `<scene>/<budget>` look at the held-out pictures when the clock shows the budget; `<scene>/drifting` and
-`<scene>/mended` have poses that drift as odometry does, without and with `--refine-poses`, at the last budget, where
-the held-out pictures stand where the drifting path has them, moved as the nearest learned one was.
+`<scene>/mended` have poses that drift as odometry does, without and with `--adjust-every`, at the last budget: where
+they drift, held-out pictures stand where the drifting path has them; mended, where depth and colour place them among
+the learned. Generated logs have a picture a second; they are played ROOM_RATE times as fast.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Trial, mean
 from benchmarks.experiments.mapping.drift import drifting_poses
-from benchmarks.generated_rooms import STEPS, make_room
+from benchmarks.generated_rooms import STEPS, error_seed, make_room
 from benchmarks.steps import made, opened
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence as SequenceArtifact
@@ -30,7 +31,7 @@ from stages.kit.geometry.transforms import inverse
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Parameters
 from stages.splat.build_stage import method_of, rasterizer_of
-from stages.splat.building import carried_poses
+from stages.splat.building import placed_poses
 from stages.splat.render_stage import figures_of
 from stages.splat.training import Trainer
 from stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
@@ -40,6 +41,8 @@ REAL = {"office": "hololens_office", "livingroom": "redwood_livingroom1"}
 ROOMS = ("kitchen", "office", "bedroom", "room")
 REPORTING = tuple(f"{ROOMS[k % 4]}-{1400 + k}" for k in range(20))
 """In the reporting range of the recipes."""
+ROOM_RATE = 4.0
+TUNING = ("kitchen-40", "office-41", "bedroom-40")
 GENERATED = "rooms"
 BUDGETS = {"10s": 10.0, "30s": 30.0, "1min": 60.0, "5min": 300.0, "20min": 1200.0}
 QUICK_BUDGETS, WHOLE_BUDGETS = ("10s", "30s"), ("1min", "5min", "20min")
@@ -48,7 +51,9 @@ HOLD_OUT_EVERY = 8
 GOOD = 20.0
 """PSNR at which a splat counts as made (Srinivas 2024, section 10.1) [dB]."""
 LOOK_EVERY = 3.0
-"""Between two looks at the held-out pictures until they are good [s]."""
+"""Between two looks at the held-out pictures until they are good [s] ..."""
+LOOK_SHARE = 0.1
+"""... and at least this share of the clock."""
 
 
 class LegsParameters(Parameters):
@@ -58,6 +63,8 @@ class LegsParameters(Parameters):
     frames: int = Field(120, ge=16, description="Frames of a generated room")
     views: int = Field(200, ge=16, description="Pictures of a log, at most")
     width: int = Field(320, ge=32, description="Width of the pictures [px]")
+    rooms: int = Field(3, ge=1, description="Generated rooms")
+    adjust_every: int = Field(10, ge=1, description="Pictures between two adjustments of poses, where they are mended")
 
 
 @dataclass(frozen=True)
@@ -86,7 +93,7 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The rooms, or the one log of that name, where it is there."""
     scene = case.split("/")[0]
     if scene == GENERATED:
-        return REPORTING[: 1 if bench.quick else None]
+        return TUNING if bench.tuning else REPORTING[: 1 if bench.quick else bench.parameters.rooms]
     return [scene] if (bench.parameters.data / REAL[scene]).is_dir() else []
 
 
@@ -101,7 +108,7 @@ def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView
     with FrameReader(sequence_of(bench, seed).path("frames.mcap")) as reader:
         posed = posed_frames(reader, sequence_of(bench, seed), None)
         if drifting:
-            drifted = drifting_poses(np.array([pose for _, pose in posed]), np.random.default_rng(0))
+            drifted = drifting_poses(np.array([pose for _, pose in posed]), np.random.default_rng(error_seed(seed)))
             posed = [(frame, pose) for (frame, _), pose in zip(posed, drifted, strict=True)]
         poses = dict(posed)
         frames = evenly([frame for frame, _ in posed], bench.parameters.views)
@@ -116,22 +123,26 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Spla
     numba.set_num_threads(1)
     warm_up()
     part = {trial: trial.case.split("/")[1] for trial in trials}
+    rate = ROOM_RATE if trials[0].case.split("/")[0] == GENERATED else 1.0
     poses = next((each for each in part.values() if each in POSES), "exact")
     last = BUDGETS[(QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS)[-1]]
     stops = {trial: BUDGETS.get(each, last) for trial, each in part.items()}
     learned, kept = split_views(bench, trials[0].seed, poses != "exact")
     trainer = Trainer(
-        method_of(trials[0].arm), rasterizer_of("cpu"), np.random.default_rng(0), refine_poses=poses == "mended"
+        method_of(trials[0].arm),
+        rasterizer_of("cpu"),
+        np.random.default_rng(0),
+        adjust_every=bench.parameters.adjust_every if poses == "mended" else 0,
     )
     waiting, start, clock, looked, reached = list(learned), learned[0].time, 0.0, 0.0, float("inf")
     for trial in sorted(trials, key=lambda each: stops[each]):
         while clock < stops[trial]:
             began = time.process_time()
-            while waiting and waiting[0].time - start <= clock:
-                trainer.add_view(waiting.pop(0))
+            while waiting and waiting[0].time - start <= clock * rate:
+                trainer.add_view(waiting.pop(0), last=not waiting)
             trainer.step()
             clock += time.process_time() - began
-            if reached == float("inf") and clock - looked >= LOOK_EVERY:
+            if reached == float("inf") and clock - looked >= max(LOOK_EVERY, LOOK_SHARE * clock):
                 looked = clock
                 if looks(trainer, kept)[0] >= GOOD:
                     reached = clock
@@ -155,7 +166,7 @@ def warm_up() -> None:
 
 def looks(trainer: Trainer, views: Sequence[PosedView]) -> tuple[float, float, float | None]:
     """Return mean PSNR [dB], SSIM and depth error [m] of pictures that were not learned."""
-    poses = dict(carried_poses(trainer, [(view.frame, inverse(view.camera_from_world)) for view in views]))
+    poses = dict(placed_poses(trainer, views))
     found = []
     for view in views:
         placed = replace(view, camera_from_world=inverse(poses[view.frame]))
@@ -184,6 +195,7 @@ EXPERIMENT = Experiment(
     cases=tuple(f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES)),
     default_cases=default_cases,
     seeds_of=seeds_of,
+    tuning=TUNING,
     reporting=REPORTING,
     together=together,
     measure=measure,

@@ -38,6 +38,13 @@ class BuildParameters(Parameters):
         500_000, ge=1, le=10_000_000, description="New pictures bring no further Gaussians once there are so many"
     )
     refine_poses: bool = Field(False, description="Learn the poses too, but for the first")
+    adjust_every: int = Field(
+        0,
+        ge=0,
+        le=100_000,
+        description="Poses of all pictures so far are adjusted to each other, by depth and colour, when so many more "
+        "have arrived, and after the last; 0: never",
+    )
 
 
 class RenderParameters(Parameters):
