@@ -1,9 +1,10 @@
-"""Splats of rooms, learned while pictures arrive: `ours` beside the method of LEGS (`thesis`).
+"""Splats of rooms, learned while pictures arrive: `ours` beside the methods of LEGS (`thesis`) and of LERF (`lerf`).
 
 Same frames, same poses, every eighth held out. The clock starts with the first picture: those that follow arrive by
-their stamps, training goes on all the while, and a step costs the processor time that it takes (one thread). Cases
+their stamps, training goes on all the while, and a step costs the processor time that it takes (one thread). `lerf`
+takes all pictures at once, so that it begins when the last has arrived. Cases
 `<scene>/<budget>` look at the held-out pictures when the clock shows the budget; `<scene>/drifting` and
-`<scene>/mended` have poses that drift as odometry does, without and with `--adjust-every`, at the last budget: where
+`<scene>/mended` have poses that drift as odometry does, without and with `--adjust-every`, at POSES_BUDGET: where
 they drift, held-out pictures stand where the drifting path has them; mended, where depth and colour place them among
 the learned. Generated logs have a picture a second; they are played ROOM_RATE times as fast.
 """
@@ -15,14 +16,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Protocol
 
 import numba
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Trial, mean
+from benchmarks.experiment import Bench, Experiment, Interval, Results, Trial, mean, ratio
 from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS, error_seed, make_room
+from benchmarks.splats.lerf import Lerf
 from benchmarks.steps import made, opened
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence as SequenceArtifact
@@ -47,6 +50,8 @@ GENERATED = "rooms"
 BUDGETS = {"10s": 10.0, "30s": 30.0, "1min": 60.0, "5min": 300.0, "20min": 1200.0}
 QUICK_BUDGETS, WHOLE_BUDGETS = ("10s", "30s"), ("1min", "5min", "20min")
 POSES = ("drifting", "mended")
+POSES_BUDGET = {True: "30s", False: "1min"}
+"""With `--quick` and without."""
 HOLD_OUT_EVERY = 8
 GOOD = 20.0
 """PSNR at which a splat counts as made (Srinivas 2024, section 10.1) [dB]."""
@@ -72,7 +77,7 @@ class Splatted:
     """What was measured of a splat."""
 
     psnr: float
-    ssim: float
+    ssim: float | None
     depth_error: float | None
     gaussians: int
     steps: int
@@ -125,31 +130,111 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Spla
     part = {trial: trial.case.split("/")[1] for trial in trials}
     rate = ROOM_RATE if trials[0].case.split("/")[0] == GENERATED else 1.0
     poses = next((each for each in part.values() if each in POSES), "exact")
-    last = BUDGETS[(QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS)[-1]]
-    stops = {trial: BUDGETS.get(each, last) for trial, each in part.items()}
+    stops = {trial: BUDGETS[POSES_BUDGET[bench.quick] if each in POSES else each] for trial, each in part.items()}
     learned, kept = split_views(bench, trials[0].seed, poses != "exact")
-    trainer = Trainer(
-        method_of(trials[0].arm),
-        rasterizer_of("cpu"),
-        np.random.default_rng(0),
-        adjust_every=bench.parameters.adjust_every if poses == "mended" else 0,
+    learner: Learner = (
+        Volume()
+        if trials[0].arm == "lerf"
+        else Splats(trials[0].arm, bench.parameters.adjust_every if poses == "mended" else 0)
     )
-    waiting, start, clock, looked, reached = list(learned), learned[0].time, 0.0, 0.0, float("inf")
+    waiting, start, looked, reached = list(learned), learned[0].time, 0.0, float("inf")
+    clock = 0.0 if not learner.at_once else (learned[-1].time - start) / rate
     for trial in sorted(trials, key=lambda each: stops[each]):
         while clock < stops[trial]:
             began = time.process_time()
             while waiting and waiting[0].time - start <= clock * rate:
-                trainer.add_view(waiting.pop(0), last=not waiting)
-            trainer.step()
+                learner.add(waiting.pop(0), last=not waiting)
+            learner.step()
             clock += time.process_time() - began
             if reached == float("inf") and clock - looked >= max(LOOK_EVERY, LOOK_SHARE * clock):
                 looked = clock
-                if looks(trainer, kept)[0] >= GOOD:
+                if learner.looks(kept)[0] >= GOOD:
                     reached = clock
-        psnr, ssim, depth_error = looks(trainer, kept)
+        psnr, ssim, depth_error = learner.looks(kept)
         good = reached <= stops[trial]
         seconds = reached if good else stops[trial]
-        yield trial, Splatted(psnr, ssim, depth_error, len(trainer.gaussians), trainer.steps, seconds, good)
+        yield trial, Splatted(psnr, ssim, depth_error, learner.gaussians, learner.steps, seconds, good)
+
+
+class Learner(Protocol):
+    """What learns pictures and shows others."""
+
+    at_once: bool
+    """Whether it begins when all pictures have arrived."""
+
+    @property
+    def steps(self) -> int:
+        """Taken so far."""
+
+    @property
+    def gaussians(self) -> int:
+        """Held now."""
+
+    def add(self, view: PosedView, *, last: bool) -> None:
+        """Take a picture in."""
+
+    def step(self) -> None:
+        """Learn a little."""
+
+    def looks(self, views: Sequence[PosedView]) -> tuple[float, float | None, float | None]:
+        """Return mean PSNR [dB], SSIM and depth error [m] of pictures that were not learned; None: not looked at."""
+
+
+class Splats:
+    """Gaussians, by the method of an arm."""
+
+    at_once = False
+
+    def __init__(self, arm: str, adjust_every: int) -> None:
+        self.trainer = Trainer(
+            method_of(arm), rasterizer_of("cpu"), np.random.default_rng(0), adjust_every=adjust_every
+        )
+
+    @property
+    def steps(self) -> int:
+        return self.trainer.steps
+
+    @property
+    def gaussians(self) -> int:
+        return len(self.trainer.gaussians)
+
+    def add(self, view: PosedView, *, last: bool) -> None:
+        self.trainer.add_view(view, last=last)
+
+    def step(self) -> None:
+        self.trainer.step()
+
+    def looks(self, views: Sequence[PosedView]) -> tuple[float, float | None, float | None]:
+        return looks(self.trainer, views)
+
+
+class Volume:
+    """A radiance field. All pixels of all held-out pictures would take minutes: some stand for them, without SSIM."""
+
+    at_once, gaussians = True, 0
+
+    def __init__(self) -> None:
+        self.views: list[PosedView] = []
+        self.model: Lerf | None = None
+
+    @property
+    def steps(self) -> int:
+        return 0 if self.model is None else self.model.steps
+
+    def add(self, view: PosedView, *, last: bool) -> None:
+        self.views.append(view)
+        if last:
+            self.model = Lerf(self.views, 0)
+
+    def step(self) -> None:
+        assert self.model is not None
+        self.model.step()
+
+    def looks(self, views: Sequence[PosedView]) -> tuple[float, float | None, float | None]:
+        model = self.model or Lerf(self.views, 0)
+        found = [model.looked_at(view) for view in views]
+        errors = [error for _, error in found if error is not None]
+        return float(np.mean([psnr for psnr, _ in found])), None, float(np.mean(errors)) if errors else None
 
 
 @cache
@@ -177,6 +262,23 @@ def looks(trainer: Trainer, views: Sequence[PosedView]) -> tuple[float, float, f
     return means[0], means[1], float(np.mean(errors)) if errors else None
 
 
+def regained(results: Results) -> dict[str, float | Interval | None]:
+    """How much of the PSNR that drift costs adjustment gives back, the scenes of a case together."""
+    figures: dict[str, float | Interval | None] = {}
+    exact = POSES_BUDGET[results.bench.quick]
+    for scene in (*REAL, GENERATED):
+        for arm in results.arms():
+            found = [
+                [results.get(arm, f"{scene}/{part}", seed) for part in (exact, *POSES)]
+                for seed in results.seeds(f"{scene}/{POSES[-1]}")
+            ]
+            shown = [[each.psnr for each in records if each is not None] for records in found]
+            parts = [(row[2] - row[1], row[0] - row[1]) for row in shown if len(row) == 1 + len(POSES)]
+            if parts:
+                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts)
+    return figures
+
+
 def together(trial: Trial) -> object:
     """Budgets of one scene with the same poses are one training."""
     part = trial.case.split("/")[1]
@@ -189,9 +291,10 @@ EXPERIMENT = Experiment(
     simulated="The generated rooms, their pictures and noisy depth; the drift of poses; the clock, which counts "
     "processor time of one thread beside the stamps of the log.",
     knows="Colour, depth, calibration and poses (exact, given, or drifting) of every picture that has arrived.",
-    does_not_show="Language: nothing is asked. LERF, LangSplat and entities. A GPU, on which the thesis's method makes "
-    "far more steps in the same time. Several cameras, and pictures without depth.",
-    arms={"ours": "ours", "thesis": "thesis's method"},
+    does_not_show="Language: nothing is asked. A GPU, on which the thesis's method and LERF make far more steps in the "
+    "same time. Several cameras, and pictures without depth.",
+    arms={"ours": "ours", "thesis": "thesis's method", "lerf": "LERF"},
+    runs=lambda arm, case: arm != "lerf" or case.split("/")[1] not in POSES,
     cases=tuple(f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES)),
     default_cases=default_cases,
     seeds_of=seeds_of,
@@ -209,8 +312,9 @@ EXPERIMENT = Experiment(
         "gaussians": mean("gaussians", interval=False),
         "steps": mean("steps", interval=False),
     },
-    pairs=(("ours", "thesis"),),
+    pairs=(("ours", "thesis"), ("ours", "lerf")),
     compared=("psnr", "ssim", "seconds_to_20"),
+    more_figures=regained,
     parameters=LegsParameters,
     places=frozenset({"data"}),
     quick={"frames": 60, "views": 60},

@@ -109,7 +109,7 @@ def test_lerf_learns_pictures_and_words(shown: Shown, monkeypatch: pytest.Monkey
     before = model.looked_at(seen[1])[0]
     losses = [model.step() for _ in range(40)]
     assert np.mean(losses[-10:]) < 0.5 * np.mean(losses[:5])
-    assert model.looked_at(seen[1])[0] > before + 5
+    assert model.looked_at(seen[1])[0] > before + 3
     small = scaled(CAMERA, 0.1)
     vectors, points = model.view_vectors(small, seen[1].camera_from_world, (0.3,))
     assert vectors.shape == (small.height * small.width, 1, 3) and points.shape == (len(vectors), 3)
