@@ -2,11 +2,11 @@
 
 Same frames, same poses, every eighth held out. The clock starts with the first picture: those that follow arrive by
 their stamps, training goes on all the while, and a step costs the processor time that it takes (one thread). `lerf`
-takes all pictures at once, so that it begins when the last has arrived. Cases
-`<scene>/<budget>` look at the held-out pictures when the clock shows the budget; `<scene>/drifting` and
-`<scene>/mended` have poses that drift as odometry does, without and with `--adjust-every`, at POSES_BUDGET: where
-they drift, held-out pictures stand where the drifting path has them; mended, where depth and colour place them among
-the learned. Generated logs have a picture a second; they are played ROOM_RATE times as fast.
+takes all pictures at once, so that it begins when the last has arrived. Cases `<scene>/<budget>` look at the held-out
+pictures when the clock shows the budget. `<scene>/drifting` and `<scene>/mended` have poses that drift as odometry
+does, without and with `--adjust-every --refine-poses`, at POSES_BUDGET: where they drift, held-out pictures stand where
+the drifting path has them; mended, where depth and colour place them among the learned. Generated logs have a picture a
+second; they are played ROOM_RATE times as fast.
 """
 
 from __future__ import annotations
@@ -187,7 +187,11 @@ class Splats:
 
     def __init__(self, arm: str, adjust_every: int) -> None:
         self.trainer = Trainer(
-            method_of(arm), rasterizer_of("cpu"), np.random.default_rng(0), adjust_every=adjust_every
+            method_of(arm),
+            rasterizer_of("cpu"),
+            np.random.default_rng(0),
+            refine_poses=adjust_every > 0,
+            adjust_every=adjust_every,
         )
 
     @property

@@ -24,7 +24,7 @@ WIDTH, LEVELS, FARTHEST = 160, 3, 6.0
 """Of the pictures that are aligned [px], resolutions, and the farthest depth [m]."""
 LIMITS = Limits(overlap=0.3, agreement=0.75, residual=0.03, uncertainty=0.05, brightness=0.1)
 """When an alignment is believed: those of `poses` (docs/POSES.md)."""
-PER_VIEW = 3
+PER_VIEW = 2
 """Earlier views that a view is aligned with, beside the one before it, at most."""
 PLACED_BY = 4
 """Adjusted views, the nearest in time, that a picture that was not learned is aligned with."""
@@ -32,7 +32,7 @@ GIVEN_STILL = np.array([0.01] * 3 + [0.01] * 3)
 """Standard deviation of a motion between neighbours as the log gives it [rad, m] ..."""
 GIVEN_SHARE = 0.05
 """... and what is added for its own length."""
-SWITCHES = (1e4, 1e3, 1e2, SWITCH)
+SWITCHES = (1e4, 1e2, SWITCH)
 """From believing all alignments to dropping those that contradict the others: far drift is no reason to drop one."""
 SPARSE = 200
 
