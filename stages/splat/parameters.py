@@ -143,7 +143,7 @@ LABEL = Stage(
 )
 QUERY = Stage(
     name="splat query",
-    version=2,
+    version=3,
     summary="Find what words ask for, with probabilities, or say that the room has none",
     parameters=QueryParameters,
     reads={"language": LanguageMap, "contact_graph": Optionally(ContactGraph), "weights": WEIGHTS},
