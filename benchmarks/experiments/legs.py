@@ -37,10 +37,18 @@ from stages.splat.build_stage import method_of, rasterizer_of
 from stages.splat.building import placed_poses
 from stages.splat.render_stage import figures_of
 from stages.splat.training import Trainer
+from stages.splat.triangulation import with_points
 from stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
 
-REAL = {"office": "hololens_office", "livingroom": "redwood_livingroom1"}
-"""The red kitchen was looked at while `ours` was made."""
+REAL = {
+    "office": "hololens_office",
+    "livingroom": "redwood_livingroom1",
+    "redkitchen": "7scenes_redkitchen",
+    "fox": "fox",
+}
+"""The red kitchen was looked at while `ours` was made. The fox is pictures alone."""
+WITHOUT_DEPTH = ("fox",)
+"""No adjustment there."""
 ROOMS = ("kitchen", "office", "bedroom", "room")
 REPORTING = tuple(f"{ROOMS[k % 4]}-{1400 + k}" for k in range(20))
 """In the reporting range of the recipes."""
@@ -105,7 +113,12 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
 def default_cases(bench: Bench) -> list[str]:
     """Short budgets with `--quick`."""
     budgets = QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS
-    return [f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*budgets, *POSES)]
+    return [f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*budgets, *POSES) if adjusts(scene, part)]
+
+
+def adjusts(scene: str, part: str) -> bool:
+    """Whether a case is one of budgets, or of poses that depth can mend."""
+    return part not in POSES or scene not in WITHOUT_DEPTH
 
 
 def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView], list[PosedView]]:
@@ -120,6 +133,8 @@ def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView
         read = {frame: read_view(reader, frame, poses[frame], bench.parameters.width) for frame in frames}
     kept = {frames[k] for k in held_out(len(frames), HOLD_OUT_EVERY)}
     learned = [view for frame, view in read.items() if view is not None and frame not in kept]
+    if seed in WITHOUT_DEPTH:
+        learned = with_points(learned, 0)
     return learned, [view for frame, view in read.items() if view is not None and frame in kept]
 
 
@@ -299,7 +314,9 @@ EXPERIMENT = Experiment(
     "same time. Several cameras, and pictures without depth.",
     arms={"ours": "ours", "thesis": "thesis's method", "lerf": "LERF"},
     runs=lambda arm, case: arm != "lerf" or case.split("/")[1] not in POSES,
-    cases=tuple(f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES)),
+    cases=tuple(
+        f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES) if adjusts(scene, part)
+    ),
     default_cases=default_cases,
     seeds_of=seeds_of,
     tuning=TUNING,
