@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 from scipy.spatial import cKDTree
 
+from benchmarks.experiment import Bench, Results, Trial
+from benchmarks.experiments import legs
 from benchmarks.splats import lerf
 from benchmarks.splats.langsplat import CODE, fitted, langsplat, segmented
 from benchmarks.splats.lerf import Lerf, Rays, rays_of
@@ -114,3 +118,30 @@ def test_lerf_learns_pictures_and_words(shown: Shown, monkeypatch: pytest.Monkey
     vectors, points = model.view_vectors(small, seen[1].camera_from_world, (0.3,))
     assert vectors.shape == (small.height * small.width, 1, 3) and points.shape == (len(vectors), 3)
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=2), 1.0, atol=1e-4)
+
+
+def test_what_adjustment_gives_back_is_a_share_of_what_drift_costs(tmp_path: Path) -> None:
+    def shown(psnr: float) -> legs.Splatted:
+        return legs.Splatted(psnr, 0.9, 0.05, 1000, 100, 30.0, True)
+
+    quality = {"30s": (30.0, 26.0), "drifting": (24.0, 22.0), "mended": (28.0, 25.0)}
+    records = {
+        Trial("ours", f"rooms/{part}", room): shown(psnr)
+        for part, found in quality.items()
+        for room, psnr in zip(("kitchen-1", "office-1"), found, strict=True)
+    }
+    records[Trial("ours", "rooms/mended", "room-1")] = shown(1.0)  # its others were not measured
+    bench = Bench(tmp_path, legs.LegsParameters(), quick=True)
+    (found,) = legs.regained(Results(legs.EXPERIMENT, bench, records)).items()
+    assert found[0] == "ours/rooms/mended/regained" and found[1] is not None
+    assert found[1].value == pytest.approx((4 + 3) / (6 + 4))
+
+
+def test_lerf_begins_when_all_pictures_are_there(shown: Shown) -> None:
+    learner = legs.Volume()
+    first, *rest = views(shown[1])
+    learner.add(first, last=False)
+    assert learner.at_once and learner.model is None and learner.steps == 0
+    for view in rest:
+        learner.add(view, last=view is rest[-1])
+    assert learner.model is not None and len(learner.model.views) == 3
