@@ -29,8 +29,10 @@ def named_goal(
     """Return the literals with the likeliest fitting node in place of every quoted text.
 
     Of the nodes those count that may stand there: only an item can be on something; and where a text ends in the class
-    of any of them ("desk", "white cup"), those of that class. A class alone needs no probability. Raises UsageError without
-    a language map, for a text that is none, and where no node is likely enough; BadInput for a map of other things.
+    of any of them ("desk", "white cup"), those of that class. A class alone needs no probability.
+
+    Raises UsageError without a language map, for a text that is none, and where no node is likely enough; BadInput for
+    a map of other things.
     """
     if not has_words(literals):
         return literals
