@@ -1,10 +1,12 @@
-"""Splats of rooms, learned while pictures arrive: `ours` beside the method of LEGS (`thesis`).
+"""Splats of rooms, learned while pictures arrive: `ours` beside the methods of LEGS (`thesis`) and of LERF (`lerf`).
 
 Same frames, same poses, every eighth held out. The clock starts with the first picture: those that follow arrive by
-their stamps, training goes on all the while, and a step costs the processor time that it takes (one thread). Cases
-`<scene>/<budget>` look at the held-out pictures when the clock shows the budget; `<scene>/drifting` and
-`<scene>/mended` have poses that drift as odometry does, without and with `--refine-poses`, at the last budget, where
-the held-out pictures stand where the drifting path has them, moved as the nearest learned one was.
+their stamps, training goes on all the while, and a step costs the processor time that it takes (one thread). `lerf`
+takes all pictures at once, so that it begins when the last has arrived. Cases `<scene>/<budget>` look at the held-out
+pictures when the clock shows the budget. `<scene>/drifting` and `<scene>/mended` have poses that drift as odometry
+does, without and with `--adjust-every --refine-poses`, at POSES_BUDGET: where they drift, held-out pictures stand where
+the drifting path has them; mended, where depth and colour place them among the learned. Generated logs have a picture a
+second; they are played ROOM_RATE times as fast.
 """
 
 from __future__ import annotations
@@ -14,14 +16,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Protocol
 
 import numba
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Trial, mean
+from benchmarks.experiment import Bench, Experiment, Interval, Results, Trial, mean, ratio
 from benchmarks.experiments.mapping.drift import drifting_poses
-from benchmarks.generated_rooms import STEPS, make_room
+from benchmarks.generated_rooms import STEPS, error_seed, make_room
+from benchmarks.splats.lerf import Lerf
 from benchmarks.steps import made, opened
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence as SequenceArtifact
@@ -30,25 +34,39 @@ from stages.kit.geometry.transforms import inverse
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Parameters
 from stages.splat.build_stage import method_of, rasterizer_of
-from stages.splat.building import carried_poses
+from stages.splat.building import placed_poses
 from stages.splat.render_stage import figures_of
 from stages.splat.training import Trainer
+from stages.splat.triangulation import with_points
 from stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
 
-REAL = {"office": "hololens_office", "livingroom": "redwood_livingroom1"}
-"""The red kitchen was looked at while `ours` was made."""
+REAL = {
+    "office": "hololens_office",
+    "livingroom": "redwood_livingroom1",
+    "redkitchen": "7scenes_redkitchen",
+    "fox": "fox",
+}
+"""The red kitchen was looked at while `ours` was made. The fox is pictures alone."""
+WITHOUT_DEPTH = ("fox",)
+"""No adjustment there."""
 ROOMS = ("kitchen", "office", "bedroom", "room")
 REPORTING = tuple(f"{ROOMS[k % 4]}-{1400 + k}" for k in range(20))
 """In the reporting range of the recipes."""
+ROOM_RATE = 4.0
+TUNING = ("kitchen-40", "office-41", "bedroom-40")
 GENERATED = "rooms"
 BUDGETS = {"10s": 10.0, "30s": 30.0, "1min": 60.0, "5min": 300.0, "20min": 1200.0}
 QUICK_BUDGETS, WHOLE_BUDGETS = ("10s", "30s"), ("1min", "5min", "20min")
 POSES = ("drifting", "mended")
+POSES_BUDGET = {True: "30s", False: "1min"}
+"""With `--quick` and without."""
 HOLD_OUT_EVERY = 8
 GOOD = 20.0
 """PSNR at which a splat counts as made (Srinivas 2024, section 10.1) [dB]."""
 LOOK_EVERY = 3.0
-"""Between two looks at the held-out pictures until they are good [s]."""
+"""Between two looks at the held-out pictures until they are good [s] ..."""
+LOOK_SHARE = 0.1
+"""... and at least this share of the clock."""
 
 
 class LegsParameters(Parameters):
@@ -58,6 +76,8 @@ class LegsParameters(Parameters):
     frames: int = Field(120, ge=16, description="Frames of a generated room")
     views: int = Field(200, ge=16, description="Pictures of a log, at most")
     width: int = Field(320, ge=32, description="Width of the pictures [px]")
+    rooms: int = Field(3, ge=1, description="Generated rooms")
+    adjust_every: int = Field(10, ge=1, description="Pictures between two adjustments of poses, where they are mended")
 
 
 @dataclass(frozen=True)
@@ -65,7 +85,7 @@ class Splatted:
     """What was measured of a splat."""
 
     psnr: float
-    ssim: float
+    ssim: float | None
     depth_error: float | None
     gaussians: int
     steps: int
@@ -86,14 +106,19 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The rooms, or the one log of that name, where it is there."""
     scene = case.split("/")[0]
     if scene == GENERATED:
-        return REPORTING[: 1 if bench.quick else None]
+        return TUNING if bench.tuning else REPORTING[: 1 if bench.quick else bench.parameters.rooms]
     return [scene] if (bench.parameters.data / REAL[scene]).is_dir() else []
 
 
 def default_cases(bench: Bench) -> list[str]:
     """Short budgets with `--quick`."""
     budgets = QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS
-    return [f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*budgets, *POSES)]
+    return [f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*budgets, *POSES) if adjusts(scene, part)]
+
+
+def adjusts(scene: str, part: str) -> bool:
+    """Whether a case is one of budgets, or of poses that depth can mend."""
+    return part not in POSES or scene not in WITHOUT_DEPTH
 
 
 def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView], list[PosedView]]:
@@ -101,13 +126,15 @@ def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView
     with FrameReader(sequence_of(bench, seed).path("frames.mcap")) as reader:
         posed = posed_frames(reader, sequence_of(bench, seed), None)
         if drifting:
-            drifted = drifting_poses(np.array([pose for _, pose in posed]), np.random.default_rng(0))
+            drifted = drifting_poses(np.array([pose for _, pose in posed]), np.random.default_rng(error_seed(seed)))
             posed = [(frame, pose) for (frame, _), pose in zip(posed, drifted, strict=True)]
         poses = dict(posed)
         frames = evenly([frame for frame, _ in posed], bench.parameters.views)
         read = {frame: read_view(reader, frame, poses[frame], bench.parameters.width) for frame in frames}
     kept = {frames[k] for k in held_out(len(frames), HOLD_OUT_EVERY)}
     learned = [view for frame, view in read.items() if view is not None and frame not in kept]
+    if seed in WITHOUT_DEPTH:
+        learned = with_points(learned, 0)
     return learned, [view for frame, view in read.items() if view is not None and frame in kept]
 
 
@@ -116,29 +143,117 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Spla
     numba.set_num_threads(1)
     warm_up()
     part = {trial: trial.case.split("/")[1] for trial in trials}
+    rate = ROOM_RATE if trials[0].case.split("/")[0] == GENERATED else 1.0
     poses = next((each for each in part.values() if each in POSES), "exact")
-    last = BUDGETS[(QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS)[-1]]
-    stops = {trial: BUDGETS.get(each, last) for trial, each in part.items()}
+    stops = {trial: BUDGETS[POSES_BUDGET[bench.quick] if each in POSES else each] for trial, each in part.items()}
     learned, kept = split_views(bench, trials[0].seed, poses != "exact")
-    trainer = Trainer(
-        method_of(trials[0].arm), rasterizer_of("cpu"), np.random.default_rng(0), refine_poses=poses == "mended"
+    learner: Learner = (
+        Volume()
+        if trials[0].arm == "lerf"
+        else Splats(trials[0].arm, bench.parameters.adjust_every if poses == "mended" else 0)
     )
-    waiting, start, clock, looked, reached = list(learned), learned[0].time, 0.0, 0.0, float("inf")
+    waiting, start, looked, reached = list(learned), learned[0].time, 0.0, float("inf")
+    clock = 0.0 if not learner.at_once else (learned[-1].time - start) / rate
     for trial in sorted(trials, key=lambda each: stops[each]):
         while clock < stops[trial]:
             began = time.process_time()
-            while waiting and waiting[0].time - start <= clock:
-                trainer.add_view(waiting.pop(0))
-            trainer.step()
+            while waiting and waiting[0].time - start <= clock * rate:
+                learner.add(waiting.pop(0), last=not waiting)
+            learner.step()
             clock += time.process_time() - began
-            if reached == float("inf") and clock - looked >= LOOK_EVERY:
+            if reached == float("inf") and clock - looked >= max(LOOK_EVERY, LOOK_SHARE * clock):
                 looked = clock
-                if looks(trainer, kept)[0] >= GOOD:
+                if learner.looks(kept)[0] >= GOOD:
                     reached = clock
-        psnr, ssim, depth_error = looks(trainer, kept)
+        psnr, ssim, depth_error = learner.looks(kept)
         good = reached <= stops[trial]
         seconds = reached if good else stops[trial]
-        yield trial, Splatted(psnr, ssim, depth_error, len(trainer.gaussians), trainer.steps, seconds, good)
+        yield trial, Splatted(psnr, ssim, depth_error, learner.gaussians, learner.steps, seconds, good)
+
+
+class Learner(Protocol):
+    """What learns pictures and shows others."""
+
+    at_once: bool
+    """Whether it begins when all pictures have arrived."""
+
+    @property
+    def steps(self) -> int:
+        """Taken so far."""
+
+    @property
+    def gaussians(self) -> int:
+        """Held now."""
+
+    def add(self, view: PosedView, *, last: bool) -> None:
+        """Take a picture in."""
+
+    def step(self) -> None:
+        """Learn a little."""
+
+    def looks(self, views: Sequence[PosedView]) -> tuple[float, float | None, float | None]:
+        """Return mean PSNR [dB], SSIM and depth error [m] of pictures that were not learned; None: not looked at."""
+
+
+class Splats:
+    """Gaussians, by the method of an arm."""
+
+    at_once = False
+
+    def __init__(self, arm: str, adjust_every: int) -> None:
+        self.trainer = Trainer(
+            method_of(arm),
+            rasterizer_of("cpu"),
+            np.random.default_rng(0),
+            refine_poses=adjust_every > 0,
+            adjust_every=adjust_every,
+        )
+
+    @property
+    def steps(self) -> int:
+        return self.trainer.steps
+
+    @property
+    def gaussians(self) -> int:
+        return len(self.trainer.gaussians)
+
+    def add(self, view: PosedView, *, last: bool) -> None:
+        self.trainer.add_view(view, last=last)
+
+    def step(self) -> None:
+        self.trainer.step()
+
+    def looks(self, views: Sequence[PosedView]) -> tuple[float, float | None, float | None]:
+        return looks(self.trainer, views)
+
+
+class Volume:
+    """A radiance field. All pixels of all held-out pictures would take minutes: some stand for them, without SSIM."""
+
+    at_once, gaussians = True, 0
+
+    def __init__(self) -> None:
+        self.views: list[PosedView] = []
+        self.model: Lerf | None = None
+
+    @property
+    def steps(self) -> int:
+        return 0 if self.model is None else self.model.steps
+
+    def add(self, view: PosedView, *, last: bool) -> None:
+        self.views.append(view)
+        if last:
+            self.model = Lerf(self.views, 0)
+
+    def step(self) -> None:
+        assert self.model is not None
+        self.model.step()
+
+    def looks(self, views: Sequence[PosedView]) -> tuple[float, float | None, float | None]:
+        model = self.model or Lerf(self.views, 0)
+        found = [model.looked_at(view) for view in views]
+        errors = [error for _, error in found if error is not None]
+        return float(np.mean([psnr for psnr, _ in found])), None, float(np.mean(errors)) if errors else None
 
 
 @cache
@@ -155,7 +270,7 @@ def warm_up() -> None:
 
 def looks(trainer: Trainer, views: Sequence[PosedView]) -> tuple[float, float, float | None]:
     """Return mean PSNR [dB], SSIM and depth error [m] of pictures that were not learned."""
-    poses = dict(carried_poses(trainer, [(view.frame, inverse(view.camera_from_world)) for view in views]))
+    poses = dict(placed_poses(trainer, views))
     found = []
     for view in views:
         placed = replace(view, camera_from_world=inverse(poses[view.frame]))
@@ -164,6 +279,23 @@ def looks(trainer: Trainer, views: Sequence[PosedView]) -> tuple[float, float, f
     errors = [each.depth_error for each in found if each.depth_error is not None]
     means = [float(np.mean([getattr(each, name) for each in found])) for name in ("psnr", "ssim")]
     return means[0], means[1], float(np.mean(errors)) if errors else None
+
+
+def regained(results: Results) -> dict[str, float | Interval | None]:
+    """How much of the PSNR that drift costs adjustment gives back, the scenes of a case together."""
+    figures: dict[str, float | Interval | None] = {}
+    exact = POSES_BUDGET[results.bench.quick]
+    for scene in (*REAL, GENERATED):
+        for arm in results.arms():
+            found = [
+                [results.get(arm, f"{scene}/{part}", seed) for part in (exact, *POSES)]
+                for seed in results.seeds(f"{scene}/{POSES[-1]}")
+            ]
+            shown = [[each.psnr for each in records if each is not None] for records in found]
+            parts = [(row[2] - row[1], row[0] - row[1]) for row in shown if len(row) == 1 + len(POSES)]
+            if parts:
+                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts)
+    return figures
 
 
 def together(trial: Trial) -> object:
@@ -178,12 +310,16 @@ EXPERIMENT = Experiment(
     simulated="The generated rooms, their pictures and noisy depth; the drift of poses; the clock, which counts "
     "processor time of one thread beside the stamps of the log.",
     knows="Colour, depth, calibration and poses (exact, given, or drifting) of every picture that has arrived.",
-    does_not_show="Language: nothing is asked. LERF, LangSplat and entities. A GPU, on which the thesis's method makes "
-    "far more steps in the same time. Several cameras, and pictures without depth.",
-    arms={"ours": "ours", "thesis": "thesis's method"},
-    cases=tuple(f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES)),
+    does_not_show="Language: nothing is asked. A GPU, on which the thesis's method and LERF make far more steps in the "
+    "same time. Several cameras, and pictures without depth.",
+    arms={"ours": "ours", "thesis": "thesis's method", "lerf": "LERF"},
+    runs=lambda arm, case: arm != "lerf" or case.split("/")[1] not in POSES,
+    cases=tuple(
+        f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES) if adjusts(scene, part)
+    ),
     default_cases=default_cases,
     seeds_of=seeds_of,
+    tuning=TUNING,
     reporting=REPORTING,
     together=together,
     measure=measure,
@@ -197,8 +333,9 @@ EXPERIMENT = Experiment(
         "gaussians": mean("gaussians", interval=False),
         "steps": mean("steps", interval=False),
     },
-    pairs=(("ours", "thesis"),),
+    pairs=(("ours", "thesis"), ("ours", "lerf")),
     compared=("psnr", "ssim", "seconds_to_20"),
+    more_figures=regained,
     parameters=LegsParameters,
     places=frozenset({"data"}),
     quick={"frames": 60, "views": 60},

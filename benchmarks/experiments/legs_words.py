@@ -2,7 +2,8 @@
 
 The same pictures and poses; `ours` and `thesis` ask the same field. `thesis` takes the size that fits best in the
 view in which a right thing is seen best (the user's choice there), then the Gaussian that fits best at that size, and
-always answers. `entities` asks what pictures show of every entity of a perfect map: more than our map would be.
+always answers. `langsplat` is asked the same way, of its three levels instead of sizes; `lerf` in the same view, along
+rays. `entities` asks what pictures show of every entity of a perfect map: more than our map would be.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.generated_rooms import STEPS
+from benchmarks.splats.langsplat import langsplat
+from benchmarks.splats.lerf import Lerf
 from benchmarks.words.asked import AskedRoom, Query
 from stages.kit.geometry.boxes import box_iou
 from stages.kit.geometry.cameras import scaled
@@ -26,6 +30,7 @@ from stages.kit.open_words.relevancy import margins, query_rows, relevancy
 from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Parameters
+from stages.splat.language.pyramid import pyramid
 from stages.splat.ply import read_gaussians
 
 ROOMS = ("kitchen", "office", "bedroom", "room")
@@ -34,7 +39,9 @@ TUNING = ("kitchen-40",)
 LEAST = 0.5
 """Probability from which on something is an answer: one for all rooms."""
 BOX_OVERLAP = 0.25
-SMALLER = 0.5
+SMALLER, LERF_SMALLER = 0.5, 0.2
+LERF_SIDES = (0.05, 0.5)
+"""Of its squares, over the height."""
 BINS = 10
 
 
@@ -43,6 +50,7 @@ class WordsParameters(Parameters):
 
     frames: int = Field(24, ge=8, description="Frames of a room")
     steps: int = Field(200, ge=1, description="Steps of training the field")
+    lerf_steps: int = Field(300, ge=1, description="Steps of training LERF")
     rooms: int = Field(20, ge=1, le=20, description="So many of the reporting rooms")
 
 
@@ -87,22 +95,22 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
     given = bench.parameters
     room = AskedRoom(bench.out / "rooms", trial.seed, given.frames, given.steps)
     for trial in trials:
-        yield trial, asked(room, trial.arm)
+        yield trial, asked(room, trial.arm, given.lerf_steps)
 
 
-def asked(room: AskedRoom, arm: str) -> Asked:
+def asked(room: AskedRoom, arm: str, lerf_steps: int) -> Asked:
     """Return what an arm makes of a room's queries."""
     encoder = open_encoder(EncoderParameters.model_validate({}), None)
     finder = Finder(room.entities if arm == "entities" else room.language, encoder)
-    thesis = ThesisWay(room, finder) if arm == "thesis" else None
+    always = always_answering(room, finder, arm, lerf_steps)
     present, absent = room.queries
     found: dict[str, list[Place]] = {}
     times = []
     for query in (*present, *absent):
         began = time.process_time()
-        found[query.text] = thesis.find(query) if thesis is not None else places(room, finder, query)
+        found[query.text] = always.find(query) if always is not None else places(room, finder, query)
         times.append(1e3 * (time.process_time() - began))
-    least = 0.0 if arm == "thesis" else LEAST
+    least = LEAST if always is None else 0.0
     first = [next(iter(found[query.text]), None) for query in present]
     answered = [place if place is not None and place.probability >= least else None for place in first]
     hits = [place is not None and room.at(place.point, query) for place, query in zip(answered, present, strict=True)]
@@ -127,7 +135,7 @@ def asked(room: AskedRoom, arm: str) -> Asked:
         chances=tuple(round(place.probability, 4) for place, _ in firsts if place is not None),
         hits=tuple(room.at(place.point, query) for place, query in firsts if place is not None),
         query_ms=float(np.median(times)),
-        gaussians=finder.info.gaussians,
+        gaussians=0 if arm == "lerf" else finder.info.gaussians,
     )
 
 
@@ -141,17 +149,60 @@ def places(room: AskedRoom, finder: Finder, query: Query) -> list[Place]:
     return result
 
 
-class ThesisWay:
-    """One size for all Gaussians, the best in a rendered view; the Gaussian that fits best at it."""
+class AlwaysAnswering(Protocol):
+    """A way to exactly one answer."""
 
-    def __init__(self, room: AskedRoom, finder: Finder) -> None:
+    def find(self, query: Query) -> list[Place]:
+        """Return it."""
+
+
+def always_answering(room: AskedRoom, finder: Finder, arm: str, lerf_steps: int) -> AlwaysAnswering | None:
+    """Return the way of an arm that never says that there is none."""
+    if arm == "thesis":
+        return ThesisWay(room, finder, finder.vectors.vectors)
+    if arm == "langsplat":
+        sights = [sight for _, sight in room.pictures]
+        gaussians = read_gaussians(room.splat.path("splat.ply"))
+        return ThesisWay(room, finder, langsplat(gaussians, sights, finder.encoder, CompiledRasterizer()))
+    return LerfWay(room, finder, lerf_steps) if arm == "lerf" else None
+
+
+class LerfWay:
+    """One size for a view, the best along its rays; the surface at its pixel that fits best."""
+
+    def __init__(self, room: AskedRoom, finder: Finder, steps: int) -> None:
         self.room, self.finder = room, finder
+        pyramids = [pyramid(sight.color, finder.encoder, *LERF_SIDES) for _, sight in room.pictures]
+        self.model = Lerf([view for view, _ in room.pictures], 0, pyramids, finder.encoder.width)
+        for _ in range(steps):
+            self.model.step()
+        self.shown: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def find(self, query: Query) -> list[Place]:
+        """Return its one answer."""
+        frame = self.room.best_view(query)
+        frame = next(iter(self.room.sights)) if frame is None else frame
+        if frame not in self.shown:
+            camera = scaled(self.room.truth.info.camera, LERF_SMALLER)
+            self.shown[frame] = self.model.view_vectors(camera, self.room.sights[frame][1], self.finder.info.sizes)
+        vectors, points = self.shown[frame]
+        fits = relevancy(margins(vectors, query_rows(self.finder.encoder, query.text)))
+        pixel, size = np.unravel_index(int(fits.argmax()), fits.shape)
+        return [Place(points[pixel].astype(float), float(fits[pixel, size]), False)]
+
+
+class ThesisWay:
+    """One size for all Gaussians, the best in a rendered view; the Gaussian that fits best at it. `vectors`
+    (N, sizes or levels, width)."""
+
+    def __init__(self, room: AskedRoom, finder: Finder, vectors: np.ndarray) -> None:
+        self.room, self.finder, self.vectors = room, finder, vectors
         self.gaussians = read_gaussians(room.splat.path("splat.ply"))
         self.camera = scaled(room.truth.info.camera, SMALLER)
 
     def find(self, query: Query) -> list[Place]:
         """Return its one answer."""
-        apart = margins(self.finder.vectors.vectors, query_rows(self.finder.encoder, query.text))
+        apart = margins(self.vectors, query_rows(self.finder.encoder, query.text))
         fits = relevancy(apart).astype(np.float32)
         frame = self.room.best_view(query)
         frame = next(iter(self.room.sights)) if frame is None else frame
@@ -193,10 +244,16 @@ EXPERIMENT = Experiment(
     name="legs_words",
     title="Rooms that are asked",
     simulated="The rooms, their pictures and noisy depth; the map of `entities`: the true surface that was seen.",
-    knows="Colour, depth and exact poses. `thesis` is given the view in which the thing is seen best.",
+    knows="Colour, depth and exact poses. `thesis`, `langsplat`, `lerf` are given the view that shows it best.",
     does_not_show="CLIP, SigLIP: the encoder is ours, small, trained on other generated rooms of the same makers. Real "
-    "logs. LERF and LangSplat. Words that people choose: queries are drawn from the encoder's own vocabulary.",
-    arms={"ours": "ours", "thesis": "thesis's method", "entities": "entities of a perfect map"},
+    "logs. SAM, whose segments LangSplat has. Words that people choose: they are of the encoder's own.",
+    arms={
+        "ours": "ours",
+        "thesis": "thesis's method",
+        "entities": "entities of a perfect map",
+        "langsplat": "LangSplat",
+        "lerf": "LERF",
+    },
     cases=("rooms",),
     measure=measure,
     record=Asked,
@@ -214,9 +271,9 @@ EXPERIMENT = Experiment(
     reporting=REPORTING,
     seeds_of=seeds_of,
     together=lambda trial: trial.seed,
-    pairs=(("ours", "thesis"), ("ours", "entities")),
+    pairs=(("ours", "thesis"), ("ours", "entities"), ("ours", "langsplat"), ("ours", "lerf")),
     compared=("recall_3d", "recall_2d", "precision", "absent_rejected"),
     parameters=WordsParameters,
-    quick={"rooms": 2, "steps": 100},
+    quick={"rooms": 2, "steps": 100, "lerf_steps": 30},
     steps=(*STEPS, "splat build", "splat language", "splat label"),
 )

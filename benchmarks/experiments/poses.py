@@ -35,9 +35,9 @@ from stages.kit.geometry.cameras import intrinsic_matrix
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.measurement.pose_error import align_rigidly, associate, trajectory_error
 from stages.kit.measurement.relative_pose_error import trajectory_drift
+from stages.kit.registration.alignment import judge
+from stages.kit.registration.pyramid import build_pyramid
 from stages.kit.stage import Parameters
-from stages.poses.alignment import judge
-from stages.poses.pyramid import build_pyramid
 from stages.poses.world import laid_onto
 
 RECIPES = ("room", "kitchen", "office", "bedroom")

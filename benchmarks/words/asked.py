@@ -28,6 +28,8 @@ from schemas.splat import Splat
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.boxes import points_in_box
 from stages.kit.geometry.transforms import inverse
+from stages.splat.language.looks import Sight
+from stages.splat.views import PosedView, evenly, posed_frames, read_view
 
 SIZE = (320, 240)
 QUERIES = 15
@@ -85,6 +87,20 @@ class AskedRoom:
         panoptic = perfect_map(self.truth, self.room.folder / "perfect")
         sequence = opened(Sequence, self.room.sequence)
         return unrecorded("splat label", target, {"most_views": VIEWS}, panoptic_map=panoptic, sequence=sequence)
+
+    @cached_property
+    def pictures(self) -> list[tuple[PosedView, Sight]]:
+        """Those that are read for language, twice."""
+        sequence = opened(Sequence, self.room.sequence)
+        learned = [view.frame for view in self.splat.built.views if view.use == "learned"]
+        found = []
+        with FrameReader(sequence.path("frames.mcap")) as reader:
+            poses = dict(posed_frames(reader, sequence, None))
+            for frame in evenly(learned, VIEWS):
+                read, view = reader.read(frame, ("color", "depth")), read_view(reader, frame, poses[frame], SIZE[0])
+                if view is not None and read.color is not None and read.depth is not None:
+                    found.append((view, Sight(read.color, read.depth, view.camera, view.camera_from_world)))
+        return found
 
     @cached_property
     def objects(self) -> dict[int, TrueObject]:

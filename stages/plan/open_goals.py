@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from schemas.contact_graph import ContactGraphFile
+from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.errors import BadInput, UsageError
 from schemas.language_map import LanguageMap
 from stages.kit.open_words.embedded import EmbeddedEncoder
@@ -28,8 +28,11 @@ def named_goal(
 ) -> tuple[str, ...]:
     """Return the literals with the likeliest fitting node in place of every quoted text.
 
-    Of the nodes those count that may stand there: only an item can be on something. Raises UsageError without a
-    language map, for a text that is none, and where no node is likely enough; BadInput for a map of other things.
+    Of the nodes those count that may stand there: only an item can be on something; and where a text ends in the class
+    of any of them ("desk", "white cup"), those of that class. A class alone needs no probability.
+
+    Raises UsageError without a language map, for a text that is none, and where no node is likely enough; BadInput for
+    a map of other things.
     """
     if not has_words(literals):
         return literals
@@ -41,13 +44,13 @@ def named_goal(
     encoder = EmbeddedEncoder()
     check_width(encoder, language.info.width, language.info.encoder, str(language.root))
     finder = Finder(language, encoder)
-    nodes = {node.instance: node.id for node in graph.nodes if node.instance and node.id in objects}
+    nodes = {node.instance: node for node in graph.nodes if node.instance and node.id in objects}
     if not any(region.instance in nodes for region in language.info.regions):
         raise BadInput(f"{language.root}: none of its places is in the scene", hint="label the map of this scene")
     return tuple(_named(literal, objects, nodes, finder) for literal in literals)
 
 
-def _named(literal: str, objects: Mapping[str, str], nodes: Mapping[int, str], finder: Finder) -> str:
+def _named(literal: str, objects: Mapping[str, str], nodes: Mapping[int, GraphNode], finder: Finder) -> str:
     predicate = literal.split("(")[0].strip()
     kinds = DOMAIN.predicates.get(predicate, ())
 
@@ -60,16 +63,18 @@ def _named(literal: str, objects: Mapping[str, str], nodes: Mapping[int, str], f
 
 
 def _likeliest(
-    text: str, kind: str | None, objects: Mapping[str, str], nodes: Mapping[int, str], finder: Finder
+    text: str, kind: str | None, objects: Mapping[str, str], nodes: Mapping[int, GraphNode], finder: Finder
 ) -> str:
     fits = finder.fits(text)
-    chances = [
-        (float(fits.probabilities[k]), nodes[region.instance])
-        for k, region in enumerate(finder.info.regions)
-        if region.instance in nodes and (kind is None or DOMAIN.is_a(objects[nodes[region.instance]], kind))
-    ]
-    best = max(chances, default=(0.0, "nothing"))
-    if best[0] < LEAST_PROBABILITY:
+    there = [(k, nodes[region.instance]) for k, region in enumerate(finder.info.regions) if region.instance in nodes]
+    there = [(k, node) for k, node in there if kind is None or DOMAIN.is_a(objects[node.id], kind)]
+    words = text.lower().split()
+    names = {k: node.class_name.split("_") for k, node in there}
+    longest = max((len(name) for name in names.values() if words[-len(name) :] == name), default=0)
+    if longest:
+        there = [(k, node) for k, node in there if len(names[k]) == longest and words[-longest:] == names[k]]
+    best = max(((float(fits.probabilities[k]), node.id) for k, node in there), default=(0.0, "nothing"))
+    if best[0] < LEAST_PROBABILITY and longest < len(words):
         raise UsageError(
             f"goal: the scene has no {text!r}: {best[1]} is the likeliest, with probability {best[0]:.2f}",
             hint="name the node, or say it in other words",

@@ -13,10 +13,10 @@ import numpy as np
 
 from schemas.scene_parts import Camera
 from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.registration.pose_graph import Edge, squared_errors
 from stages.poses.estimation import Estimate
 from stages.poses.features import Features, match_features
 from stages.poses.frame_poses import largest_part
-from stages.poses.pose_graph import Edge, residual
 from stages.poses.tracking import KeyFrame
 from stages.poses.world import laid_onto
 
@@ -63,9 +63,7 @@ def adjust(estimate: Estimate, camera: Camera, logger: logging.Logger) -> Estima
 
 def mean_error(edges: list[Edge], poses: np.ndarray) -> float:
     """Return the mean squared error per degree of freedom of edges under poses (N, 4, 4)."""
-    twists = [residual(edge, poses) for edge in edges]
-    squares = [float(twist @ edge.information @ twist) for twist, edge in zip(twists, edges, strict=True)]
-    return float(np.mean(squares)) / 6
+    return float(squared_errors(poses, edges).mean()) / 6
 
 
 def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[int, int]]]:

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from schemas.trajectory import LoopClosure
+from stages.kit.registration.rigid_motion import between, distance_of
 from stages.poses.estimation import Estimate
-from stages.poses.rigid_motion import between, distance_of
 
 LEAST_WAY = 0.5
 """Loops over less way than this say nothing of drift [m]."""

@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stages.kit.formats.frames import FrameReader
+from stages.kit.registration.pairs import edge_of, overlap_candidates
+from stages.kit.registration.pose_graph import Edge, Solution, laid_out, optimize, parts_of
+from stages.kit.registration.pyramid import Pyramid, build_pyramid
+from stages.kit.registration.rigid_motion import between
 from stages.kit.stage import Context
 from stages.poses.features import Features, find_features
-from stages.poses.loops import Loop, PyramidCache, Verifier, edge_of, overlap_candidates, place_candidates
+from stages.poses.loops import Loop, PyramidCache, Verifier, place_candidates
 from stages.poses.parameters import PosesParameters
 from stages.poses.places import Ferns
-from stages.poses.pose_graph import Edge, Solution, laid_out, optimize, parts_of
-from stages.poses.pyramid import Pyramid, build_pyramid
-from stages.poses.rigid_motion import between
-from stages.poses.tracking import Limits, Seen, Track, Tracker
+from stages.poses.tracking import Seen, Track, Tracker, TrackingLimits
 
 LEVELS = 3
 
@@ -64,9 +65,9 @@ class FrameSource:
         return Seen(index, pyramid, describe, lambda: self._ferns.code(depth))
 
 
-def limits_of(parameters: PosesParameters) -> Limits:
+def limits_of(parameters: PosesParameters) -> TrackingLimits:
     """Return the limits that the options state."""
-    return Limits(
+    return TrackingLimits(
         overlap=parameters.minimum_overlap,
         agreement=parameters.minimum_agreement,
         residual=parameters.maximum_residual,
@@ -127,13 +128,13 @@ def _close_loops(
         loop = verifier.by_appearance(target, later)
         if loop is not None:
             loops.append(loop)
-    seen = set(pairs)
+    seen, cameras = set(pairs), [source.camera] * len(track.keys)
     for _ in range(parameters.overlap_rounds):
         every = edges + [edge_of(loop.target, loop.source, loop.alignment, switchable=True) for loop in loops]
         solution = optimize(laid_out(poses, every), every)
         poses = solution.world_from_node
         parts = parts_of(len(poses), believed(every, solution))
-        fresh = overlap_candidates(track.keys, poses, source.camera, seen, per_key=parameters.overlap_candidates)
+        fresh = overlap_candidates(track.keys, poses, cameras, seen, per_key=parameters.overlap_candidates)
         fresh = [(target, later) for target, later in fresh if parts[target] == parts[later]]
         if not fresh:
             break

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse
-from stages.poses.alignment import Alignment
+from stages.kit.registration.alignment import Alignment
+from stages.kit.registration.pairs import with_systematic_error
+from stages.kit.registration.rigid_motion import between, fraction, orthonormal, skew
 from stages.poses.estimation import Estimate
-from stages.poses.loops import with_systematic_error
-from stages.poses.rigid_motion import between, fraction, orthonormal, skew
 
 
 @dataclass(frozen=True)

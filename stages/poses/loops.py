@@ -8,30 +8,24 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import apply, inverse
-from stages.poses.alignment import Alignment, align
+from stages.kit.registration.alignment import Alignment
+from stages.kit.registration.pairs import Limits, agreed
+from stages.kit.registration.pyramid import Pyramid
+from stages.kit.registration.rigid_motion import angle_of, between, distance_of
 from stages.poses.features import ransac_motion
 from stages.poses.places import PlaceIndex, fern_likeness
-from stages.poses.pose_graph import Edge
-from stages.poses.pyramid import Pyramid
-from stages.poses.rigid_motion import angle_of, between, distance_of
-from stages.poses.tracking import KeyFrame, Limits
+from stages.poses.tracking import KeyFrame
 
-SYSTEMATIC = np.array([0.0015] * 3 + [0.003] * 3)
-"""Errors that do not average out over pixels (lens, depth scale): standard deviations [rad] and [m]."""
 LEAST_FEATURES = 15
 """Feature matches that must agree before dense alignment is tried."""
 LEAST_WORDS = 0.02
 LEAST_FERNS = 0.55
-RETURN_DISTANCE, RETURN_ANGLE = 0.02, math.radians(1.0)
-"""Alignment there and back must end within this."""
 LARGEST_CORRECTION = (0.4, math.radians(20.0))
 """A pair that was chosen for where it should be must not move farther than this."""
 PYRAMIDS = 24
@@ -68,19 +62,6 @@ class PyramidCache:
         return self._held[key]
 
 
-def with_systematic_error(information: np.ndarray) -> np.ndarray:
-    """Return the information (6, 6) after adding the errors that more pixels do not reduce."""
-    spread = np.linalg.inv(information + 1e-3 * np.eye(6)) + np.diag(SYSTEMATIC**2)
-    result = np.linalg.inv(spread)
-    return 0.5 * (result + result.T)
-
-
-def edge_of(target: int, source: int, alignment: Alignment, *, switchable: bool) -> Edge:
-    """Return the edge of an alignment between two key frames."""
-    information = with_systematic_error(alignment.information)
-    return Edge(target, source, alignment.target_from_source, information, switchable)
-
-
 def place_candidates(
     keys: list[KeyFrame], random: np.random.Generator, *, per_key: int, least_gap: int
 ) -> list[tuple[int, int]]:
@@ -106,53 +87,6 @@ def place_candidates(
         ranked = numbers[allowed][np.argsort(-scores[allowed], kind="stable")]
         pairs += [(int(earlier), later) for earlier in ranked[:per_key]]
     return pairs
-
-
-def overlap_candidates(
-    keys: list[KeyFrame],
-    world_from_key: np.ndarray,
-    camera: Camera,
-    linked: Iterable[tuple[int, int]],
-    *,
-    per_key: int,
-    least_overlap: float = 0.35,
-) -> list[tuple[int, int]]:
-    """Return pairs (earlier, later), not yet `linked`, that should see the same surface where they stand.
-
-    `world_from_key` is (N, 4, 4). Pairs of different parts of the graph must not be asked for. For each later key
-    frame the candidates are spread: the best ones that are no neighbours of one that was taken.
-    """
-    taken = set(linked)
-    pairs = []
-    for later in range(2, len(keys)):
-        shares = []
-        for earlier in range(later - 1):
-            guess = between(world_from_key[earlier], world_from_key[later])
-            shares.append((seen_share(keys[earlier], keys[later], guess, camera), earlier))
-        chosen: list[int] = []
-        for share, earlier in sorted(shares, key=lambda entry: (-entry[0], entry[1])):
-            if share < least_overlap or len(chosen) >= per_key:
-                break
-            if any(abs(earlier - other) < 2 for other in chosen):
-                continue
-            chosen.append(earlier)
-        pairs += [(earlier, later) for earlier in chosen if (earlier, later) not in taken]
-    return pairs
-
-
-def seen_share(target: KeyFrame, source: KeyFrame, target_from_source: np.ndarray, camera: Camera) -> float:
-    """Return the share of what `source` saw that lies in the view of `target` at a depth it could see (0 to 1).
-
-    Views whose axes differ by more than 75 degrees share nothing that could be aligned.
-    """
-    if target_from_source[2, 2] < math.cos(math.radians(75)) or not len(source.sparse_points):
-        return 0.0
-    points = apply(target_from_source, source.sparse_points)
-    z = np.maximum(points[:, 2], 1e-6)
-    u = camera.fx * points[:, 0] / z + camera.cx
-    v = camera.fy * points[:, 1] / z + camera.cy
-    near = (points[:, 2] > 0.2) & (points[:, 2] < 3 * max(target.median_depth, 0.5))
-    return float((near & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)).mean())
 
 
 class Verifier:
@@ -186,13 +120,5 @@ class Verifier:
     def _verified(self, target: int, source: int, guess: np.ndarray, found_by: FoundBy) -> Loop | None:
         first, second = self._pyramids(target), self._pyramids(source)
         coarsest = None if found_by == "place" else 1
-        there = align(first, second, guess, use_color=self._use_color, coarsest=coarsest)
-        if not self._limits.good(there):
-            return None
-        back = align(second, first, inverse(there.target_from_source), use_color=self._use_color, coarsest=0)
-        if not self._limits.good(back):
-            return None
-        turn = there.target_from_source @ back.target_from_source
-        if distance_of(turn) > RETURN_DISTANCE or angle_of(turn) > RETURN_ANGLE:
-            return None
-        return Loop(target, source, there, found_by)
+        there = agreed(first, second, guess, self._limits, use_color=self._use_color, coarsest=coarsest)
+        return None if there is None else Loop(target, source, there, found_by)

@@ -16,10 +16,10 @@ import numpy as np
 from schemas.scene_parts import Camera
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.transforms import inverse
+from stages.kit.registration.rigid_motion import between, fraction
 from stages.kit.stage import Context
 from stages.poses.frame_poses import FramePose
 from stages.poses.parameters import PosesParameters
-from stages.poses.rigid_motion import between, fraction
 
 FEATURES = 1500
 """SIFT features per image, at most."""

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse
-from stages.poses.alignment import Alignment, align
+from stages.kit.registration.alignment import Alignment, align
+from stages.kit.registration.pairs import Limits
+from stages.kit.registration.pyramid import Pyramid
+from stages.kit.registration.rigid_motion import angle_of, distance_of, exponential
 from stages.poses.features import Features, ransac_motion
-from stages.poses.pyramid import Pyramid
-from stages.poses.rigid_motion import angle_of, distance_of, exponential
 
 LEAST_DEPTH_SHARE = 0.03
 """A frame with depth on fewer of its pixels cannot be tracked."""
@@ -25,31 +26,14 @@ SEARCH_ANGLES = (math.radians(8), math.radians(16))
 
 
 @dataclass(frozen=True)
-class Limits:
+class TrackingLimits(Limits):
     """When an alignment is believed, and when a new key frame is due."""
 
-    overlap: float
-    agreement: float
-    residual: float
-    """[m]."""
-    uncertainty: float
-    """[m]."""
-    brightness: float
     key_overlap: float
     key_angle: float
     """[rad]."""
     key_distance: float
     """Times the median depth of the key frame."""
-
-    def good(self, alignment: Alignment) -> bool:
-        """Whether an alignment is believed."""
-        return (
-            alignment.overlap >= self.overlap
-            and alignment.agreement >= self.agreement
-            and alignment.residual <= self.residual
-            and alignment.uncertainty <= self.uncertainty
-            and alignment.brightness_residual <= self.brightness
-        )
 
 
 @dataclass
@@ -116,7 +100,7 @@ class Seen:
 class Tracker:
     """Takes frames in order."""
 
-    def __init__(self, limits: Limits, use_color: bool, random: np.random.Generator) -> None:
+    def __init__(self, limits: TrackingLimits, use_color: bool, random: np.random.Generator) -> None:
         self.track = Track()
         self._limits, self._use_color, self._random = limits, use_color, random
         self._key: Seen | None = None

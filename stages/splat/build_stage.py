@@ -16,7 +16,7 @@ from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import write_tum
 from stages.kit.rendering.splatting.rasterizer import Rasterizer
 from stages.kit.stage import Context
-from stages.splat.building import LAST, Arrival, arrivals, carried_poses, train
+from stages.splat.building import LAST, Arrival, arrivals, carried_poses, placed_poses, train
 from stages.splat.checkpoints import read_checkpoint, write_checkpoint
 from stages.splat.methods.method import Method
 from stages.splat.parameters import BuildParameters
@@ -67,6 +67,7 @@ def run(
             rasterizer_of(context.device),
             context.random(1),
             refine_poses=parameters.refine_poses,
+            adjust_every=parameters.adjust_every,
             most=parameters.most_gaussians,
         )
         arriving = arrivals(views, parameters.steps_per_second)
@@ -86,7 +87,10 @@ def run(
             raise BadInput(f"{sequence.root}: no Gaussian is left after {trainer.steps} steps", hint="--method ours")
         times = reader.times
         names = {frame: reader.read(frame, ()).camera_name for frame, _ in posed}
+        kept = [read_view(reader, frame, poses[frame], parameters.width) for frame in uses if uses[frame] == "held_out"]
     final = carried_poses(trainer, posed)
+    aligned = dict(placed_poses(trainer, [view for view in kept if view is not None]))
+    final = [(frame, aligned.get(frame, pose)) for frame, pose in final]
     write_tum(context.output / "trajectory.tum", times[[frame for frame, _ in final]], np.array([p for _, p in final]))
     write_gaussians(context.output / "splat.ply", trainer.gaussians)
     info = SplatFile(
@@ -95,7 +99,7 @@ def run(
         harmonics_degree=int(np.sqrt(trainer.gaussians.harmonics.shape[1])) - 1,
         steps=trainer.steps,
         loss=float(np.mean(losses)) if losses else 0.0,
-        refined=parameters.refine_poses,
+        refined=trainer.moves_poses,
         cameras=cameras,
         views=_listing(posed, uses, times, names, arriving, trainer),
     )
@@ -151,7 +155,7 @@ def _listing(
 ) -> tuple[SplatView, ...]:
     arrived = {arrival.view.frame: arrival.step for arrival in arriving}
     changes = {}
-    for each in trainer.views if trainer.refine_poses else ():
+    for each in trainer.views if trainer.moves_poses else ():
         change = each.camera_from_world @ np.linalg.inv(each.view.camera_from_world)
         turned = float(np.linalg.norm(Rotation.from_matrix(change[:3, :3]).as_rotvec()))
         centers = [-pose[:3, :3].T @ pose[:3, 3] for pose in (each.camera_from_world, each.view.camera_from_world)]

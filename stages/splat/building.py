@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse
+from stages.kit.registration.rigid_motion import fraction
 from stages.splat.training import Trainer
 from stages.splat.views import PosedView
 
@@ -35,7 +36,7 @@ def train(trainer: Trainer, arriving: Sequence[Arrival], steps: int) -> Iterator
     end = (arriving[-1].step if arriving else 0) + steps
     while trainer.steps < end or waiting:
         while waiting and waiting[0].step <= trainer.steps:
-            trainer.add_view(waiting.pop(0).view)
+            trainer.add_view(waiting.pop(0).view, last=not waiting)
         if trainer.steps >= end:
             break
         yield trainer.step()
@@ -43,12 +44,34 @@ def train(trainer: Trainer, arriving: Sequence[Arrival], steps: int) -> Iterator
 
 def carried_poses(trainer: Trainer, given: Sequence[tuple[int, np.ndarray]]) -> list[tuple[int, np.ndarray]]:
     """Return (frame, world_from_camera) of the frames given with their poses, each moved in the world as the learned
-    view nearest in the sequence was moved."""
+    views before and after it in the sequence were moved, by its share of the way between them."""
     learned = sorted(trainer.views, key=lambda each: each.view.frame)
     frames = np.array([each.view.frame for each in learned])
+    changes = [inverse(each.camera_from_world) @ each.view.camera_from_world for each in learned]
     result = []
     for frame, pose in given:
-        nearest = learned[int(np.abs(frames - frame).argmin())]
-        change = inverse(nearest.camera_from_world) @ nearest.view.camera_from_world
-        result.append((frame, change @ pose))
+        after = int(np.clip(np.searchsorted(frames, frame), 1, max(len(frames) - 1, 1)))
+        before = after - 1
+        change = changes[before]
+        if len(frames) > 1:
+            share = np.clip((frame - frames[before]) / (frames[after] - frames[before]), 0.0, 1.0)
+            # The motion of the camera itself from where the change before it alone would have put it.
+            rest = inverse(change @ pose) @ changes[after] @ pose
+            result.append((frame, change @ pose @ fraction(rest, float(share))))
+        else:
+            result.append((frame, change @ pose))
     return result
+
+
+def placed_poses(trainer: Trainer, views: Sequence[PosedView]) -> list[tuple[int, np.ndarray]]:
+    """Return (frame, world_from_camera) of pictures that were not learned: where the learned ones carry them, and,
+    where poses are adjusted, aligned with these by depth and colour, never with what the Gaussians show."""
+    carried = carried_poses(trainer, [(view.frame, inverse(view.camera_from_world)) for view in views])
+    if not trainer.adjust_every:
+        return carried
+    learned = [each.view for each in trainer.views]
+    poses = np.array([inverse(each.camera_from_world) for each in trainer.views])
+    return [
+        (frame, trainer.adjustment.placed(view, guess, learned, poses))
+        for view, (frame, guess) in zip(views, carried, strict=True)
+    ]

@@ -12,6 +12,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from stages.kit.formats.numpy_files import read_all_arrays
+from stages.kit.registration.pose_graph import Edge
 from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.splat.building import Arrival
 from stages.splat.training import Learned, Trainer, TrainerState
@@ -29,6 +30,10 @@ def write_checkpoint(folder: Path, trainer: Trainer, losses: Sequence[float]) ->
     arrays["poses"] = np.array([each.camera_from_world for each in trainer.views]).reshape(-1, 4, 4)
     arrays["pose_moments"] = np.array([(each.first, each.second) for each in trainer.views]).reshape(-1, 2, 6)
     arrays["pose_steps"] = np.array([each.steps for each in trainer.views], np.int64)
+    arrays["origins"], arrays["tried"] = state.origins, np.array(state.tried, np.int64).reshape(-1, 2)
+    arrays["edge_ends"] = np.array([(e.target, e.source, e.switchable) for e in state.edges], np.int64).reshape(-1, 3)
+    arrays["edge_motions"] = np.array([edge.target_from_source for edge in state.edges]).reshape(-1, 4, 4)
+    arrays["edge_information"] = np.array([edge.information for edge in state.edges]).reshape(-1, 6, 6)
     facts = {"random": trainer.random.bit_generator.state, **{name: getattr(state, name) for name in FACTS}}
     arrays["facts"] = np.frombuffer(json.dumps(facts).encode(), np.uint8)
     folder.mkdir(exist_ok=True)
@@ -59,7 +64,15 @@ def read_checkpoint(folder: Path, trainer: Trainer, arriving: Sequence[Arrival])
             )
         ]
         trainer.random.bit_generator.state = facts["random"]
-        state = TrainerState(moments, arrays["moved"], arrays["pull"], **{name: facts[name] for name in FACTS})
+        edges = [
+            Edge(int(target), int(source), motion, information, bool(switchable))
+            for (target, source, switchable), motion, information in zip(
+                arrays["edge_ends"], arrays["edge_motions"], arrays["edge_information"], strict=True
+            )
+        ]
+        tried = [(int(target), int(source)) for target, source in arrays["tried"]]
+        before = (arrays["moved"], arrays["pull"], arrays["origins"], edges, tried)
+        state = TrainerState(moments, *before, **{name: facts[name] for name in FACTS})
         trainer.go_on(gaussians, views, state)
         return [float(loss) for loss in arrays["losses"]]
     except (BadInput, OSError, ValueError, KeyError, TypeError):

@@ -57,8 +57,8 @@ class Pull:
 
 def grown(
     gaussians: Gaussians, pull: np.ndarray, density: Density, random: np.random.Generator
-) -> tuple[Gaussians, np.ndarray]:
-    """Return the Gaussians to add, and which (N,) make way for them."""
+) -> tuple[Gaussians, np.ndarray, np.ndarray]:
+    """Return the Gaussians to add, the rows (M,) that they come from, and which (N,) make way for them."""
     wanted = pull > density.gradient
     room = max(0, density.most - len(gaussians))
     if wanted.sum() > room:
@@ -67,11 +67,12 @@ def grown(
         wanted[rows[np.argsort(-pull[rows], kind="stable")[:room]]] = True
     large = np.exp(gaussians.log_scales.max(axis=1)) > density.size
     split, doubled = wanted & large, wanted & ~large
-    parts = gaussians.taken(np.repeat(np.flatnonzero(split), SPLIT))
+    halves = np.repeat(np.flatnonzero(split), SPLIT)
+    parts = gaussians.taken(halves)
     offsets = random.standard_normal(parts.means.shape).astype(np.float32) * np.exp(parts.log_scales)
     parts.means += np.einsum("nij,nj->ni", _turns(parts.quaternions), offsets).astype(np.float32)
     parts.log_scales -= np.float32(np.log(SHRINK))
-    return parts.joined(gaussians.taken(doubled)), split
+    return parts.joined(gaussians.taken(doubled)), np.concatenate([halves, np.flatnonzero(doubled)]), split
 
 
 def useless(gaussians: Gaussians, density: Density, was_reset: bool) -> np.ndarray:

@@ -38,6 +38,13 @@ class BuildParameters(Parameters):
         500_000, ge=1, le=10_000_000, description="New pictures bring no further Gaussians once there are so many"
     )
     refine_poses: bool = Field(False, description="Learn the poses too, but for the first")
+    adjust_every: int = Field(
+        0,
+        ge=0,
+        le=100_000,
+        description="Poses of all pictures so far are adjusted to each other, by depth and colour, when so many more "
+        "have arrived, and after the last; 0: never",
+    )
 
 
 class RenderParameters(Parameters):
@@ -86,7 +93,7 @@ def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
 
 BUILD = Stage(
     name="splat build",
-    version=4,
+    version=5,
     summary="Learn a room as 3-D Gaussians from posed pictures that arrive one after another",
     parameters=BuildParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},
@@ -136,7 +143,7 @@ LABEL = Stage(
 )
 QUERY = Stage(
     name="splat query",
-    version=2,
+    version=3,
     summary="Find what words ask for, with probabilities, or say that the room has none",
     parameters=QueryParameters,
     reads={"language": LanguageMap, "contact_graph": Optionally(ContactGraph), "weights": WEIGHTS},

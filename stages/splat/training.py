@@ -8,8 +8,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from stages.kit.geometry.transforms import inverse
+from stages.kit.registration.pose_graph import Edge
+from stages.kit.registration.rigid_motion import inverses
 from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import Drawn, Rasterizer, View
+from stages.splat.adjustment import Adjustment
 from stages.splat.density import Pull, grown, useless
 from stages.splat.losses import loss_of
 from stages.splat.methods.method import Method
@@ -28,6 +32,11 @@ class TrainerState:
     """(N,) how often each Gaussian was moved."""
     pull: np.ndarray
     """(2, N) sums and counts."""
+    origins: np.ndarray
+    """(N,) the view that set each Gaussian."""
+    edges: list[Edge]
+    tried: list[tuple[int, int]]
+    """Of the adjustment."""
     steps: int
     rounds: int
     was_reset: bool
@@ -47,8 +56,9 @@ class Learned:
 class Trainer:
     """Holds the Gaussians and the views; `step` makes them agree a little better.
 
-    `refine_poses`: poses are learned too, but for that of the first view, which holds the world still. `most`: pictures
-    bring no further Gaussians once there are so many.
+    `refine_poses`: poses are learned too, but for that of the first view, which holds the world still. `adjust_every`:
+    the poses of all views are adjusted together whenever so many have arrived; 0: never. `most`: pictures bring no
+    further Gaussians once there are so many.
     """
 
     def __init__(
@@ -58,20 +68,38 @@ class Trainer:
         random: np.random.Generator,
         *,
         refine_poses: bool = False,
+        adjust_every: int = 0,
         most: int = 10**7,
     ) -> None:
         self.method, self.rasterizer, self.random = method, rasterizer, random
-        self.refine_poses, self.most = refine_poses, most
+        self.refine_poses, self.adjust_every, self.most = refine_poses, adjust_every, most
+        self.adjustment = Adjustment()
         self.gaussians = no_gaussians()
         self.views: list[Learned] = []
         self.steps = 0
         self._adam, self._pull = RowAdam(), Pull(0)
         self._rounds, self._was_reset = 0, False
+        self._origins = np.zeros(0, np.int64)
+
+    @property
+    def moves_poses(self) -> bool:
+        """Whether views do not stay where they were given."""
+        return self.refine_poses or self.adjust_every > 0
 
     def state(self) -> TrainerState:
         """Return what a checkpoint holds of it."""
         pull = np.stack([self._pull.sums, self._pull.seen])
-        return TrainerState(self._adam.moments, self._adam.steps, pull, self.steps, self._rounds, self._was_reset)
+        return TrainerState(
+            self._adam.moments,
+            self._adam.steps,
+            pull,
+            self._origins,
+            self.adjustment.edges,
+            sorted(self.adjustment.tried),
+            self.steps,
+            self._rounds,
+            self._was_reset,
+        )
 
     def go_on(self, gaussians: Gaussians, views: list[Learned], state: TrainerState) -> None:
         """Go on from where another trainer was."""
@@ -79,16 +107,34 @@ class Trainer:
         self._adam.moments, self._adam.steps = state.moments, state.moved
         self._pull.sums, self._pull.seen = state.pull
         self._rounds, self._was_reset = state.rounds, state.was_reset
+        self._origins = state.origins
+        self.adjustment.edges, self.adjustment.tried = list(state.edges), set(state.tried)
 
-    def add_view(self, view: PosedView) -> None:
-        """Take a new picture in: Gaussians are set where the method wants them."""
-        self.views.append(Learned(view, view.camera_from_world.copy(), np.zeros(6), np.zeros(6)))
-        shown = self.draw(self.views[-1]).picture
-        more = self.method.seed(view, shown, view.camera_from_world, self.random)
+    def add_view(self, view: PosedView, *, last: bool = False) -> None:
+        """Take a new picture in: Gaussians are set where the method wants them. After the `last` all are adjusted."""
+        pose = view.camera_from_world.copy()
+        if self.adjust_every and self.views:
+            # The motion since the view before is taken as it is given, until it is adjusted.
+            before = self.views[-1]
+            pose = pose @ inverse(before.view.camera_from_world) @ before.camera_from_world
+        self.views.append(Learned(view, pose, np.zeros(6), np.zeros(6)))
+        if self.adjust_every and (last or len(self.views) % self.adjust_every == 0):
+            self._adjust()
+        learned = self.views[-1]
+        shown = self.draw(learned).picture
+        more = self.method.seed(view, shown, learned.camera_from_world, self.random)
         room = max(0, self.most - len(self.gaussians))
         if len(more) > room:
             more = more.taken(np.sort(self.random.permutation(len(more))[:room]))
-        self._add(more)
+        self._add(more, np.full(len(more), len(self.views) - 1))
+
+    def _adjust(self) -> None:
+        before = inverses(np.array([each.camera_from_world for each in self.views]))
+        after = self.adjustment.adjusted([each.view for each in self.views], before)
+        for each, pose in zip(self.views, after, strict=True):
+            each.camera_from_world = inverse(pose)
+        if self.method.carried:
+            move(self.gaussians, (after @ inverses(before))[self._origins])
 
     def draw(self, learned: Learned) -> Drawn:
         """Return what a view shows of the Gaussians now."""
@@ -129,7 +175,8 @@ class Trainer:
         self.gaussians = with_harmonics(self.gaussians, (degree + 1) ** 2)
         self._adam.extend(self.gaussians)
 
-    def _add(self, more: Gaussians) -> None:
+    def _add(self, more: Gaussians, origins: np.ndarray) -> None:
+        self._origins = np.concatenate([self._origins, origins])
         self.gaussians = self.gaussians.joined(with_harmonics(more, self.gaussians.harmonics.shape[1]))
         self._adam.extend(self.gaussians)
         self._pull.extend(len(self.gaussians))
@@ -137,12 +184,14 @@ class Trainer:
     def _change_density(self) -> None:
         density = self.method.density
         self._rounds += 1
-        more, gone = grown(self.gaussians, self._pull.means(), density, self.random)
+        more, parents, gone = grown(self.gaussians, self._pull.means(), density, self.random)
+        origins = self._origins[parents]
         gone |= useless(self.gaussians, density, self._was_reset)
         self.gaussians = self.gaussians.taken(~gone)
         self._adam.keep(~gone)
+        self._origins = self._origins[~gone]
         self._pull = Pull(len(self.gaussians))
-        self._add(more)
+        self._add(more, origins)
         if density.reset_every and self._rounds % density.reset_every == 0:
             least = 2 * density.least_opacity
             np.minimum(
@@ -168,6 +217,15 @@ def with_harmonics(gaussians: Gaussians, count: int) -> Gaussians:
     harmonics = np.zeros((len(gaussians), count, 3), np.float32)
     harmonics[:, :had] = gaussians.harmonics
     return replace(gaussians, harmonics=harmonics)
+
+
+def move(gaussians: Gaussians, motions: np.ndarray) -> None:
+    """Move every Gaussian by its motion (N, 4, 4), in place. Their colours keep the directions that they had."""
+    if not len(gaussians):
+        return
+    gaussians.means[:] = np.einsum("nij,nj->ni", motions[:, :3, :3], gaussians.means) + motions[:, :3, 3]
+    turned = Rotation.from_matrix(motions[:, :3, :3]) * Rotation.from_quat(np.roll(gaussians.quaternions, -1, axis=1))
+    gaussians.quaternions[:] = np.roll(turned.as_quat(), 1, axis=1)
 
 
 def _move(learned: Learned, twist: np.ndarray, rate: float) -> None:

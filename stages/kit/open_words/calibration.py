@@ -1,6 +1,6 @@
 """Relevancies as probabilities: a logistic function fitted to right and wrong answers in tuning rooms.
 
-data/words/calibration.toml holds one for each source and encoder; benchmarks/experiments/legs_language.py fits it.
+data/words/calibration.toml holds one for each source and encoder; benchmarks/words/calibrate.py fits it.
 """
 
 from __future__ import annotations

@@ -24,18 +24,18 @@ CHUNK = 32768
 
 
 class HashGrid(nn.Module):
-    """Places (N, 3) in 0..1 -> (N, 2 x 12 x 4)."""
+    """Places (N, 3) in 0..1 -> (N, width), `numbers` for each of 2 x 12 levels."""
 
     resolutions: torch.Tensor
     corners: torch.Tensor
 
-    def __init__(self, entries: int) -> None:
+    def __init__(self, entries: int, numbers: int = NUMBERS) -> None:
         super().__init__()
-        self.entries = entries
+        self.entries, self.numbers, self.width = entries, numbers, 2 * LEVELS * numbers
         sizes = [low * (high / low) ** (k / (LEVELS - 1)) for low, high in GRIDS for k in range(LEVELS)]
         self.register_buffer("resolutions", torch.tensor(np.floor(sizes), dtype=torch.float32), persistent=False)
         self.register_buffer("corners", torch.tensor(CORNERS, dtype=torch.int64), persistent=False)
-        self.table = nn.Parameter(1e-4 * (2 * torch.rand(len(sizes) * entries, NUMBERS) - 1))
+        self.table = nn.Parameter(1e-4 * (2 * torch.rand(len(sizes) * entries, numbers) - 1))
 
     def forward(self, places: torch.Tensor) -> torch.Tensor:
         """Return what the corners around each place hold, trilinear, level by level."""
@@ -50,35 +50,48 @@ class HashGrid(nn.Module):
         found = nn.functional.embedding_bag(
             row.reshape(-1, 8), self.table, per_sample_weights=weight.reshape(-1, 8), mode="sum"
         )
-        return found.reshape(len(places), levels * NUMBERS)
+        return found.reshape(len(places), levels * self.numbers)
+
+
+class Space:
+    """Where the grids lie: about these centres (N, 3) [m], space beyond most of them contracted."""
+
+    def __init__(self, centers: np.ndarray) -> None:
+        low, high = np.percentile(centers, INNER[0], axis=0), np.percentile(centers, INNER[1], axis=0)
+        self.middle = torch.tensor((low + high) / 2, dtype=torch.float32)
+        self.reach = torch.tensor(np.maximum((high - low) / 2, 0.1), dtype=torch.float32)
+
+    def __call__(self, places: torch.Tensor) -> torch.Tensor:
+        """Return places (N, 3) [m] in 0..1."""
+        inner = (places - self.middle) / self.reach
+        norm = inner.abs().amax(dim=1, keepdim=True).clamp(min=1e-6)
+        outer = torch.where(norm > 1, (2 - 1 / norm) * inner / norm, inner)
+        return (outer + 2) / 4
 
 
 class LanguageField(nn.Module):
     """Places [m, world] and sizes [m] -> unit vectors of an encoder's width; `entries`, a power of 2, a level."""
 
-    def __init__(self, centers: np.ndarray, width: int, entries: int = ENTRIES) -> None:
+    def __init__(
+        self, centers: np.ndarray, width: int, entries: int = ENTRIES, *, numbers: int = NUMBERS, layers: int = LAYERS
+    ) -> None:
         super().__init__()
-        low, high = np.percentile(centers, INNER[0], axis=0), np.percentile(centers, INNER[1], axis=0)
-        self.middle = torch.tensor((low + high) / 2, dtype=torch.float32)
-        self.reach = torch.tensor(np.maximum((high - low) / 2, 0.1), dtype=torch.float32)
-        self.grid = HashGrid(entries)
-        inputs = [2 * LEVELS * NUMBERS + 1, *[HIDDEN] * LAYERS]
-        layers: list[nn.Module] = []
+        self.space = Space(centers)
+        self.grid = HashGrid(entries, numbers)
+        inputs = [self.grid.width + 1, *[HIDDEN] * layers]
+        made: list[nn.Module] = []
         for before, after in zip(inputs[:-1], inputs[1:], strict=True):
-            layers += [nn.Linear(before, after), nn.ReLU()]
+            made += [nn.Linear(before, after), nn.ReLU()]
         self.width = width
-        self.network = nn.Sequential(*layers, nn.Linear(HIDDEN, width))
+        self.network = nn.Sequential(*made, nn.Linear(HIDDEN, width))
 
     def forward(self, places: torch.Tensor, sizes: torch.Tensor) -> torch.Tensor:
         """Return (N, width) of places (N, 3) and sizes (N,)."""
-        held = self.grid(self._contracted(places))
-        return nn.functional.normalize(self.network(torch.cat([held, sizes[:, None]], dim=1)), dim=1)
+        return nn.functional.normalize(self.raw(places, sizes), dim=1)
 
-    def _contracted(self, places: torch.Tensor) -> torch.Tensor:
-        inner = (places - self.middle) / self.reach
-        norm = inner.abs().amax(dim=1, keepdim=True).clamp(min=1e-6)
-        outer = torch.where(norm > 1, (2 - 1 / norm) * inner / norm, inner)
-        return (outer + 2) / 4
+    def raw(self, places: torch.Tensor, sizes: torch.Tensor) -> torch.Tensor:
+        """Return the same before it is made of length 1."""
+        return self.network(torch.cat([self.grid(self.space(places)), sizes[:, None]], dim=1))
 
     def vectors(self, places: np.ndarray, size: float) -> np.ndarray:
         """Return (N, width) float32 of places (N, 3) at one size."""

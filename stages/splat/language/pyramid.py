@@ -49,16 +49,11 @@ def _between(middles: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.nd
     return before, np.clip((places - middles[before]) / step, 0.0, 1.0).astype(np.float32)
 
 
-def shares() -> np.ndarray:
-    """Return the sides (LEVELS,) over the height."""
-    return np.linspace(SMALLEST, LARGEST, LEVELS)
-
-
-def pyramid(color: np.ndarray, encoder: Encoder) -> list[Level]:
-    """Return the levels of a picture (H, W, 3) uint8."""
+def pyramid(color: np.ndarray, encoder: Encoder, smallest: float = SMALLEST, largest: float = LARGEST) -> list[Level]:
+    """Return the levels of a picture (H, W, 3) uint8, whose sides over its height go from `smallest` to `largest`."""
     height, width = color.shape[:2]
     plans, crops = [], []
-    for share in shares():
+    for share in np.linspace(smallest, largest, LEVELS):
         side = max(4, min(round(share * height), height, width))
         tops, lefts = _starts(height, side), _starts(width, side)
         plans.append((float(share), side, tops, lefts))

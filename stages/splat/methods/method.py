@@ -46,3 +46,5 @@ class Method:
     """Steps after which colour may have harmonics of one degree more, up to 3."""
     visible_alone: bool
     """Move only Gaussians that the picture shows; else all are carried on by their momentum."""
+    carried: bool
+    """Where poses are adjusted, Gaussians go with the view that set them."""

@@ -60,4 +60,5 @@ METHOD = Method(
     pose_rate=Rate(1e-3, 5e-5, 5000),
     degree_every=500,
     visible_alone=True,
+    carried=True,
 )

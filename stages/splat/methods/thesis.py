@@ -37,4 +37,5 @@ METHOD = Method(
     pose_rate=Rate(1e-3, 5e-5),
     degree_every=1000,
     visible_alone=False,
+    carried=False,
 )

@@ -59,3 +59,18 @@ def test_what_the_scene_has_not_is_said(language: LanguageMap) -> None:
     other = ContactGraphFile(nodes=(GraphNode(id="cup_9", instance=9, class_name="cup", node_type="rigid"),), links=())
     with pytest.raises(BadInput, match="none of its places"):
         named_goal(('on("red",cup_9)',), {"cup_9": "item"}, other, language)
+
+
+def test_a_class_that_the_scene_names_is_taken_at_its_word(
+    language: LanguageMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The encoder of colours knows no table and no cup: what the map calls so is meant; more words need likeness."""
+    monkeypatch.setattr(open_goals, "LEAST_PROBABILITY", 0.6)
+    classes = zip(OBJECTS, ("cup", "cup", "coffee_table"), strict=True)
+    nodes = tuple(
+        GraphNode(id=name, instance=k, class_name=each, node_type="rigid") for k, (name, each) in enumerate(classes, 1)
+    )
+    named = named_goal(('on("cup","coffee table")',), OBJECTS, ContactGraphFile(nodes=nodes, links=()), language)
+    assert named[0].endswith(",table_3)") and named[0].startswith("on(cup_")
+    with pytest.raises(UsageError, match="the scene has no 'purple cup': cup_"):
+        named_goal(('on("purple cup","coffee table")',), OBJECTS, ContactGraphFile(nodes=nodes, links=()), language)

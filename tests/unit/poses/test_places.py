@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stages.kit.geometry.transforms import apply, transform_from
+from stages.kit.registration.rigid_motion import between, distance_of
 from stages.poses.features import Features, find_features, ransac_motion, rigid_motions
 from stages.poses.places import Ferns, PlaceIndex, fern_likeness
-from stages.poses.rigid_motion import between, distance_of
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 
 WALK = round_walk(13)

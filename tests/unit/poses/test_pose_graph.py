@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from stages.kit.geometry.transforms import inverse
-from stages.poses.pose_graph import Edge, laid_out, optimize, parts_of
-from stages.poses.rigid_motion import angle_of, between, distance_of, exponential
+from stages.kit.registration.pose_graph import Edge, laid_out, optimize, parts_of
+from stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
 
 SURE = np.eye(6) * 1e4
 

@@ -10,7 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stages.kit.geometry.transforms import inverse
-from stages.poses.rigid_motion import adjoint, angle_of, between, distance_of, exponential, fraction, logarithm, skew
+from stages.kit.registration.rigid_motion import (
+    adjoint,
+    angle_of,
+    between,
+    distance_of,
+    exponential,
+    fraction,
+    logarithm,
+    skew,
+)
 
 EXAMPLES = settings(deadline=None, max_examples=40)
 twists = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.poses.rigid_motion import between, exponential, fraction
+from stages.kit.registration.rigid_motion import between, exponential, fraction
 from stages.poses.structure_from_motion import interpolated
 
 POSES = {

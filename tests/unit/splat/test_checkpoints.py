@@ -18,7 +18,15 @@ from tests.unit.poses.textured_room import round_walk, write_sequence
 from tests.unit.viewing.artifacts import seal
 
 PARAMETERS = BuildParameters.model_validate(
-    {"width": 80, "steps": 30, "steps_per_second": 10.0, "hold_out_every": 4, "refine_poses": True, "method": "thesis"}
+    {
+        "width": 80,
+        "steps": 30,
+        "steps_per_second": 10.0,
+        "hold_out_every": 4,
+        "refine_poses": True,
+        "adjust_every": 3,
+        "method": "thesis",
+    }
 )
 
 

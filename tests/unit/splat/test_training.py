@@ -141,8 +141,8 @@ def test_gaussians_split_double_and_go() -> None:
     gaussians = trainer.gaussians.taken(np.arange(4))
     gaussians.log_scales[:] = np.log([[0.5], [0.001], [0.5], [0.001]])
     density = Density(begin=0, every=1, gradient=1.0, size=0.01, least_opacity=0.1, largest=0.3)
-    more, gone = grown(gaussians, np.array([2.0, 2.0, 0.0, 0.0]), density, np.random.default_rng(0))
-    assert len(more) == 3 and gone.tolist() == [True, False, False, False]
+    more, parents, gone = grown(gaussians, np.array([2.0, 2.0, 0.0, 0.0]), density, np.random.default_rng(0))
+    assert len(more) == 3 and parents.tolist() == [0, 0, 1] and gone.tolist() == [True, False, False, False]
     np.testing.assert_allclose(np.exp(more.log_scales[:2]), 0.5 / 1.6, rtol=1e-5)
     gaussians.logit_opacities[:] = [-9.0, 3.0, 3.0, 3.0]
     gaussians.means[3] = np.nan

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, diags_array
@@ -15,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from stages.kit.geometry.transforms import inverse
-from stages.poses.rigid_motion import adjoint, between, exponential, logarithm, orthonormal
+from stages.kit.registration.rigid_motion import adjoint, exponential, inverses, logarithm, orthonormal
 
 SWITCH = 12.0
 """Phi of dynamic covariance scaling: loop edges whose squared error is above it (6 degrees of freedom, of which two
@@ -49,9 +50,14 @@ class Solution:
     """(E,) in [0, 1]: how much of each edge was believed; odometry 1."""
     squared_errors: np.ndarray
     """(E,) Mahalanobis distances squared before scaling."""
-    covariances: np.ndarray
-    """(N, 6, 6) of a left perturbation of each node in the world, the first node of its part being exact."""
+    normal_matrix: csc_matrix
+    """(6N, 6N) of left perturbations of all nodes; of size 0 without nodes."""
     iterations: int
+
+    @cached_property
+    def covariances(self) -> np.ndarray:
+        """(N, 6, 6) of a left perturbation of each node in the world, the first node of its part being exact."""
+        return _covariances(self.normal_matrix)
 
     @property
     def variance_factor(self) -> float:
@@ -104,20 +110,21 @@ def optimize(world_from_node: np.ndarray, edges: Sequence[Edge], *, switch: floa
     """
     poses = np.array(world_from_node, dtype=float)
     if not len(poses):
-        return Solution(poses, np.zeros(0), np.zeros(0), np.zeros((0, 6, 6)), 0)
+        return Solution(poses, np.zeros(0), np.zeros(0), csc_matrix((0, 0)), 0)
     part = parts_of(len(poses), edges)
     anchors = np.unique(part, return_index=True)[1]
-    weights, errors = _weigh(poses, edges, switch)
-    cost = _cost(errors, edges, switch)
+    graph = _Graph(edges)
+    weights, errors = _weigh(poses, graph, switch)
+    cost = _cost(errors, graph, switch)
     damping, iterations = 1e-6, 0
     while iterations < MAXIMUM_ITERATIONS and edges:
         iterations += 1
-        matrix, right = _assemble(poses, edges, weights, anchors)
+        matrix, right = _assemble(poses, graph, weights, anchors)
         damped = (matrix + diags_array(damping * matrix.diagonal())).tocsc()
         twists = splu(damped).solve(right).reshape(-1, 6)
-        moved = np.array([orthonormal(exponential(t) @ pose) for t, pose in zip(twists, poses, strict=True)])
-        new_weights, new_errors = _weigh(moved, edges, switch)
-        new_cost = _cost(new_errors, edges, switch)
+        moved = orthonormal(exponential(twists) @ poses)
+        new_weights, new_errors = _weigh(moved, graph, switch)
+        new_cost = _cost(new_errors, graph, switch)
         if new_cost > cost * (1 + 1e-12):
             damping *= 10
             if damping > 1e4:
@@ -127,60 +134,64 @@ def optimize(world_from_node: np.ndarray, edges: Sequence[Edge], *, switch: floa
         poses, weights, errors, cost, damping = moved, new_weights, new_errors, new_cost, max(damping / 10, 1e-9)
         if done:
             break
-    matrix, _ = _assemble(poses, edges, weights, anchors)
-    return Solution(poses, weights, errors, _covariances(matrix), iterations)
+    matrix, _ = _assemble(poses, graph, weights, anchors)
+    return Solution(poses, weights, errors, matrix, iterations)
 
 
-def residual(edge: Edge, poses: np.ndarray) -> np.ndarray:
-    """Return the twist (6,) by which the poses differ from an edge, as a left perturbation in its target's frame."""
-    return logarithm(between(poses[edge.target], poses[edge.source]) @ inverse(edge.target_from_source))
+def squared_errors(poses: np.ndarray, edges: Sequence[Edge]) -> np.ndarray:
+    """Return by how much poses (N, 4, 4) contradict the edges: Mahalanobis distances squared (E,)."""
+    return _weigh(poses, _Graph(edges), SWITCH)[1]
 
 
-def _weigh(poses: np.ndarray, edges: Sequence[Edge], switch: float) -> tuple[np.ndarray, np.ndarray]:
-    twists = [residual(edge, poses) for edge in edges]
-    errors = np.array([twist @ edge.information @ twist for twist, edge in zip(twists, edges, strict=True)])
-    loops = np.array([edge.switchable for edge in edges], dtype=bool)
-    scale = np.where(loops, np.minimum(1.0, 2.0 * switch / (switch + errors)), 1.0)
+class _Graph:
+    """The edges as arrays."""
+
+    def __init__(self, edges: Sequence[Edge]) -> None:
+        self.targets = np.array([edge.target for edge in edges], dtype=int)
+        self.sources = np.array([edge.source for edge in edges], dtype=int)
+        self.inverse_motions = inverses(np.array([edge.target_from_source for edge in edges]).reshape(-1, 4, 4))
+        self.information = np.array([edge.information for edge in edges]).reshape(-1, 6, 6)
+        self.switchable = np.array([edge.switchable for edge in edges], dtype=bool)
+
+    def residuals(self, poses: np.ndarray) -> np.ndarray:
+        """Return the twists (E, 6) by which poses differ from the edges, left perturbations in the targets' frames."""
+        return logarithm(inverses(poses[self.targets]) @ poses[self.sources] @ self.inverse_motions)
+
+
+def _weigh(poses: np.ndarray, graph: _Graph, switch: float) -> tuple[np.ndarray, np.ndarray]:
+    twists = graph.residuals(poses)
+    errors = np.einsum("ei,eij,ej->e", twists, graph.information, twists)
+    scale = np.where(graph.switchable, np.minimum(1.0, 2.0 * switch / (switch + errors)), 1.0)
     return scale**2, errors
 
 
-def _cost(errors: np.ndarray, edges: Sequence[Edge], switch: float) -> float:
+def _cost(errors: np.ndarray, graph: _Graph, switch: float) -> float:
     """The robust cost whose reweighted least squares these are: quadratic below `switch`, then saturating."""
-    loops = np.array([edge.switchable for edge in edges], dtype=bool)
     scale = np.minimum(1.0, 2.0 * switch / (switch + errors))
-    return float(np.where(loops, scale**2 * errors + switch * (1 - scale) ** 2, errors).sum())
+    return float(np.where(graph.switchable, scale**2 * errors + switch * (1 - scale) ** 2, errors).sum())
 
 
 def _assemble(
-    poses: np.ndarray, edges: Sequence[Edge], weights: np.ndarray, anchors: np.ndarray
+    poses: np.ndarray, graph: _Graph, weights: np.ndarray, anchors: np.ndarray
 ) -> tuple[csc_matrix, np.ndarray]:
     """Return the normal matrix (6N, 6N) and the right side (6N,)."""
-    count = len(poses)
-    right = np.zeros((count, 6))
-    rows, columns, values = [], [], []
-    grid_row, grid_column = np.divmod(np.arange(36), 6)
-
-    def block(i: int, j: int, content: np.ndarray) -> None:
-        rows.append(6 * i + grid_row)
-        columns.append(6 * j + grid_column)
-        values.append(content.reshape(-1))
-
-    for edge, weight in zip(edges, weights, strict=True):
-        # r = log(Ti^-1 Tj Z^-1); a left step of both nodes changes it by Ad(Ti^-1) (dj - di) to first order.
-        jacobian = adjoint(inverse(poses[edge.target]))
-        weighted = weight * jacobian.T @ edge.information
-        content, gradient = weighted @ jacobian, weighted @ residual(edge, poses)
-        i, j = edge.target, edge.source
-        block(i, i, content)
-        block(j, j, content)
-        block(i, j, -content)
-        block(j, i, -content)
-        right[i] += gradient
-        right[j] -= gradient
-    for anchor in anchors:
-        block(int(anchor), int(anchor), ANCHOR * np.eye(6))
-    shape = (6 * count, 6 * count)
-    matrix = coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+    # r = log(Ti^-1 Tj Z^-1); a left step of both nodes changes it by Ad(Ti^-1) (dj - di) to first order.
+    jacobians = adjoint(inverses(poses[graph.targets]))
+    weighted = weights[:, None, None] * np.swapaxes(jacobians, 1, 2) @ graph.information
+    contents = weighted @ jacobians
+    gradients = (weighted @ graph.residuals(poses)[..., None])[..., 0]
+    right = np.zeros((len(poses), 6))
+    np.add.at(right, graph.targets, gradients)
+    np.subtract.at(right, graph.sources, gradients)
+    i, j = graph.targets, graph.sources
+    first = np.concatenate([i, j, i, j, anchors])
+    second = np.concatenate([i, j, j, i, anchors])
+    held = np.repeat(ANCHOR * np.eye(6)[None], len(anchors), axis=0)
+    values = np.concatenate([contents, contents, -contents, -contents, held])
+    row, column = np.divmod(np.arange(36), 6)
+    rows, columns = 6 * first[:, None] + row, 6 * second[:, None] + column
+    shape = (6 * len(poses), 6 * len(poses))
+    matrix = coo_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
     return matrix.tocsc(), right.reshape(-1)
 
 

@@ -1,0 +1,122 @@
+"""Key-frame adjustment: the poses of all views so far, moved together until what their depth and colour say agrees.
+
+The thesis adjusts features by bundle adjustment (DROID-SLAM's, every 150 key frames; Srinivas 2024, section 9.3). Here
+every view has depth: views that should see the same surface are aligned densely, both ways, and a pose graph over all
+views holds these alignments beside the motions that the log gives. Views without depth are held by those alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.transforms import inverse
+from stages.kit.registration.pairs import Limits, agreed, edge_of, overlap_candidates
+from stages.kit.registration.pose_graph import SWITCH, Edge, optimize
+from stages.kit.registration.pyramid import Pyramid, build_pyramid
+from stages.kit.registration.rigid_motion import adjoint, angle_of, between, distance_of
+from stages.splat.views import PosedView
+
+WIDTH, LEVELS, FARTHEST = 160, 3, 6.0
+"""Of the pictures that are aligned [px], resolutions, and the farthest depth [m]."""
+LIMITS = Limits(overlap=0.3, agreement=0.75, residual=0.03, uncertainty=0.05, brightness=0.1)
+"""When an alignment is believed: those of `poses` (docs/POSES.md)."""
+PER_VIEW = 2
+"""Earlier views that a view is aligned with, beside the one before it, at most."""
+PLACED_BY = 4
+"""Adjusted views, the nearest in time, that a picture that was not learned is aligned with."""
+GIVEN_STILL = np.array([0.01] * 3 + [0.01] * 3)
+"""Standard deviation of a motion between neighbours as the log gives it [rad, m] ..."""
+GIVEN_SHARE = 0.05
+"""... and what is added for its own length."""
+SWITCHES = (1e4, 1e2, SWITCH)
+"""From believing all alignments to dropping those that contradict the others: far drift is no reason to drop one."""
+SPARSE = 200
+
+
+@dataclass(frozen=True)
+class KeyView:
+    """What is kept of a view for alignment."""
+
+    pyramid: Pyramid
+    camera: Camera
+    sparse_points: np.ndarray
+    median_depth: float
+
+
+class Adjustment:
+    """Alignments of views with each other, which grow as views arrive."""
+
+    def __init__(self) -> None:
+        self.edges: list[Edge] = []
+        self.tried: set[tuple[int, int]] = set()
+        self._keys: list[KeyView] = []
+
+    def adjusted(self, views: Sequence[PosedView], world_from_camera: np.ndarray) -> np.ndarray:
+        """Return the poses (N, 4, 4) of all views that agree best, the first as it was.
+
+        `views` are those of the last call and what has arrived since, `world_from_camera` (N, 4, 4) where they stand.
+        """
+        self._look_at(views)
+        given = [view.camera_from_world for view in views]
+        motions = [before @ inverse(after) for before, after in zip(given, given[1:], strict=False)]
+        chain = [Edge(k, k + 1, motion, given_information(motion)) for k, motion in enumerate(motions)]
+        neighbours = [(k, k + 1) for k in range(len(motions)) if (k, k + 1) not in self.tried]
+        self._align(neighbours, world_from_camera)
+        poses = optimize(world_from_camera, chain + self.edges, switch=SWITCHES[0]).world_from_node
+        cameras = [key.camera for key in self._keys]
+        self._align(overlap_candidates(self._keys, poses, cameras, self.tried, per_key=PER_VIEW), poses)
+        for switch in SWITCHES:
+            poses = optimize(poses, chain + self.edges, switch=switch).world_from_node
+        return poses
+
+    def placed(
+        self, view: PosedView, guess: np.ndarray, views: Sequence[PosedView], world_from_camera: np.ndarray
+    ) -> np.ndarray:
+        """Return where a picture that takes no part (world_from_camera) stands among adjusted `views` that show the
+        same, whose poses (N, 4, 4) stay; `guess` (4, 4) where it can be aligned with none."""
+        self._look_at(views)
+        own = key_view(view)
+        order = np.argsort([abs(other.time - view.time) for other in views], kind="stable")
+        edges = []
+        for k in order[:PLACED_BY]:
+            there = between(world_from_camera[k], guess)
+            found = agreed(self._keys[k].pyramid, own.pyramid, there, LIMITS, use_color=True, coarsest=None)
+            if found is not None:
+                edge = edge_of(0, 1, found, switchable=True)
+                turned = adjoint(inverse(world_from_camera[k]))
+                motion = world_from_camera[k] @ edge.target_from_source
+                edges.append(replace(edge, target_from_source=motion, information=turned.T @ edge.information @ turned))
+        return optimize(np.stack([np.eye(4), guess]), edges).world_from_node[1]
+
+    def _look_at(self, views: Sequence[PosedView]) -> None:
+        self._keys += [key_view(view) for view in views[len(self._keys) :]]
+
+    def _align(self, pairs: list[tuple[int, int]], poses: np.ndarray) -> None:
+        """Align pairs of views where they stand, and keep what is believed."""
+        for target, source in pairs:
+            self.tried.add((target, source))
+            first, second = self._keys[target].pyramid, self._keys[source].pyramid
+            guess = between(poses[target], poses[source])
+            found = agreed(first, second, guess, LIMITS, use_color=True, coarsest=None)
+            if found is not None:
+                self.edges.append(edge_of(target, source, found, switchable=True))
+
+
+def key_view(view: PosedView) -> KeyView:
+    """Return what is kept of a view."""
+    depth = np.zeros(view.color.shape[:2], np.float32) if view.depth is None else view.depth
+    color = np.round(255 * view.color).astype(np.uint8)
+    pyramid = build_pyramid(depth, color, view.camera, width=WIDTH, levels=LEVELS, maximum_depth=FARTHEST)
+    points = pyramid.levels[-1].points.reshape(-1, 3)
+    points = points[points[:, 2] > 0]
+    return KeyView(pyramid, view.camera, points[:: max(1, len(points) // SPARSE)], pyramid.median_depth)
+
+
+def given_information(motion: np.ndarray) -> np.ndarray:
+    """Return the information (6, 6) of a motion (4, 4) between neighbours as the log gives it."""
+    length = np.array([angle_of(motion)] * 3 + [distance_of(motion)] * 3)
+    return np.diag((GIVEN_STILL + GIVEN_SHARE * length) ** -2.0)
