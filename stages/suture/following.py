@@ -33,8 +33,9 @@ RIG_HINT = (
 )
 ENDINGS = (".png", ".jpg")
 AROUND, RIM = NEEDLE_RADIUS / 2, 48
-"""How far from where it was a needle is looked for [m], and how far a window reaches beyond that [px], so that what
-lies at its edge is judged with what is around it."""
+"""How far from where it was a needle is looked for [m] (one that seems farther is looked at whole: few starts may end
+in another outline of the same masks), and how far a window reaches beyond that [px], so that what lies at its edge is
+judged with what is around it."""
 ARC = np.linspace(0.0, np.pi, 33)
 UNKNOWN = {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5}
 
@@ -205,6 +206,8 @@ class Follower:
         answer = estimate(masks.observation(self._rig, None), self._seed, self._guess, near=True)
         if answer.abstained or answer.pose is None:
             return None
+        if np.linalg.norm(answer.pose.centre - self._guess.centre) > AROUND:
+            return None
         found = windows_about(self._rig, answer.pose, 0.0)
         inside = all(
             window.start <= side.start and side.stop <= window.stop
@@ -225,4 +228,4 @@ class Follower:
             raise BadInput(
                 f"{path}: {what}, the rig's are {size[1]} x {size[0]}", hint="rectified pictures of that size"
             )
-        return np.ascontiguousarray(picture[..., ::-1])
+        return picture[..., ::-1]

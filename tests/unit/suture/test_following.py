@@ -20,6 +20,7 @@ from stages.suture.following import Follower, growing_pairs, named_pairs, read_r
 from stages.suture.masks import EyeMasks, masks_in
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.estimators import ESTIMATORS
+from stages.suture.needle.observation import NeedleEstimate
 from stages.suture.needle.radius import as_if_usual, in_metres
 from stages.suture.pairs import Pair
 from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose
@@ -130,6 +131,27 @@ def test_a_needle_is_looked_for_where_it_was_and_everywhere_when_lost(tmp_path: 
     for line, pose in zip(lines, poses, strict=True):
         assert not line["abstained"]
         assert np.array(line["camera_from_needle"])[:3, 3] == pytest.approx(pose.centre, abs=1e-3)
+
+
+def test_an_answer_near_that_is_far_from_where_it_was_is_looked_at_whole(
+    masks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Few starts may end in another outline of the same masks; it gives itself away by its distance."""
+
+    def astray(*given: object, near: bool = False) -> NeedleEstimate:
+        answer = estimate(*given)  # type: ignore[arg-type]
+        assert answer.pose is not None
+        off = answer.pose.camera_from_needle.copy()
+        off[:3, 3] += [0.0, 0.0, 0.008]
+        return replace(answer, pose=NeedlePose(off)) if near else answer
+
+    monkeypatch.setattr(following, "estimate", astray)
+    for name in ("000000", "000001"):
+        arrive(tmp_path, name)
+    follower = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280)), NEEDLE_RADIUS)
+    lines = [follower.line(files) for files in growing_pairs(tmp_path, latest=False, idle=0.0)]
+    assert [line["whole"] for line in lines] == [True, True]
+    assert np.array(lines[1]["camera_from_needle"])[:3, 3] == pytest.approx(pose_at().centre, abs=2e-3)
 
 
 @pytest.mark.parametrize(
