@@ -38,9 +38,7 @@ CASES = tuple(
     for delay in DELAYS
     for tier in TIERS
 )
-SHOWN = tuple(
-    f"{tier}/physics{kind}" for kind in ("/truth", "/truth/delay5", "") for tier in ("tier1", "tier2")
-)
+SHOWN = tuple(f"{tier}/physics{kind}" for kind in ("/truth", "/truth/delay5", "") for tier in ("tier1", "tier2"))
 """What the page shows, by default."""
 TUNING, REPORTING = range(20), range(2120, 2130)
 
