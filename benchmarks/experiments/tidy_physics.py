@@ -1,8 +1,8 @@
 """Clearing tables in physics: an arm with friction grasps, by the truth or through rendered images.
 
-Tables 1000 to 1059 and 2100 to 2119 were run with earlier arms or motions. Where the bin is farther, trips cost its delay twice. Ours is
-two arms: planned for the bin as it stands, and (`ours_far`) for one that is 5 s away; both stand beside the rivals with
-either bin.
+Tables 1000 to 1059 and 2100 to 2119 were run with earlier arms or motions. Where the bin is farther, trips cost its
+delay twice. Ours is two arms: planned for the bin as it stands, and (`ours_far`) for one that is 5 s away; both stand
+beside the rivals with either bin.
 """
 
 from __future__ import annotations

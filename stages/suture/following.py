@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from schemas.errors import BadInput
 from schemas.outside import file_content, file_json
-from schemas.suture_scene import StereoRigRecord
+from schemas.suture_scene import RigFile
 from stages.suture.masks import EyeMasks, MaskMaker
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.observation import NeedleEstimate
@@ -50,10 +50,11 @@ class PairFiles:
     skipped: int = 0
 
 
-def read_rig(path: Path) -> StereoRig:
-    """Read rig.json: a rectified pair. Raises BadInput in one line."""
+def read_rig(path: Path) -> tuple[StereoRig, float]:
+    """Read rig.json: a rectified pair, and the needle's radius [m], the usual one where it names none. Raises BadInput
+    in one line."""
     try:
-        record = StereoRigRecord.model_validate(file_json(path, LARGEST_PICTURE, hint=RIG_HINT), strict=False)
+        record = RigFile.model_validate(file_json(path, LARGEST_PICTURE, hint=RIG_HINT), strict=False)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "document"
@@ -63,7 +64,8 @@ def read_rig(path: Path) -> StereoRig:
         raise BadInput(
             f"{path}: fx {camera.fx:g} and fy {camera.fy:g} are no square pixels", hint="rectify to square pixels"
         )
-    return StereoRig(camera.width, camera.height, camera.fx, (camera.cx, camera.cy), record.baseline)
+    rig = StereoRig(camera.width, camera.height, camera.fx, (camera.cx, camera.cy), record.baseline)
+    return rig, record.needle_radius or NEEDLE_RADIUS
 
 
 def named_pairs(lines: TextIO | Iterable[str]) -> Iterator[PairFiles]:

@@ -159,6 +159,7 @@ def test_an_answer_near_that_is_far_from_where_it_was_is_looked_at_whole(
     [
         ({}, "camera"),
         (RIG | {"baseline": 0}, "baseline"),
+        (RIG | {"needle_radius": 12.0}, "needle_radius"),
         (RIG | {"camera": RIG["camera"] | {"fy": 9.0}}, "square"),  # type: ignore[operator]
     ],
 )
@@ -166,6 +167,12 @@ def test_a_rig_that_cannot_be_is_refused(told: dict[str, object], said: str, tmp
     (tmp_path / "rig.json").write_text(json.dumps(told))
     with pytest.raises(BadInput, match=said):
         read_rig(tmp_path / "rig.json")
+
+
+def test_a_rig_may_name_the_needle(tmp_path: Path) -> None:
+    for told, radius in (({}, NEEDLE_RADIUS), ({"needle_radius": 0.0085}, 0.0085)):
+        (tmp_path / "rig.json").write_text(json.dumps(RIG | told))
+        assert read_rig(tmp_path / "rig.json") == (TWO_CAMERAS, radius)
 
 
 def test_the_command_writes_lines(masks: Path, tmp_path: Path) -> None:
