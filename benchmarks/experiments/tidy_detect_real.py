@@ -25,6 +25,7 @@ from pydantic import Field
 from scipy.optimize import linear_sum_assignment
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
+from benchmarks.tabulation import Figure
 from schemas.scene_parts import Camera
 from stages.kit.stage import Parameters
 from stages.tableware.actions.stack import Stack
@@ -278,28 +279,27 @@ def photograph_seen(data: Path, trial: Trial) -> tuple[Counts, np.ndarray]:
     return counts, draw_outlines(color, outlines, "a photograph without depth: heights are unknown")
 
 
-def more_figures(results: Results) -> dict[str, float | None]:
-    """`ours/<case>/<class>/<measure>` over all images."""
-    flat: dict[str, float | None] = {}
+def more_figures(results: Results) -> dict[str, Figure]:
+    """`ours/<case>/<class>/<measure>` over all images, of how many things there are."""
+    flat: dict[str, Figure] = {}
     for case in results.cases:
         counts = sum((Counter(record) for record in results.of("ours", case)), Counter[str]())
         for name in ("true", "found", "right", "planned", "planned_right", "refused") if case in SIZES else ():
             counts[f"dish/{name}"] = sum(counts[f"{kind}/{name}"] for kind in ("cup", "bowl", "plate"))
-        for kind in sorted({name.split("/")[0] for name in counts} - {"stackings"}):
+        kinds = {name.split("/")[0] for name in counts} | ({"stackings"} if case in SIZES else set())
+        for kind in sorted(kinds):
             true, found, right = (counts[f"{kind}/{name}"] for name in ("true", "found", "right"))
-            at = f"ours/{case}/{kind}"
-            flat |= {f"{at}/true": true, f"{at}/found": found, f"{at}/right": right, f"{at}/false": found - right}
+            values: dict[str, float] = {"true": true, "found": found, "right": right, "false": found - right}
+            if case in SIZES and kind not in ("unknown", "stackings"):
+                values["refused"] = counts[f"{kind}/refused"]
+            if kind == "stackings":
+                values = {}
             if case in SIZES and kind != "unknown":
-                planned, meant, refused = (counts[f"{kind}/{name}"] for name in ("planned", "planned_right", "refused"))
-                flat |= {f"{at}/planned_right": meant, f"{at}/planned_false": planned - meant, f"{at}/refused": refused}
-        if case in SIZES:
-            planned, meant = counts["stackings/planned"], counts["stackings/planned_right"]
-            at = f"ours/{case}/stackings"
-            flat |= {f"{at}/planned_right": meant, f"{at}/planned_false": planned - meant}
-            flat |= {
-                f"{at}/precision": right / found if found else None,
-                f"{at}/recall": right / true if true else None,
-            }
+                meant = counts[f"{kind}/planned_right"]
+                values |= {"planned_right": meant, "planned_false": counts[f"{kind}/planned"] - meant}
+            values |= ({"precision": right / found} if found else {}) | ({"recall": right / true} if true else {})
+            for name, value in values.items():
+                flat[f"ours/{case}/{kind}/{name}"] = Figure(float(value), None, None, true or None, "")
     return flat
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.experiments.tidy_fast.arms import DELAYS, OURS
-from benchmarks.tabulation import markdown
+from benchmarks.tabulation import Figure, markdown
 from benchmarks.tidy.rivals import against, faster, no_slower
 from stages.kit.measurement.bootstrap import Interval
 from stages.kit.measurement.proportions import wilson_interval
@@ -130,15 +130,15 @@ def items_lost(runs: Sequence[Run]) -> float:
     return sum(run.dropped + run.left for run in runs) / sum(run.moved + run.dropped + run.left for run in runs)
 
 
-def wilson(count: int, tables: int) -> Interval:
+def wilson(count: int, tables: int) -> Figure:
     """Return a share of tables."""
-    return Interval(count / tables, *wilson_interval(count, tables))
+    return Figure(count / tables, *wilson_interval(count, tables), tables, "")
 
 
-def more_figures(results: Results) -> dict[str, float | Interval | None]:
+def more_figures(results: Results) -> dict[str, float | Interval | Figure | None]:
     """Ratios against Random, by how much faster than Pull and Stack, shares of tables no slower than the better of
     them; failed trials of all tiers."""
-    flat: dict[str, float | Interval | None] = {}
+    flat: dict[str, float | Interval | Figure | None] = {}
     for case in results.cases:
         for arm in results.arms(case):
             runs = results.of(arm, case)
