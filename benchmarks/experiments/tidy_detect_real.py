@@ -32,7 +32,7 @@ from stages.tableware.actions.stack import Stack
 from stages.tableware.dishes_file import estimated_setting
 from stages.tableware.planning.choice import make_policy
 from stages.tableware.planning.time_model import EXACT, fitted
-from stages.tableware.sight import understood
+from stages.tableware.sight import setting_seen, understood
 from stages.tableware.simulation.fast import FastWorld
 from stages.tableware.simulation.trial import Done, run_in
 from stages.tableware.vision.image_files import read_image
@@ -106,7 +106,8 @@ def frame_counts(truth: list[tuple[str, float, float]], sight: Sight) -> Counts:
 
 def setting_for(sight: Sight) -> Setting:
     """Return the sizes and the hand that `tableware plan` goes by."""
-    return estimated_setting(sight.detections, Gripper()) if sight.estimated else Setting()
+    setting = estimated_setting(sight.detections, Gripper()) if sight.estimated else Setting()
+    return setting_seen(sight.detections, setting)
 
 
 def planned_table(sight: Sight) -> Table:
