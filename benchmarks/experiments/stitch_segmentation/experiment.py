@@ -286,8 +286,10 @@ EXPERIMENT = Experiment(
     name="stitch_segmentation",
     title="Needle and thread in a picture",
     simulated="Pairs of the one rendered world the network was trained on; disparity is true with noise.",
-    knows="The picture; for the pose the needle's radius and taper.",
-    does_not_show="Anything about real pictures: one rendered world, one pad, one needle, one kind of driver.",
+    knows="The picture; for the pose the needle's taper, and its radius but for the arm that fits it.",
+    does_not_show="Anything about real pictures: it has seen one rendered world, one pad, one needle, one kind of "
+    "driver, and was trained once. Disparity is no matcher's. A needle of another radius: the fitted radius is that of "
+    "the usual needle. Few views are few.",
     arms={name: name for name in (NETWORK, *(f"{arm}_{masks}" for masks in MASKS for arm in ESTIMATORS), FITTED)},
     cases=(VIEWS,),
     tuning=tuple(map(str, TUNING)),
