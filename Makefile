@@ -232,10 +232,11 @@ bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 
 .PHONY: tidy
 # Fast: 200 reporting seeds a tier, about 20 minutes of one core; seen: images before each action, a second each;
 # physics and detect: docs/TIDY.md. Stopped runs go on where they were. PARTS="fast seen" runs some of them.
-PARTS ?= fast seen physics detect
+PARTS ?= fast wrong seen physics detect
 TIDY := $(OUTPUTS)/experiments/tidy$(if $(QUICK),-quick)
 tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum, vision (QUICK=1: few tables; PARTS=...)
 	$(if $(filter fast,$(PARTS)),$(EXPERIMENT) tidy_fast --out $(TIDY)/fast $(ASKED))
+	$(if $(filter wrong,$(PARTS)),$(EXPERIMENT) tidy_wrong --out $(TIDY)/wrong $(ASKED))
 	$(if $(filter seen,$(PARTS)),$(EXPERIMENT) tidy_seen --out $(TIDY)/seen $(ASKED))
 	$(if $(filter physics,$(PARTS)),$(EXPERIMENT) tidy_physics --out $(TIDY)/physics $(ASKED))
 	$(if $(filter physics,$(PARTS)),$(EXPERIMENT) tidy_pulls --out $(TIDY)/pulls $(ASKED))
@@ -247,12 +248,13 @@ tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum
 .PHONY: stitch
 # chain: every command on two rendered scenes and trials, into a report; the other parts are the benchmarks below, together
 # about two hours of one core. Stopped runs go on where they were. STITCH_PARTS="chain trials" runs some of them.
-STITCH_PARTS ?= chain needle segmentation thread trials
+STITCH_PARTS ?= chain needle segmentation follow thread trials
 STITCH := $(OUTPUTS)/experiments/stitch$(if $(QUICK),-quick)
 stitch: setup ## Suturing (STITCH): scene to disparity, needle, thread; trials, table 4.1, report (QUICK=1; STITCH_PARTS=...)
 	$(if $(filter chain,$(STITCH_PARTS)),$(EXPERIMENT) stitch_chain --out $(STITCH)/chain $(ASKED))
 	$(if $(filter needle,$(STITCH_PARTS)),$(EXPERIMENT) stitch_needle --out $(STITCH)/needle $(ASKED))
 	$(if $(filter segmentation,$(STITCH_PARTS)),$(EXPERIMENT) stitch_segmentation --views $(STITCH_VIEWS) --out $(STITCH)/segmentation $(ASKED))
+	$(if $(filter follow,$(STITCH_PARTS)),$(EXPERIMENT) stitch_follow --out $(STITCH)/follow $(ASKED))
 	$(if $(filter thread,$(STITCH_PARTS)),$(EXPERIMENT) stitch_thread --views $(STITCH_VIEWS) --out $(STITCH)/thread $(ASKED))
 	$(if $(filter trials,$(STITCH_PARTS)),$(EXPERIMENT) stitch_trials --out $(STITCH)/trials $(ASKED))
 	$(EXPERIMENT) gather $(STITCH)

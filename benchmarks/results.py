@@ -38,7 +38,9 @@ def figures_of(results: Results) -> dict[str, Figure]:
                     low, high = found.low, found.high
                 figures[f"{arm}/{case}/{name}"] = Figure(value, low, high, cases, measure.unit)
     for key, more in (results.experiment.more_figures(results) if results.experiment.more_figures else {}).items():
-        if isinstance(more, Interval):
+        if isinstance(more, Figure):
+            figures[key] = more
+        elif isinstance(more, Interval):
             figures[key] = Figure(more.value, more.low, more.high, None, "")
         elif more is not None and math.isfinite(more):
             figures[key] = Figure(float(more), None, None, None, "")

@@ -17,8 +17,9 @@ def follow(
     ],
     rig: Annotated[Path, typer.Option("--rig", help="rig.json: the rectified pair (docs/STITCH.md).")],
     needle_radius: Annotated[
-        float, typer.Option("--needle-radius", min=0.002, max=0.05, help="Radius of the half circle [m].")
-    ] = 0.012,
+        float | None,
+        typer.Option("--needle-radius", min=0.002, max=0.05, help="Radius of the half circle [m]; else rig.json's."),
+    ] = None,
     masks: Annotated[
         Path | None, typer.Option("--masks", help="Folder of masks of your own: NNNNNN_left.png by the pair's number.")
     ] = None,
@@ -38,9 +39,9 @@ def follow(
     from stages.suture.following import Follower, growing_pairs, named_pairs, read_rig
     from stages.suture.masks import masks_in, network_masks
 
-    stereo = read_rig(rig)
+    stereo, radius = read_rig(rig)
     make = masks_in(masks, (stereo.height, stereo.width)) if masks is not None else network_masks(segmenter)
-    follower = Follower(stereo, make, needle_radius, cuts=masks is None)
+    follower = Follower(stereo, make, needle_radius or radius, cuts=masks is None)
     pairs = named_pairs(sys.stdin) if str(pictures) == "-" else growing_pairs(pictures, latest=latest, idle=idle)
     for files in pairs:
         sys.stdout.write(json.dumps(follower.line(files), allow_nan=False) + "\n")

@@ -67,6 +67,9 @@ class SutureNeedleFile(Model):
     """The matcher whose disparity was used; empty without."""
     rig: StereoRigRecord
     needle_radius: float = Field(gt=0.0)
+    """Of the half circle [m]: as it was told, or fitted."""
+    needle_radius_deviation: float | None = Field(None, gt=0.0)
+    """Standard deviation [m] of a fitted radius; None where it was told."""
     frames: tuple[NeedleFrame, ...] = Field(max_length=MOST_VIEWS)
     filtered: NeedleEstimateRecord | None
     """The filter's estimate in the last frame, from all of them; None where frames were not filtered."""

@@ -29,6 +29,13 @@ class StereoRigRecord(Model):
     baseline: float = Field(gt=0.0)
 
 
+class RigFile(StereoRigRecord):
+    """A user's rig.json: the pair, and the needle that is used with it, where it is known."""
+
+    needle_radius: float | None = Field(None, ge=0.002, le=0.05)
+    """Of the half circle [m]."""
+
+
 class SutureView(Model):
     """The truth of one frame."""
 

@@ -28,7 +28,7 @@ from stages.suture.world.scene import moved_scene, random_motions
 
 FRAMES = 8
 CALIBRATION_ERROR = 0.15
-TUNING, REPORTING = range(20, 40), range(2400, 2406)
+TUNING, REPORTING = range(20, 40), range(2403, 2409)
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,25 @@ CASES = (
     "pp",
     "pbc",
 )
+SHOWN = (
+    "ccc",
+    "bbb",
+    "buu",
+    "buuuu",
+    "cc|c",
+    "cc|cc",
+    "bb|bb",
+    "bbb|bbb",
+    "bc|bc",
+    "bcc|bcc",
+    "bcc|bb",
+    "bbc|bbc",
+    "bbb|bb",
+    "cccuu",
+    "p",
+    "pp",
+)
+"""What the page shows, by default."""
 KINDS: dict[str, Kind] = {"c": "cup", "b": "bowl", "p": "plate"}
 NUDGE = 0.001
 """Standard deviation [m] of where a utensil comes to lie on what carries it, along each axis."""
@@ -195,6 +214,7 @@ EXPERIMENT = Experiment(
     does_not_show="A real arm or table.",
     arms={"hold": "hold"},
     cases=CASES,
+    default_cases=lambda bench: SHOWN,
     reporting=tuple(map(str, range(10))),
     measure=measure,
     record=Grasp,

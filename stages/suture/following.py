@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from schemas.errors import BadInput
 from schemas.outside import file_content, file_json
-from schemas.suture_scene import StereoRigRecord
+from schemas.suture_scene import RigFile
 from stages.suture.masks import EyeMasks, MaskMaker
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.observation import NeedleEstimate
@@ -33,8 +33,9 @@ RIG_HINT = (
 )
 ENDINGS = (".png", ".jpg")
 AROUND, RIM = NEEDLE_RADIUS / 2, 48
-"""How far from where it was a needle is looked for [m], and how far a window reaches beyond that [px], so that what
-lies at its edge is judged with what is around it."""
+"""How far from where it was a needle is looked for [m] (one that seems farther is looked at whole: few starts may end
+in another outline of the same masks), and how far a window reaches beyond that [px], so that what lies at its edge is
+judged with what is around it."""
 ARC = np.linspace(0.0, np.pi, 33)
 UNKNOWN = {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5}
 
@@ -49,10 +50,11 @@ class PairFiles:
     skipped: int = 0
 
 
-def read_rig(path: Path) -> StereoRig:
-    """Read rig.json: a rectified pair. Raises BadInput in one line."""
+def read_rig(path: Path) -> tuple[StereoRig, float]:
+    """Read rig.json: a rectified pair, and the needle's radius [m], the usual one where it names none. Raises BadInput
+    in one line."""
     try:
-        record = StereoRigRecord.model_validate(file_json(path, LARGEST_PICTURE, hint=RIG_HINT), strict=False)
+        record = RigFile.model_validate(file_json(path, LARGEST_PICTURE, hint=RIG_HINT), strict=False)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "document"
@@ -62,7 +64,8 @@ def read_rig(path: Path) -> StereoRig:
         raise BadInput(
             f"{path}: fx {camera.fx:g} and fy {camera.fy:g} are no square pixels", hint="rectify to square pixels"
         )
-    return StereoRig(camera.width, camera.height, camera.fx, (camera.cx, camera.cy), record.baseline)
+    rig = StereoRig(camera.width, camera.height, camera.fx, (camera.cx, camera.cy), record.baseline)
+    return rig, record.needle_radius or NEEDLE_RADIUS
 
 
 def named_pairs(lines: TextIO | Iterable[str]) -> Iterator[PairFiles]:
@@ -205,6 +208,8 @@ class Follower:
         answer = estimate(masks.observation(self._rig, None), self._seed, self._guess, near=True)
         if answer.abstained or answer.pose is None:
             return None
+        if np.linalg.norm(answer.pose.centre - self._guess.centre) > AROUND:
+            return None
         found = windows_about(self._rig, answer.pose, 0.0)
         inside = all(
             window.start <= side.start and side.stop <= window.stop
@@ -225,4 +230,4 @@ class Follower:
             raise BadInput(
                 f"{path}: {what}, the rig's are {size[1]} x {size[0]}", hint="rectified pictures of that size"
             )
-        return np.ascontiguousarray(picture[..., ::-1])
+        return picture[..., ::-1]

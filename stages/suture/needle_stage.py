@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -21,10 +23,14 @@ from stages.suture.needle.drawing import draw_eyes, estimate_text
 from stages.suture.needle.estimators import ESTIMATORS
 from stages.suture.needle.observation import NeedleEstimate
 from stages.suture.needle.radius import as_if_usual, in_metres
+from stages.suture.needle.radius_fit import Radius, fitted_radius, together, with_radius_unknown
 from stages.suture.needle.records import as_estimate_record
 from stages.suture.pairs import Pair, StereoPairs
 from stages.suture.parameters import NeedleParameters
 from stages.suture.rig import NeedlePose, StereoRig
+
+RADIUS_FRAMES = 20
+"""From so many frames a radius is fitted."""
 
 
 def run(
@@ -42,9 +48,11 @@ def run(
         size = (pairs.camera.height, pairs.camera.width)
         make, source, masks_from = open_masks(sequence, masks, segmenter, parameters, size)
         motion = _motion(sequence, parameters, len(pairs))
+        fitted = _fitted_radius(pairs, make, context) if parameters.fit_radius else None
         maps = _disparity_maps(disparity)
         try:
-            frames, answers = _estimates(pairs, make, maps, views, motion != "none", parameters, context)
+            looked = Looked(fitted or Radius(parameters.needle_radius, 0.0), motion != "none")
+            frames, answers = _estimates(pairs, make, maps, views, looked, parameters, context)
         finally:
             if maps is not None:
                 maps.close()
@@ -53,6 +61,12 @@ def run(
         raise BadInput(f"{sequence.root}: no frame has both eyes", hint="ingest both eyes")
     fused = _filtered(answers, motion, views, parameters.estimator)
     statement = _statement(answers, fused)
+    if parameters.fit_radius:
+        statement += (
+            "; no radius could be fitted, the one that was told is used"
+            if fitted is None
+            else f"; its radius is {1000 * fitted.metres:.2f} mm, known to {1000 * fitted.deviation:.2f} mm"
+        )
     SutureNeedleFile(
         statement=statement,
         estimator=parameters.estimator,
@@ -60,7 +74,8 @@ def run(
         masks_from=masks_from,
         disparity="" if disparity is None else disparity.matching.detail,
         rig=record,
-        needle_radius=parameters.needle_radius,
+        needle_radius=looked.radius.metres,
+        needle_radius_deviation=None if fitted is None else fitted.deviation,
         frames=tuple(frames),
         filtered=None if fused is None else as_estimate_record(fused),
         filter=motion,  # type: ignore[arg-type]
@@ -71,6 +86,24 @@ def run(
     if not is_known:
         summary["reason"] = statement
     return SutureNeedle(root=context.output, outcome="ok" if is_known else "abstained", summary=summary)
+
+
+@dataclass(frozen=True)
+class Looked:
+    """How frames are looked at: for a needle of which radius (deviation 0: it was told), and whether each frame's pose
+    is a start of the next one's."""
+
+    radius: Radius
+    follows: bool
+
+
+def _fitted_radius(pairs: StereoPairs, make: MaskMaker, context: Context) -> Radius | None:
+    """Return the radius that the first frames say together; None where none of them says any."""
+    first = islice(pairs, RADIUS_FRAMES)
+    seen = context.progress.track(first, total=min(RADIUS_FRAMES, len(pairs)), description="radius")
+    said = (fitted_radius(make(pair).observation(pairs.rig, None), context.seed) for pair in seen)
+    radii = [radius for radius in said if radius is not None]
+    return together(radii) if radii else None
 
 
 class _Maps:
@@ -123,7 +156,7 @@ def _estimates(
     make: MaskMaker,
     maps: _Maps | None,
     views: tuple[SutureView, ...],
-    follows: bool,
+    looked: Looked,
     parameters: NeedleParameters,
     context: Context,
 ) -> tuple[list[NeedleFrame], list[NeedleEstimate]]:
@@ -133,15 +166,18 @@ def _estimates(
     of_view = ESTIMATORS[parameters.estimator].of_view
     guess: NeedlePose | None = None
     matched = 0
-    rig, radius = as_if_usual(pairs.rig, parameters.needle_radius), parameters.needle_radius
+    radius = looked.radius.metres
+    rig = as_if_usual(pairs.rig, radius)
     for pair in context.progress.track(pairs, total=len(pairs), description="needles"):
         disparity = None if maps is None else maps.of(pair)
         matched += disparity is not None
         seen = make(pair)
         observation = seen.observation(rig, disparity)
-        answer = of_view(observation, context.seed, guess if follows else None)
+        answer = of_view(observation, context.seed, guess if looked.follows else None)
         guess = answer.pose if not answer.abstained else None
         told = in_metres(answer, radius)
+        if looked.radius.deviation > 0.0:
+            told = with_radius_unknown(told, answer, observation, looked.radius)
         answers.append(told)
         pixels = (int(seen.needle[0].sum()), int(seen.needle[1].sum()))
         frames.append(

@@ -57,6 +57,9 @@ class NeedleParameters(MaskOptions):
     needle_radius: float = Field(
         0.012, ge=0.002, le=0.05, description="Radius of the needle's half circle [m]; 12 mm is a GS-21's"
     )
+    fit_radius: bool = Field(
+        False, description="Fit the radius (6 to 20 mm) to the first frames instead; wire and taper scale with it"
+    )
 
 
 class ThreadParameters(MaskOptions):
@@ -97,6 +100,8 @@ def check_masks(parameters: MaskOptions, inputs: Mapping[str, Any]) -> None:
 def check_needle(parameters: NeedleParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options and inputs that do not go together."""
     check_masks(parameters, inputs)
+    if parameters.fit_radius and parameters.estimator != "ours":
+        raise UsageError(f"--fit-radius is not for --estimator {parameters.estimator}", hint="--needle-radius METRES")
     if parameters.estimator in NEED_DISPARITY and inputs.get("disparity") is None:
         raise UsageError(
             f"--estimator {parameters.estimator} needs --disparity",
@@ -153,7 +158,7 @@ SCENE = Stage(
 )
 NEEDLE = Stage(
     name="suture needle",
-    version=3,
+    version=4,
     summary="Find the needle's pose in stereo pairs, with its covariance, or say why it cannot be known (STITCH)",
     parameters=NeedleParameters,
     reads={"sequence": Sequence, "disparity": Optionally(Disparity), "masks": MASKS, "segmenter": SEGMENTER},
@@ -182,7 +187,7 @@ THREAD = Stage(
 )
 SIMULATE = Stage(
     name="suture simulate",
-    version=3,
+    version=4,
     summary="Throw running sutures with two simulated arms until a failure that ends the trial, or six",
     parameters=SimulateParameters,
     reads={"perception": Optionally(External("error model of perception (TOML) that every arm sees by"))},

@@ -111,7 +111,7 @@ SCENE = Stage(
 )
 PLAN = Stage(
     name="tableware plan",
-    version=5,
+    version=6,
     summary="Plan how to clear a table: pulls, stackings, multi-object and single grasps (TIDY)",
     parameters=PlanParameters,
     reads={"detections": Optionally(TablewareDetections), "scene": Optionally(TablewareScene)},

@@ -22,7 +22,7 @@ from stages.tableware.planning.rules import Rules
 from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
 from stages.tableware.ros2_plan import write_plan_bag
 from stages.tableware.scene_files import read_image
-from stages.tableware.sight import look, understood
+from stages.tableware.sight import look, setting_seen, understood
 from stages.tableware.simulation.fast import FastWorld, run_trial
 from stages.tableware.simulation.trial import Done, Trial, run_in
 from stages.tableware.table_pictures import Panel, draw_strip
@@ -39,6 +39,7 @@ ESTIMATED = (
 )
 OTHER_SETTING = "which piles hold side by side was measured with the standard dishes and hand, not with these"
 """Said of every plan that goes by other sizes."""
+FROM_THE_SIDE = "seen from the side, where kinds are sometimes wrong: nothing is stacked"
 
 
 def run(
@@ -125,7 +126,10 @@ def _accepted(
             notes = (*notes, ESTIMATED)
         elif setting != Setting():
             notes = (*notes, OTHER_SETTING)
-        return Understood(understood(found, least, setting), notes, setting, payload.sizes)
+        seen_so = setting_seen(found, setting)
+        if seen_so != setting:
+            notes = (*notes, FROM_THE_SIDE)
+        return Understood(understood(found, least, seen_so), notes, seen_so, payload.sizes)
     if scene is None:
         raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
     setting = setting_of(scene.info.dishes)

@@ -12,7 +12,7 @@ from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
 from stages.tableware.planning.rules import Rules
 from stages.tableware.simulation.trial import World
 from stages.tableware.vision.detections import Detection, as_table
-from stages.tableware.vision.seeing import Sight, see
+from stages.tableware.vision.seeing import OBLIQUE_VIEW, Sight, see
 from stages.tableware.world.items import Table
 from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
 from stages.tableware.world.setting import Setting
@@ -47,6 +47,13 @@ def understood(detections: tuple[Detection, ...], least: float, setting: Setting
         if detection.kind is None
     )
     return accept(as_table(detections, setting.sizes), doubts, unknown, least, Rules(setting))
+
+
+def setting_seen(detections: tuple[Detection, ...], setting: Setting) -> Setting:
+    """Return the setting by which detections are planned for: of what was seen from the side nothing is stacked, as
+    lower rims are hidden there, and one dish that is taken for another is a wrong stack."""
+    oblique = any(OBLIQUE_VIEW in detection.unsure for detection in detections)
+    return replace(setting, stacking=False) if oblique else setting
 
 
 class Eyes:

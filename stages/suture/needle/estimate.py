@@ -19,7 +19,7 @@ from stages.suture.rig import NeedlePose, StereoRig
 
 FEWEST_PIXELS = 30
 STARTS, MIRRORED, FINALISTS = 14, 3, 6
-NEAR_STARTS, NEAR_FINALISTS = 4, 3
+NEAR_STARTS, NEAR_FINALISTS = 2, 2
 """Where a needle that hardly moved is looked for again."""
 COARSE_LEVELS, NARROW_LEVELS = ((3.0, 5), (1.5, 3)), ((1.5, 4), (0.7, 8))
 """Widths of the outline [px], and the most steps with each."""

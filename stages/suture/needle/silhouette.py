@@ -16,7 +16,6 @@ from typing import NamedTuple
 import cv2
 import numba
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from stages.suture.needle.windows import EyeMask
 from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
@@ -228,14 +227,71 @@ def _compare(
 
 
 @numba.njit(cache=True, fastmath=True)
-def _compare_both(
+def _misfit(
     arc: Arc, sheets: tuple[Sheet, Sheet], tau: float, scale: float, matrix: np.ndarray, gradient: np.ndarray
-) -> tuple[float, float]:
-    """Return both eyes' misfits less what they are without a needle; add to the normal equations."""
-    misfits = np.zeros(2)
+) -> float:
+    """Return the misfit with the calibration's prior; write the normal matrix (8, 8) and the downhill gradient (8,)."""
+    matrix[:], gradient[:] = 0.0, 0.0
+    precision = PIXEL_VARIANCE / CALIBRATION_SIGMA**2
+    cost = precision * (arc.shift[0] ** 2 + arc.shift[1] ** 2)
     for eye, sheet in enumerate(sheets):
-        misfits[eye] = _compare(arc, sheet, eye, tau, scale, matrix, gradient)
-    return misfits[0], misfits[1]
+        cost += sheet.total + _compare(arc, sheet, eye, tau, scale, matrix, gradient)
+    for i in range(8):
+        for j in range(i):
+            matrix[i, j] = matrix[j, i]
+    for i in range(2):
+        matrix[6 + i, 6 + i] += precision
+        gradient[6 + i] -= precision * arc.shift[i]
+    return cost
+
+
+@numba.njit(cache=True)
+def _stepped(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float) -> Arc:
+    """Return the needle after a damped Gauss-Newton step of pose and shift."""
+    step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)) + UNDETERMINED, gradient)
+    angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
+    step *= min(1.0, LARGEST_STEP / max(angle, 1e-9))
+    angle = min(angle, LARGEST_STEP)
+    # Rodrigues' formula; the limits of its two factors where there is no turn
+    sine = np.sin(angle) / angle if angle > 1e-8 else 1.0
+    versine = (1.0 - np.cos(angle)) / angle**2 if angle > 1e-8 else 0.5
+    cross = np.array([[0.0, -step[5], step[4]], [step[5], 0.0, -step[3]], [-step[4], step[3], 0.0]])
+    turn = np.eye(3) + sine * cross + versine * (cross @ cross)
+    pose = arc.pose.copy()
+    pose[:3, :3] = turn @ np.ascontiguousarray(arc.pose[:3, :3])
+    pose[:3, 3] += step[:3]
+    return Arc(pose, arc.shift + step[6:], arc.camera, arc.on_circle, arc.radii, arc.growth)
+
+
+@numba.njit(cache=True)
+def _fitted(
+    arc: Arc, sheets: tuple[Sheet, Sheet], levels: tuple[tuple[float, int], ...], polish: int
+) -> tuple[Arc, float, np.ndarray]:
+    """Return the needle moved onto the masks, its misfit and the information (8, 8)."""
+    tau, cost = 1.0, 0.0
+    matrix, gradient = np.eye(8), np.zeros(8)
+    for tau, steps in levels:
+        damping = 1e-3
+        cost = _misfit(arc, sheets, tau, 0.0, matrix, gradient)
+        for _ in range(steps):
+            trial = _stepped(arc, matrix, gradient, damping)
+            there, slope = np.empty((8, 8)), np.empty(8)
+            gain = cost - _misfit(trial, sheets, tau, 0.0, there, slope)
+            if gain > 0.0:
+                arc, cost, matrix, gradient = trial, cost - gain, there, slope
+                damping = max(damping / 5.0, 1e-4)
+                if gain < LEAST_GAIN:
+                    break
+            else:
+                damping *= 8.0
+                if damping > 1e3:
+                    break
+    for _ in range(polish):
+        _misfit(arc, sheets, tau, OFF_BY, matrix, gradient)
+        arc = _stepped(arc, matrix, gradient, 0.0)
+    if polish:
+        cost = _misfit(arc, sheets, tau, 0.0, np.empty((8, 8)), np.empty(8))
+    return arc, cost, matrix
 
 
 def camera_of(rig: StereoRig) -> np.ndarray:
@@ -245,26 +301,7 @@ def camera_of(rig: StereoRig) -> np.ndarray:
 
 def arc_at(rig: StereoRig, pose: np.ndarray, shift: np.ndarray) -> Arc:
     """Return the needle at a pose (4, 4) for the compiled functions."""
-    return Arc(pose, shift, camera_of(rig), ON_CIRCLE, RADII, GROWTH)
-
-
-def _misfit(
-    rig: StereoRig, sheets: tuple[Sheet, Sheet], pose: np.ndarray, shift: np.ndarray, tau: float, scale: float = 0.0
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return the misfit with the calibration's prior, the normal matrix (8, 8) and the downhill gradient (8,)."""
-    matrix, gradient = np.zeros((8, 8)), np.zeros(8)
-    precision = PIXEL_VARIANCE / CALIBRATION_SIGMA**2
-    cost = precision * float(shift @ shift)
-    arc = arc_at(rig, pose, shift)
-    left, right = _compare_both(arc, sheets, tau, scale, matrix, gradient)
-    cost += sheets[0].total + left
-    cost += sheets[1].total + right
-    upper = np.triu(matrix)
-    matrix = upper + np.triu(upper, 1).T
-    matrix[6, 6] += precision
-    matrix[7, 7] += precision
-    gradient[6:] -= precision * shift
-    return cost, matrix, gradient
+    return Arc(np.ascontiguousarray(pose, dtype=np.float64), shift, camera_of(rig), ON_CIRCLE, RADII, GROWTH)
 
 
 def fit_outline(
@@ -280,40 +317,5 @@ def fit_outline(
     `levels` are widths of the logistic function [px] and the most steps with each; `polish` steps at the last of them
     count less what is off by much. The information is the polished one's, the misfit the plain one's.
     """
-    place, tau = pose.camera_from_needle, 1.0
-    cost, matrix, gradient = 0.0, np.eye(8), np.zeros(8)
-    for tau, steps in levels:
-        damping = 1e-3
-        cost, matrix, gradient = _misfit(rig, sheets, place, shift, tau)
-        for _ in range(steps):
-            trial, moved = _stepped(place, shift, matrix, gradient, damping)
-            there = _misfit(rig, sheets, trial, moved, tau)
-            gain = cost - there[0]
-            if gain > 0.0:
-                place, shift = trial, moved
-                cost, matrix, gradient = there
-                damping = max(damping / 5.0, 1e-4)
-                if gain < LEAST_GAIN:
-                    break
-            else:
-                damping *= 8.0
-                if damping > 1e3:
-                    break
-    for _ in range(polish):
-        _, matrix, gradient = _misfit(rig, sheets, place, shift, tau, OFF_BY)
-        place, shift = _stepped(place, shift, matrix, gradient, 0.0)
-    if polish:
-        cost = _misfit(rig, sheets, place, shift, tau)[0]
-    return Outline(NeedlePose(place), shift, cost, matrix)
-
-
-def _stepped(
-    place: np.ndarray, shift: np.ndarray, matrix: np.ndarray, gradient: np.ndarray, damping: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return pose (4, 4) and shift (2,) after a damped Gauss-Newton step."""
-    step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)) + UNDETERMINED, gradient)
-    step *= min(1.0, LARGEST_STEP / max(float(np.linalg.norm(step[3:6])), 1e-9))
-    there = place.copy()
-    there[:3, :3] = Rotation.from_rotvec(step[3:6]).as_matrix() @ place[:3, :3]
-    there[:3, 3] += step[:3]
-    return there, shift + step[6:]
+    arc, cost, information = _fitted(arc_at(rig, pose.camera_from_needle, shift), sheets, levels, polish)
+    return Outline(NeedlePose(arc.pose), arc.shift, cost, information)

@@ -1,8 +1,8 @@
 """Eyes that look: every estimate is made of a rendered view of the trial's state, by ours or by the thesis's estimator.
 
 The needle world (stages/suture/world) is given the trial's needle, thread and drivers, and cameras, lamps and
-calibration error of its own, drawn once a trial. Its ridge is 0.5 mm higher and rounder than the simulator's; thread
-behind the last hole is not drawn. `geometry`: masks are the rendered truth spoiled as learned ones, seventy times as
+calibration error of its own, drawn once a trial. The ridge is the simulator's; thread behind the last hole is not
+drawn. `geometry`: masks are the rendered truth spoiled as learned ones, seventy times as
 fast; `pictures`: both eyes' pictures, masks by the network. Either is given the true disparity with the noise of the
 needle benchmark. A state that is looked at again is not rendered again: what is new is the noise.
 """
@@ -24,7 +24,9 @@ from stages.suture.robot.arms import REMOTE_CENTRES
 from stages.suture.robot.psm import YAW_TO_TIP
 from stages.suture.trials.bench import Bench
 from stages.suture.trials.perception import PerceptionModel, Seen
+from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
 from stages.suture.world.corruption import noisy_disparity
+from stages.suture.world.pad import Ridge
 from stages.suture.world.render import StereoView, render
 from stages.suture.world.scene import NeedleScene, make_scene
 from stages.suture.world.thread import THREAD_RADIUS
@@ -138,6 +140,7 @@ def pictured(world: NeedleScene, bench: Bench, needle: np.ndarray, frame: int) -
         grips={},
         holder=held or "air",
         place="trial",
+        ridge=Ridge(RIDGE_HEIGHT, RIDGE_HALF_WIDTH, elliptic=True),
     )
 
 

@@ -2,26 +2,42 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
 RIDGE_HEIGHT = 0.0055
 RIDGE_HALF_WIDTH = 0.0065
+
+
+class Ridge(NamedTuple):
+    """The raised wound: its height and half its width [m]; `elliptic`: half an ellipse on a flat pad, as trials have it
+    (stages/suture/trials/wound.py), else rounded, with a slit along its crest and slight waves."""
+
+    height: float = RIDGE_HEIGHT
+    half_width: float = RIDGE_HALF_WIDTH
+    elliptic: bool = False
+
+
+ROUNDED = Ridge()
 SLIT_HALF_WIDTH = 0.0006
 FLAT_FROM = 0.0135
 """Beyond this distance from the wound [m] the pad is flat but for its waves."""
 
 
 @numba.njit(cache=True, fastmath=True)
-def height(x: float, y: float) -> float:
-    """Return the pad's height [m] at (x, y): a rounded ridge with a slit along its crest, and slight waves."""
+def height(x: float, y: float, ridge: Ridge) -> float:
+    """Return the pad's height [m] at (x, y)."""
+    if ridge.elliptic:
+        return ridge.height * np.sqrt(max(1.0 - (y / ridge.half_width) ** 2, 0.0))
     waves = 0.0004 * np.sin(90.0 * x + 1.3) * np.cos(70.0 * y)
     if abs(y) > FLAT_FROM:
         return waves
-    across = y / RIDGE_HALF_WIDTH
-    ridge = RIDGE_HEIGHT * np.exp(-across * across * across * across * 0.7)
+    across = y / ridge.half_width
+    crest = ridge.height * np.exp(-across * across * across * across * 0.7)
     slit = 0.0018 * np.exp(-(y / SLIT_HALF_WIDTH) * (y / SLIT_HALF_WIDTH))
-    return ridge - slit + waves
+    return crest - slit + waves
 
 
 @numba.njit(cache=True)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from stages.suture.world.pad import FLAT_FROM, height, texture
+from stages.suture.world.pad import FLAT_FROM, Ridge, height, texture
 from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
 SUBPIXELS = 3
@@ -31,13 +31,14 @@ class Cones(NamedTuple):
 
 class View(NamedTuple):
     """A camera: focal length and principal point [px]; `rotation` (3, 3) turns its directions into the world, where it
-    stands at `place` (3,) [m]."""
+    stands at `place` (3,) [m] over a pad with this `ridge`."""
 
     focal: float
     centre_x: float
     centre_y: float
     rotation: np.ndarray
     place: np.ndarray
+    ridge: Ridge
 
 
 class Lighting(NamedTuple):
@@ -122,11 +123,9 @@ def draw(cones: Cones, view: View, depth: np.ndarray, cone: np.ndarray) -> tuple
 
 
 @numba.njit(cache=True, fastmath=True)
-def pad_depth(ray_x: float, ray_y: float, rotation: np.ndarray, eye: np.ndarray) -> tuple[float, float, float]:
-    """Return the depth z at which the ray meets the wound pad, and the world's x and y there.
-
-    `rotation` (3, 3) turns camera directions into the world, `eye` (3,) is the camera's place in the world [m].
-    """
+def pad_depth(ray_x: float, ray_y: float, view: View) -> tuple[float, float, float]:
+    """Return the depth z at which the ray meets the wound pad, and the world's x and y there."""
+    _, _, _, rotation, eye, ridge = view
     direction_x = rotation[0, 0] * ray_x + rotation[0, 1] * ray_y + rotation[0, 2]
     direction_y = rotation[1, 0] * ray_x + rotation[1, 1] * ray_y + rotation[1, 2]
     direction_z = rotation[2, 0] * ray_x + rotation[2, 1] * ray_y + rotation[2, 2]
@@ -138,19 +137,19 @@ def pad_depth(ray_x: float, ray_y: float, rotation: np.ndarray, eye: np.ndarray)
     if min(near_y, far_y) > FLAT_FROM or max(near_y, far_y) < -FLAT_FROM:
         reach = -eye[2] / direction_z
         for _ in range(2):
-            reach = (height(eye[0] + reach * direction_x, eye[1] + reach * direction_y) - eye[2]) / direction_z
+            reach = (height(eye[0] + reach * direction_x, eye[1] + reach * direction_y, ridge) - eye[2]) / direction_z
         return reach, eye[0] + reach * direction_x, eye[1] + reach * direction_y
     steps = 10
     last = near
     for step in range(1, steps + 1):
         reach = near + (far - near) * step / steps
         x, y, z = eye[0] + reach * direction_x, eye[1] + reach * direction_y, eye[2] + reach * direction_z
-        if z <= height(x, y):
+        if z <= height(x, y, ridge):
             low, high = last, reach
             for _ in range(8):
                 middle = 0.5 * (low + high)
                 x, y, z = eye[0] + middle * direction_x, eye[1] + middle * direction_y, eye[2] + middle * direction_z
-                if z <= height(x, y):
+                if z <= height(x, y, ridge):
                     high = middle
                 else:
                     low = middle
@@ -162,7 +161,7 @@ def pad_depth(ray_x: float, ray_y: float, rotation: np.ndarray, eye: np.ndarray)
 @numba.njit(cache=True, fastmath=True)
 def hide_below_pad(depth: np.ndarray, cone: np.ndarray, box: tuple[int, int, int, int], view: View) -> None:
     """Take out of the buffers whatever lies behind the wound pad's surface: what is in the tissue is not seen."""
-    focal, centre_x, centre_y, rotation, eye = view
+    focal, centre_x, centre_y, rotation, eye, ridge = view
     half = (SUBPIXELS - 1) / 2.0
     for row in range(box[0] * SUBPIXELS, min(box[1] * SUBPIXELS, depth.shape[0])):
         ray_y = ((row - half) / SUBPIXELS - centre_y) / focal
@@ -176,9 +175,9 @@ def hide_below_pad(depth: np.ndarray, cone: np.ndarray, box: tuple[int, int, int
             z = eye[2] + reach * (rotation[2, 0] * ray_x + rotation[2, 1] * ray_y + rotation[2, 2])
             if z > 0.0075:
                 continue
-            hidden = z < height(x, y)
+            hidden = z < height(x, y, ridge)
             if not hidden:
-                ground, _, _ = pad_depth(ray_x, ray_y, rotation, eye)
+                ground, _, _ = pad_depth(ray_x, ray_y, view)
                 hidden = 0.0 < ground < reach
             if hidden:
                 cone[row, column] = -1
@@ -256,7 +255,7 @@ def shade(
     """Write the linear colour image (H, W, 3) of the buffers over the wound pad, and the pad's depth where it is
     seen."""
     starts, ends, bodies = cones.starts, cones.ends, cones.bodies
-    focal, centre_x, centre_y, rotation, eye = view
+    focal, centre_x, centre_y, rotation, eye, ridge = view
     lights, turn, salt, pad_colour, shadow, shadow_origin, shadow_scale = lighting
     rows, columns = image.shape[0], image.shape[1]
     half = (SUBPIXELS - 1) / 2.0
@@ -293,15 +292,15 @@ def shade(
                     total_1 += min(colour[1], 4.0)
                     total_2 += min(colour[2], 4.0)
             if empty > 0:
-                ground, x, y = pad_depth(ray_x, ray_y, rotation, eye)
+                ground, x, y = pad_depth(ray_x, ray_y, view)
                 if ground > 0.0:
                     if depth_map[row, column] == 0.0:
                         depth_map[row, column] = ground
                     slope = 0.0
                     if abs(y) < FLAT_FROM:
-                        slope = (height(x, y + 2e-4) - height(x, y - 2e-4)) / 4e-4
+                        slope = (height(x, y + 2e-4, ridge) - height(x, y - 2e-4, ridge)) / 4e-4
                     normal_x, normal_y, normal_z = _unit(0.0, -slope, 1.0)
-                    z = height(x, y)
+                    z = height(x, y, ridge)
                     light_sum = 0.0
                     for light in lights:
                         to_x, to_y, to_z = _unit(light[0] - x, light[1] - y, light[2] - z)

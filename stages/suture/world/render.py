@@ -100,7 +100,7 @@ def _eye(
     cone = np.full(depth.shape, -1, dtype=np.int16)
     starts, ends = np.ascontiguousarray(tubes.starts), np.ascontiguousarray(tubes.ends)
     cones = Cones(starts, ends, tubes.start_radii, tubes.end_radii, tubes.bodies)
-    view = View(rig.focal, rig.centre[0], rig.centre[1], rotation, place)
+    view = View(rig.focal, rig.centre[0], rig.centre[1], rotation, place, scene.ridge)
     box = draw(cones, view, depth, cone)
     hide_below_pad(depth, cone, box, view)
     bodies = np.zeros((rig.height, rig.width), dtype=np.uint8)

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from stages.kit.geometry.transforms import apply, inverse, transform_from
 from stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose, StereoRig
-from stages.suture.world.pad import RIDGE_HEIGHT
+from stages.suture.world.pad import RIDGE_HEIGHT, ROUNDED, Ridge
 from stages.suture.world.thread import THREAD_RADIUS, loose_thread
 from stages.suture.world.tubes import (
     LEFT_DRIVER,
@@ -79,6 +79,7 @@ class NeedleScene:
     without_needle: bool = False
     """Everything but the needle; `pose` is where it would be."""
     shape: NeedleShape = USUAL_NEEDLE
+    ridge: Ridge = ROUNDED
 
     def tubes(self) -> Tubes:
         """Return every tube of the scene in the left camera's frame."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.suture.world.pad import height
+from stages.suture.world.pad import ROUNDED, height
 
 THREAD_RADIUS = 0.00019
 """Half the thickness of a 2-0 thread [m]: it is 0.35 to 0.4 mm thick."""
@@ -34,7 +34,7 @@ def loose_thread(
             heading[:2] -= STEP * 25.0 * points[index, :2] / distance
         heading /= np.linalg.norm(heading)
         step = points[index] + STEP * heading
-        floor = height(float(step[0]), float(step[1])) + THREAD_RADIUS
+        floor = height(float(step[0]), float(step[1]), ROUNDED) + THREAD_RADIUS
         if step[2] < floor:
             step[2] = floor
             heading[2] = max(heading[2], 0.0)

@@ -33,6 +33,7 @@ MILLIMETRES = 20.0
 LEVEL = 0.9995
 """Cosine of the angle to the vertical, from which a camera looks straight down."""
 OBLIQUE, OBLIQUE_TRUST = np.deg2rad(15.0), 0.8
+OBLIQUE_VIEW = "oblique view"
 """A view this far off the vertical is oblique; what is left of a confidence there."""
 OVER_MIDDLE = 0.002
 """A camera this near [m] to the vertical through the workspace's middle is over it."""
@@ -217,7 +218,7 @@ def seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ..
             seen.append(detection)
             continue
         stacked = index in carrying or (detection.kind in DISHES and detection.on is not None)
-        reasons = ("oblique view", "a stack seen from the side") if stacked else ("oblique view",)
+        reasons = (OBLIQUE_VIEW, "a stack seen from the side") if stacked else (OBLIQUE_VIEW,)
         trust = 0.0 if stacked else OBLIQUE_TRUST
         seen.append(replace(detection, confidence=trust * detection.confidence, unsure=(*detection.unsure, *reasons)))
     return tuple(seen)

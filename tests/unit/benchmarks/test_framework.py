@@ -17,6 +17,7 @@ from benchmarks.code_digest import code_digest
 from benchmarks.command import run
 from benchmarks.discovery import experiment_files, load_experiment
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
+from benchmarks.tabulation import Figure
 from schemas.errors import UsageError
 from stages.kit.stage import Parameters
 
@@ -100,6 +101,15 @@ def test_what_is_measured_is_kept_and_the_figures_are_written(tmp_path: Path, ca
     assert run(SMALL, [*words, "--place", "elsewhere"]) == 0 and len(MEASURED) == 16, "where things are is in no key"
     assert run(SMALL, [*words, "--fresh", "--arms", "ours", "--cases", "one"]) == 0 and len(MEASURED) == 20
     assert run(SMALL, ["small", "--out", str(tmp_path), "--seeds", "2a"]) == 0 and len(MEASURED) == 24, "other scale"
+
+
+def test_further_figures_may_say_of_how_many_cases_they_are(tmp_path: Path) -> None:
+    share = Figure(0.5, 0.1, 0.9, 4, "m")
+    more = replace(SMALL, more_figures=lambda _: {"ours/one/half": share, "ours/one/two": 2.0, "ours/one/none": None})
+    assert run(more, ["small", "--out", str(tmp_path)]) == 0
+    figures = figures_in(tmp_path)
+    assert figures["ours/one/half"] == vars(share) and "ours/one/none" not in figures
+    assert figures["ours/one/two"] == {"value": 2.0, "low": None, "high": None, "cases": None, "unit": ""}
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:

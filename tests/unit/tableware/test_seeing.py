@@ -8,10 +8,13 @@ import trimesh
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
+from stages.tableware.planning.rules import Rules, can_stack
+from stages.tableware.sight import setting_seen
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.seeing import see, see_image, seen_from_the_side
 from stages.tableware.world.items import STANDARD, Table, make_item
 from stages.tableware.world.overhead import OverheadCamera, overhead_camera, render_overhead
+from stages.tableware.world.setting import Setting
 
 VIEW = overhead_camera()
 
@@ -128,3 +131,10 @@ def test_stacksseen_from_the_side_are_not_trusted():
     assert [one.confidence for one in doubted] == pytest.approx([0.0, 0.0, 0.72, 0.72, 0.0])
     assert all("a stack seen from the side" in one.unsure for one in doubted[:2])
     assert doubted[2].unsure == ("oblique view",) and doubted[4] == seen[4]
+
+
+def test_nothing_is_stacked_of_what_is_seen_from_the_side(oblique):
+    assert setting_seen((), Setting()) == Setting()
+    setting = setting_seen(see(*oblique).detections, Setting())
+    assert setting == replace(Setting(), stacking=False)
+    assert can_stack("c", "b", Rules(Setting())) and not can_stack("c", "b", Rules(setting))

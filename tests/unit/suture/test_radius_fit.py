@@ -1,0 +1,49 @@
+"""A needle's radius that nobody told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stages.suture.needle.estimate import estimate
+from stages.suture.needle.radius import as_if_usual, in_metres
+from stages.suture.needle.radius_fit import Radius, estimate_without_radius, fitted_radius, together
+from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from tests.unit.suture.needle_cases import observed, pose_at
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.7])
+def test_a_radius_is_found_with_the_pose(factor: float) -> None:
+    """The masks of the usual needle are those of a smaller one before eyes as much nearer to each other."""
+    radius = factor * NEEDLE_RADIUS
+    seen = replace(
+        observed(pose_at()), disparity=None, rig=replace(TWO_CAMERAS, baseline=factor * TWO_CAMERAS.baseline)
+    )
+    answer, found = estimate_without_radius(seen)
+    assert found is not None and answer.pose is not None and not answer.abstained
+    assert found.metres == pytest.approx(radius, rel=0.02)
+    assert abs(found.metres - radius) < 4 * found.deviation < 0.1 * radius
+    assert answer.pose.centre == pytest.approx(factor * pose_at().centre, abs=0.02 * 0.4)
+    rig = as_if_usual(seen.rig, radius)
+    told = in_metres(estimate(replace(seen, rig=rig)), radius)
+    spread, known = (np.trace(one.covariance[:3, :3]) for one in (answer, told))
+    assert spread > known, "a radius that is not known makes the distance less sure"
+
+
+def test_nothing_is_fitted_to_nothing() -> None:
+    seen = observed(pose_at())
+    blank = replace(seen, left_mask=np.zeros_like(seen.left_mask))
+    assert fitted_radius(blank) is None
+    answer, found = estimate_without_radius(blank)
+    assert found is None and answer.abstained
+
+
+def test_frames_say_more_together_but_for_what_they_share() -> None:
+    one, other = Radius(0.010, 0.0002), Radius(0.011, 0.0004)
+    both = together([one, other])
+    assert both.metres == pytest.approx((0.010 * 4 + 0.011) / 5)
+    assert 0.5 * 0.0002 < both.deviation < 0.0003
+    many = together([one] * 1000)
+    assert many.deviation == pytest.approx(0.5 * one.deviation, rel=0.01)
