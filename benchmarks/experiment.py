@@ -16,6 +16,7 @@ from urllib.parse import quote
 import numpy as np
 
 from benchmarks.reporting_seeds import Method
+from benchmarks.tabulation import Figure
 from stages.kit.measurement.bootstrap import (
     Interval,
     bootstrap_interval,
@@ -164,7 +165,7 @@ class Experiment:
     subcases: Mapping[str, tuple[str, Callable[[Any], Any | None]]] = field(default_factory=dict)
     """A case that is shown -> the case that is measured for it, and what of a record counts there (None: nothing). With
     any of them they are all that is shown."""
-    more_figures: Callable[[Results], Mapping[str, float | Interval | None]] | None = None
+    more_figures: Callable[[Results], Mapping[str, float | Interval | Figure | None]] | None = None
     """Further `<arm>/<case>/<measure>` -> value."""
     notes: Callable[[Results], str] | None = None
     """What table.md says after the figures, the differences and the single seeds."""

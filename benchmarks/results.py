@@ -38,7 +38,9 @@ def figures_of(results: Results) -> dict[str, Figure]:
                     low, high = found.low, found.high
                 figures[f"{arm}/{case}/{name}"] = Figure(value, low, high, cases, measure.unit)
     for key, more in (results.experiment.more_figures(results) if results.experiment.more_figures else {}).items():
-        if isinstance(more, Interval):
+        if isinstance(more, Figure):
+            figures[key] = more
+        elif isinstance(more, Interval):
             figures[key] = Figure(more.value, more.low, more.high, None, "")
         elif more is not None and math.isfinite(more):
             figures[key] = Figure(float(more), None, None, None, "")
@@ -82,6 +84,7 @@ def described(results: Results, figures: Mapping[str, Figure], command: Sequence
         "simulated": experiment.simulated,
         "knows": experiment.knows,
         "does_not_show": experiment.does_not_show,
+        "notes": seeds_line(results).strip(),
         **({"seeds": dict(results.seeds_met)} if results.seeds_met else {}),
         "figures": {name: vars(figure) for name, figure in figures.items()},
     }
