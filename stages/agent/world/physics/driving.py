@@ -34,7 +34,9 @@ class Driving:
         """Drive along the robot's own map; with empty hands it is moved and asked for contacts, not simulated."""
         goal = np.array([base.x, base.y, base.yaw])
         error = stop_error(self._robot.random)
+        turns_there = bool(toward) or self._seen.obstacles.at_ease(base.x, base.y)  # its head turns anywhere
         failed: MotionFailed | None = None
+        rows: list[np.ndarray] = []
         for number in range(TRIES):
             way = self._seen.obstacles.path(self._robot.base, (base.x, base.y))
             if way is None:
@@ -46,12 +48,15 @@ class Driving:
             ease = [self._seen.obstacles.at_ease(*point) for point in way[1:-1]]
             turns = (ease, [False] * len(ease), [True] * len(ease))[number % 3]
             start = self._robot.true_base()
-            failed = self._roll_along(start, _facing_on(start, points, turns, goal - error))
+            rows = _facing_on(start, points, [*turns, turns_there], goal - error)
+            failed = self._roll_along(start, rows)
             if failed is None:
                 break
             self._robot.believed = self._robot.true_base() + self._robot.error
+            if not points and number:
+                break  # it is there but for the turn
         self._robot.error = error
-        self._robot.believed = goal if failed is None else self._robot.true_base() + error
+        self._robot.believed = (rows[-1] if failed is None else self._robot.true_base()) + error
         self._robot.believed[2] = (self._robot.believed[2] + pi) % (2 * pi) - pi
         self._robot.metres += length
         if toward:
@@ -116,13 +121,16 @@ def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
 
 def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:
     """Return base poses (3,) through points to a goal pose that turn little from each to the next: along the way at
-    points where it `turns`, as before at the others, for the base drives to any side."""
+    points where it `turns`, and as the goal says there if it does, as before at the others, for the base drives to any
+    side."""
     made: list[np.ndarray] = []
     before = start
-    for point, turn in zip([*points, goal], [*turns, True], strict=True):
+    for point, turn in zip([*points, goal], turns, strict=True):
         turned = point.copy()
-        if len(made) < len(points):
-            turned[2] = atan2(point[1] - before[1], point[0] - before[0]) if turn else before[2]
+        if not turn:
+            turned[2] = before[2]
+        elif len(made) < len(points):
+            turned[2] = atan2(point[1] - before[1], point[0] - before[0])
         turned[2] = before[2] + (turned[2] - before[2] + pi) % (2 * pi) - pi
         made.append(turned)
         before = turned
