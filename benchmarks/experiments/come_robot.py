@@ -41,6 +41,8 @@ CURVES = {
     for scale in SCALES
 }
 """Case -> factors of the rates of execution and of perception."""
+FEWER, CURVED = {MIXED: 50}, 25
+"""Seeds of a case that is no task with the rates as they are, for want of processor time."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,12 @@ class Record:
     metres: float
     failures: dict[str, tuple[int, int]]
     """Cause -> direct, recovered."""
+
+
+def seeds_of(bench: Bench, case: str) -> list[str]:
+    """The first seeds are enough for ablations and curves."""
+    most = FEWER.get(case, CURVED if case in CURVES else None)
+    return [str(seed) for seed in (TUNING if bench.tuning else REPORTING)[:most]]
 
 
 def runs(arm: str, case: str) -> bool:
@@ -192,6 +200,7 @@ EXPERIMENT = Experiment(
     runs=runs,
     tuning=tuple(map(str, TUNING)),
     reporting=tuple(map(str, REPORTING)),
+    seeds_of=seeds_of,
     together=lambda trial: (trial.case, trial.seed),
     measure=measure,
     record=Record,

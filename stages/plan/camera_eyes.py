@@ -95,7 +95,7 @@ class CameraEyes:
 
                 found[joint.name] = fit_joint(seen, of_joint, joint.lower, joint.upper)
             if turn == 0:
-                motion = fit_upright(points, points_at(found), near=True)
+                motion = fit_upright(points, points_at(found), as_believed=True)
                 if np.linalg.norm(motion[:3, 3] + (motion[:3, :3] - np.eye(3)) @ points.mean(axis=0)) > MOST_MOVED:
                     return np.eye(4), found  # that is no error of a map: something else was fitted
         return motion, found
