@@ -23,8 +23,8 @@ def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = Fals
 
     `seen` (N, 3): points of the side that cameras saw; `shape` (M, 3): all around it, where it is believed. Trimmed
     iterated closest points from the seen points to the shape, so that its hidden side pulls at nothing. It starts with
-    the boxes' middles one over the other, tops level: a top is in sight more often than a foot; `as_believed`, where it is
-    believed: of what is large one side is in sight.
+    the boxes' middles one over the other, tops level: a top is in sight more often than a foot; `as_believed`, where
+    it is believed: of what is large one side is in sight.
     """
     low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
     own_low, own_high = shape.min(axis=0), shape.max(axis=0)
