@@ -75,7 +75,7 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
 
 def _as_recorded(words: Sequence[str], options: argparse.Namespace) -> tuple[str, ...]:
     """Return the command line that stands beside figures: where they were written says nothing."""
-    kept = ["FOLDER" if word == str(options.out) else word for word in words if word != "--publish"]
+    kept = ["FOLDER" if word == str(options.out) else word for word in words if word not in ("--publish", "--kept")]
     return ("python", "-m", "benchmarks", *kept)
 
 
