@@ -226,7 +226,7 @@ SCENE ?= $(OUTPUTS)/demo/interactive_scene
 PLANNING := $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
 bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)
 	$(EXPERIMENT) planning_motion $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(PLANNING)/motion $(ASKED)
-	$(EXPERIMENT) planning_tamp --out $(PLANNING)/tamp $(ASKED)
+	$(EXPERIMENT) planning_tamp --out $(PLANNING)/tamp $(ASKED) $(if $(PUBLISH),--publish)
 	$(EXPERIMENT) gather $(PLANNING)
 
 .PHONY: tidy
@@ -298,9 +298,12 @@ cutting: setup ## Cutting towards goals: table 6.1, the thesis's arms and ours (
 	OMP_NUM_THREADS=1 $(EXPERIMENT) cutting_touching --out $(OUTPUTS)/experiments/cutting_touching$(if $(QUICK),-quick)
 
 .PHONY: come-robot
-# A hundred reporting seeds a task, twelve tasks, ablations and curves: about four minutes of two cores.
-come-robot: setup ## A robot told in words (COME-robot): tables 3.2 to 3.4, ablations, curves (QUICK=1: ten seeds)
-	$(EXPERIMENT) come_robot --out $(OUTPUTS)/experiments/come-robot$(if $(QUICK),-quick) $(ASKED)
+# A hundred reporting seeds a task, twelve tasks, ablations and curves: about fifteen minutes of one core. PHYSICS=N: N seeds a
+# task in pybullet too, about a minute of a core for each. PUBLISH=1 writes docs/results from what is measured.
+come-robot: setup ## A robot told in words (COME-robot): tables 3.2 to 3.4, ablations, curves (QUICK=1: ten seeds; PHYSICS=N; PUBLISH=1)
+	$(EXPERIMENT) come_robot --out $(OUTPUTS)/experiments/come-robot$(if $(QUICK),-quick) $(ASKED) $(if $(PUBLISH),--publish)
+	$(if $(PHYSICS),$(EXPERIMENT) come_robot_physics --count $(PHYSICS) --arms open_loop thesis ours --out $(OUTPUTS)/experiments/come-robot-physics $(ASKED) $(if $(PUBLISH),--publish))
+	$(if $(PUBLISH),$(PYTHON) -m benchmarks.figures)
 
 .PHONY: bench-disparity bench-reconstruct-stereo train-stereo
 # Rendered pairs are kept below the output folder; the network's arms run when its checkpoint is there.

@@ -17,8 +17,9 @@ from benchmarks.keeping import measure_missing, read_record, wanted_trials
 from benchmarks.options import add_option
 from benchmarks.reporting_seeds import FILE, UNRECORDED, newest, note_use
 from benchmarks.results import write_results
-from schemas.errors import ScenewrightError
+from schemas.errors import ScenewrightError, UsageError
 
+PUBLISHED = Path(__file__).resolve().parents[1] / "docs" / "results"
 UNMET = 4
 """Exit code when an expectation does not hold."""
 
@@ -63,11 +64,30 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
         return code
     results = Results(experiment, bench, shown(experiment, records), met)
     missing = [trial for trial in trials if trial not in records]
-    print(write_results(results, ("python", "-m", "benchmarks", *words), missing))
+    print(write_results(results, _as_recorded(words, options), missing))
+    if options.publish:
+        print(f"{publish(results, missing)}: `make figures` shows it", file=sys.stderr)
     problems = experiment.problems(results) if experiment.problems else ()
     for problem in problems:
         print(f"expectation not met: {problem}", file=sys.stderr)
     return code or (UNMET if problems else 0)
+
+
+def _as_recorded(words: Sequence[str], options: argparse.Namespace) -> tuple[str, ...]:
+    """Return the command line that stands beside figures: where they were written says nothing."""
+    kept = ["FOLDER" if word == str(options.out) else word for word in words if word not in ("--publish", "--kept")]
+    return ("python", "-m", "benchmarks", *kept)
+
+
+def publish(results: Results, missing: Sequence[Trial], folder: Path = PUBLISHED) -> Path:
+    """Copy figures.json to where pages take it from, and return that file. Raises UsageError for figures of tuning
+    seeds or of a quick run, and for an unfinished one."""
+    if results.bench.quick or results.bench.tuning or missing:
+        what = f"{len(missing)} trials are missing" if missing else "this is no run over reporting seeds"
+        raise UsageError(f"nothing is published: {what}", hint="run it without --quick and --tuning to its end")
+    file = folder / f"{results.experiment.name}.json"
+    file.write_bytes((results.bench.out / "figures.json").read_bytes())
+    return file
 
 
 def seeds_met(
@@ -120,6 +140,7 @@ def parser_of(experiment: Experiment) -> argparse.ArgumentParser:
     parser.add_argument("--jobs", type=int, help=f"measure so many at a time (default: {experiment.jobs})")
     parser.add_argument("--fresh", action="store_true", help="measure again what is kept")
     parser.add_argument("--kept", action="store_true", help="measure nothing: tabulate what is kept, of any code")
+    parser.add_argument("--publish", action="store_true", help="copy figures.json to docs/results, for `make figures`")
     for name, field in experiment.parameters.model_fields.items():
         add_option(parser, name, field)
     return parser

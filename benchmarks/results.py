@@ -84,6 +84,7 @@ def described(results: Results, figures: Mapping[str, Figure], command: Sequence
         "simulated": experiment.simulated,
         "knows": experiment.knows,
         "does_not_show": experiment.does_not_show,
+        "notes": seeds_told(results),
         **({"seeds": dict(results.seeds_met)} if results.seeds_met else {}),
         "figures": {name: vars(figure) for name, figure in figures.items()},
     }
@@ -141,6 +142,11 @@ def seeds_table(results: Results) -> str:
 
 
 def seeds_line(results: Results) -> str:
+    """Say which seeds ran and how intervals are made."""
+    return f"{seeds_told(results)} Intervals: 95 %, bootstrap, {RESAMPLES} draws over clusters of seeds.\n"
+
+
+def seeds_told(results: Results) -> str:
     """Say which seeds ran."""
     told = []
     for names in dict.fromkeys(tuple(results.seeds(case)) for case in results.cases):
@@ -150,7 +156,7 @@ def seeds_line(results: Results) -> str:
         told.append(
             f"{len(names)}{f' for {kind}' if kind else ''} ({', '.join(names[:20])}{', ...' * (len(names) > 20)})"
         )
-    return f"Seeds: {'; '.join(told)}. Intervals: 95 %, bootstrap, {RESAMPLES} draws over clusters of seeds.\n"
+    return f"Seeds: {'; '.join(told)}."
 
 
 def _write(path: Path, values: Mapping[str, Any]) -> None:

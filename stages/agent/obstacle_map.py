@@ -17,6 +17,9 @@ CELL = 0.1
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
 DEARER = 4.0
 """What a cell costs there: the corners of a turning base come nearer than its sides."""
+DEAREST = 20.0
+"""What a cell costs that is nearer than the clearance: where the base stands too near to something it first goes away
+from it."""
 HALF = int(LARGEST_SIDE / CELL) + 20
 
 
@@ -116,6 +119,7 @@ class ObstacleMap:
             if self.comfort > 0:
                 self._dear = self._near_obstacles(self.comfort)
                 cost[self._dear] = DEARER
+                cost[self._near_obstacles(self.clearance)] = DEAREST
             self._fields[at] = distances(free, cost, at[0], at[1]) * CELL
         return self._fields[at]
 

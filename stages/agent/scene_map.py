@@ -75,6 +75,12 @@ class Item:
         other, count = said.most_common(1)[0] if said else ("", 0)
         return other if count == own else ""
 
+    @property
+    def disputed(self) -> str:
+        """The class that most regions say of those that say another one; empty where all agree."""
+        said = Counter(vote for vote in self.votes.values() if vote not in (None, self.label))
+        return said.most_common(1)[0][0] or "" if said else ""
+
     def sides(self, *, seen: bool) -> set[int | str]:
         """Return the sides from which it was seen from near or far, or from which it should have been and was not:
         what hides a thing hides it from a side."""
@@ -162,18 +168,19 @@ class SceneMap:
         """Return the thing of a place that each detection of one look is of, or None.
 
         Pairs are taken by distance, each thing once: fruit lies closer together on a plate than the eyes measure, and
-        two things that were seen side by side are two. A further detection right where a thing was found is of it too.
+        two things that were seen side by side are two. Of two that are about as near, the one that looks like it is it.
+        A further detection right where a thing was found is of it too.
         """
         pairs = sorted(
-            (apart, key, number)
+            (apart + (0.0 if d.label == i.label else TWICE * self._same_thing), key, number, apart)
             for number, d in enumerate(detections)
             for key, i in self.items.items()
-            if i.place == place and not (i.label in CARRIERS and d.radius < UNLIKE * i.radius)
+            if i.place == place and not _one_carries_the_other(i, d)
             for apart in [_apart(i.position, d.position)]
             if apart <= self._same_thing
         )
         found: dict[int, str] = {}
-        for apart, key, number in pairs:
+        for _, key, number, apart in pairs:
             if number not in found and (key not in found.values() or apart <= TWICE * self._same_thing):
                 found[number] = key
         return [self.items[found[number]] if number in found else None for number in range(len(detections))]
@@ -221,6 +228,13 @@ def _faces(base: Base, piece: SeenFurniture) -> bool:
         min(max(p, c - s / 2), c + s / 2) for p, c, s in zip((base.x, base.y), piece.centre, piece.size, strict=True)
     )
     return abs((atan2(y - base.y, x - base.x) - base.yaw + pi) % (2 * pi) - pi) <= pi / 4
+
+
+def _one_carries_the_other(item: Item, seen: Detection) -> bool:
+    """Whether one of two is a carrier and the other too narrow to be that."""
+    narrow, wide = sorted((item.radius, seen.radius))
+    wider = item.label if item.radius >= seen.radius else seen.label
+    return wider in CARRIERS and narrow < UNLIKE * wide
 
 
 def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:

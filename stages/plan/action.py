@@ -51,6 +51,8 @@ class MotionRequest:
     """Base (3,) and grasp or place (4, 4) that are tried first."""
     style: GraspStyle = "any"
     """What the place where a grasped item goes next asks for."""
+    base: np.ndarray | None = None
+    """Base (3,) from which a joint is moved; None: wherever that can be done."""
 
 
 class PlanAction:

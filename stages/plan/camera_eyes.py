@@ -1,5 +1,6 @@
 """A look through cameras: rendered depth pictures, masks that may be missed or wrong, and the planned shape fitted to
-the points of a mask. What is estimated is where a thing stands and how far a joint is open; shapes stay as planned."""
+the points of a mask. What is estimated is where a thing, or furniture with joints, stands and how far a joint is open;
+shapes stay as planned."""
 
 from __future__ import annotations
 
@@ -24,8 +25,10 @@ which is not there while the hand holds something. **Assumed**: the arm gets the
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
-POINTS = 1500
-"""Of a shape that is fitted."""
+POINTS, FURNITURE_POINTS = 1500, 3000
+"""Of a shape that is fitted; of each part of furniture."""
+MOST_MOVED = 0.1
+"""Furniture stands no farther from where it is believed [m]."""
 
 
 class CameraEyes:
@@ -62,24 +65,40 @@ class CameraEyes:
         if record.carriable:
             pose = fit_upright(points, apply(pose, self._model.points(body, POINTS))) @ pose
         else:
-            joints = self._opened(body, points, joints)
+            motion, joints = self._furniture(body, points, joints)
+            pose = motion @ pose
         return moved_record(record, pose, joints), text, planes
 
-    def _opened(self, body: str, points: np.ndarray, joints: dict[str, float]) -> dict[str, float]:
-        """Return the joint values at which the points (N, 3) fit furniture where it is believed, joint by joint."""
+    def _furniture(
+        self, body: str, points: np.ndarray, joints: dict[str, float]
+    ) -> tuple[np.ndarray, dict[str, float]]:
+        """Return how furniture stands from where it is believed (4, 4), and the joint values at which it fits the
+        points (N, 3), joint by joint: joints, place, and joints again, as an open door tells nothing of where a shut
+        one stands."""
         model, found = self._model, dict(joints)
         shapes = {
-            link: surface_points(meshes, POINTS, np.random.default_rng(0))[0]
+            link: surface_points(meshes, FURNITURE_POINTS, np.random.default_rng(0))[0]
             for link, meshes in link_shapes(model.text(body)).items()
         }
-        for joint in model.records[body].joints:
 
-            def points_at(value: float, name: str = joint.name) -> np.ndarray:
-                with model.joints_at(body, found | {name: value}):
-                    return np.concatenate([apply(model.world.link_pose(body, k), own) for k, own in shapes.items()])
+        def points_at(values: dict[str, float]) -> np.ndarray:
+            with model.joints_at(body, values):
+                return np.concatenate([apply(model.world.link_pose(body, k), own) for k, own in shapes.items()])
 
-            found[joint.name] = fit_joint(points, points_at, joint.lower, joint.upper)
-        return found
+        motion = np.eye(4)
+        for turn in range(2):
+            seen = apply(inverse(motion), points)
+            for joint in model.records[body].joints:
+
+                def of_joint(value: float, name: str = joint.name) -> np.ndarray:
+                    return points_at(found | {name: value})
+
+                found[joint.name] = fit_joint(seen, of_joint, joint.lower, joint.upper)
+            if turn == 0:
+                motion = fit_upright(points, points_at(found), as_believed=True)
+                if np.linalg.norm(motion[:3, 3] + (motion[:3, :3] - np.eye(3)) @ points.mean(axis=0)) > MOST_MOVED:
+                    return np.eye(4), found  # that is no error of a map: something else was fitted
+        return motion, found
 
     def _look_for(self, body: str, class_name: str) -> np.ndarray:
         """Return the points (N, 3) of the mask of its class that is nearest to where a body is believed, map frame."""

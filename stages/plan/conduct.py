@@ -127,7 +127,7 @@ class Conduct:
                 preferred = None if anchor is None else self._re_anchored(group[-1], anchor)
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style)
-                again = self.eyes is not None and self.eyes.again and action.tied_to is not None
+                again = self.eyes is not None and self.eyes.again
                 before = self.model.snapshot() if again else None
                 steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:
@@ -178,7 +178,8 @@ class Conduct:
         hold_for_checks(self.model, there)
         anchor = self._anchor(step)
         self._look(step.name, arguments)
-        assert anchor is not None and action.tied_to is not None
+        if anchor is None or action.tied_to is None:
+            return refine_action(self.model, there, step.name, replace(request, base=there.base), origin)
         shift = self.model.pose(arguments[action.tied_to])[:3, 3] - anchor[:3, 3]
         _, target = action.moved_along(self.model, arguments, step.manipulation, shift)
         return refine_action(self.model, there, step.name, replace(request, preferred=(there.base, target)), origin)

@@ -18,6 +18,7 @@ from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.rrt_connect import densify
 from stages.kit.motion.segments import Manipulation, Segment, whole_body
 from stages.kit.simulation.robot import Configuration, base_pose
+from stages.plan.action import MotionRequest
 from stages.plan.pick_place import Budgets
 from stages.plan.world_model import RobotState, WorldModel
 
@@ -76,16 +77,17 @@ def is_open(joint: Joint, value: float) -> bool:
 
 
 def plan_close(
-    model: WorldModel, state: RobotState, body: str, joint_name: str, budgets: Budgets, random: np.random.Generator
+    model: WorldModel, state: RobotState, body: str, joint_name: str, request: MotionRequest
 ) -> tuple[Manipulation, ...]:
-    """Return the motions that push a joint shut, one or two (from two places), base poses included.
+    """Return the motions that push a joint shut, one or two (from two places), base poses included; the first from the
+    base of the request, if it has one.
 
     Raises MotionFailed with what ended most attempts.
     """
     joint = model.joint(body, joint_name)
     value = model.joint_value(body, joint_name)
     tally = Tally()
-    search = JointSearch(model, state, body, joint, budgets, random, tally)
+    search = JointSearch(model, state, body, joint, request.budgets, request.random, tally, request.base)
     whole = _push(search, value, -OVERSHOOT)
     if whole is not None:
         return (whole,)
@@ -96,7 +98,7 @@ def plan_close(
             continue
         after = RobotState(first.base, first.segments[-1].path[-1, 3:])
         with model.joints_at(body, {joint_name: middle}):
-            second = _push(replace(search, state=after), middle, -OVERSHOOT)
+            second = _push(replace(search, state=after, base=None), middle, -OVERSHOOT)
         if second is not None:
             return first, second
     tally.raise_for(f"close({joint_name})", (body, joint_name))
@@ -104,7 +106,7 @@ def plan_close(
 
 
 def plan_open(
-    model: WorldModel, state: RobotState, body: str, joint_name: str, budgets: Budgets, random: np.random.Generator
+    model: WorldModel, state: RobotState, body: str, joint_name: str, request: MotionRequest
 ) -> tuple[Manipulation, ...]:
     """Return the motions that pull a joint open by its handle. Raises MotionFailed; `no_grasp` without a handle."""
     joint = model.joint(body, joint_name)
@@ -116,7 +118,7 @@ def plan_open(
     bar = np.array(joint.handle_axis) if joint.handle_axis is not None else np.array([0.0, 0.0, 1.0])
     roll = 0.0 if abs(bar[2]) > 0.5 else np.pi / 2
     tally = Tally()
-    search = JointSearch(model, state, body, joint, budgets, random, tally)
+    search = JointSearch(model, state, body, joint, request.budgets, request.random, tally, request.base)
     for end in (open_value(joint), max(0.65 * open_value(joint), 0.62 * joint.upper)):
         plan = _drag(search, contact, roll, value, end)
         if plan is not None:
@@ -140,15 +142,12 @@ def _tilts(count: int) -> Iterator[np.ndarray]:
                 yield np.linspace(start, end, count)
 
 
-def _candidate_bases(
-    model: WorldModel,
-    state: RobotState,
-    points: np.ndarray,
-    budgets: Budgets,
-    random: np.random.Generator,
-    tally: Tally,
-) -> np.ndarray:
-    """Return free bases (K, 3) from which all points (N, 3) lie within the arm's length."""
+def _candidate_bases(search: JointSearch, points: np.ndarray) -> np.ndarray:
+    """Return free bases (K, 3) from which all points (N, 3) lie within the arm's length; the one that is asked for."""
+    if search.base is not None:
+        return search.base[None]
+    model, state, budgets = search.model, search.state, search.budgets
+    random, tally = search.random, search.tally
     planner_reach = 0.98 * ArmPlanner(model, random, 1).reach
     middle, ring = points.mean(axis=0), {"nearest": 0.2, "farthest": 0.9, "heading": 1.2}
     bases = possible_bases(model.description, state.base, middle, model.room, budgets.bases, random, **ring)
@@ -180,6 +179,8 @@ class JointSearch:
     random: np.random.Generator
     tally: Tally
     """Counts what ended the attempts."""
+    base: np.ndarray | None = None
+    """Where the robot stands for it (3,); None: where it can."""
 
 
 def _push(search: JointSearch, start: float, end: float) -> Manipulation | None:
@@ -197,7 +198,7 @@ def _push(search: JointSearch, start: float, end: float) -> Manipulation | None:
         route = np.array(
             [apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values]
         )
-        bases = _candidate_bases(model, state, route, budgets, random, tally)
+        bases = _candidate_bases(search, route)
         for tilt in _tilts(len(values)):
             for roll in (0.0, np.pi / 2):
                 arc = Arc(body, joint, contact, values, tilt, roll, gap, 0.0, 0.0)
@@ -214,7 +215,7 @@ def _drag(search: JointSearch, contact: ContactPoint, roll: float, start: float,
     world_from_body = model.pose(body)
     values = _values(start, end)
     route = np.array([apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values])
-    bases = _candidate_bases(model, state, route, budgets, random, tally)
+    bases = _candidate_bases(search, route)
     opening = model.description.opening
     planner = ArmPlanner(model, random, budgets.path_samples)
     for tilt in _tilts(len(values)):

@@ -18,18 +18,20 @@ STEPS, FINE = 25, 9
 """Values of a joint that are tried over its range, and then around the best of them."""
 
 
-def fit_upright(seen: np.ndarray, shape: np.ndarray) -> np.ndarray:
+def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = False) -> np.ndarray:
     """Return the motion (4, 4), a turn about the vertical and a shift, that brings a shape onto points of it.
 
     `seen` (N, 3): points of the side that cameras saw; `shape` (M, 3): all around it, where it is believed. Trimmed
     iterated closest points from the seen points to the shape, so that its hidden side pulls at nothing. It starts with
-    the boxes' middles one over the other, tops level: a top is in sight more often than a foot.
+    the boxes' middles one over the other, tops level: a top is in sight more often than a foot; `as_believed`, where
+    it is believed: of what is large one side is in sight.
     """
     low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
     own_low, own_high = shape.min(axis=0), shape.max(axis=0)
     motion = np.eye(4)
-    motion[:2, 3] = (low + high - own_low - own_high)[:2] / 2
-    motion[2, 3] = high[2] - own_high[2]
+    if not as_believed:
+        motion[:2, 3] = (low + high - own_low - own_high)[:2] / 2
+        motion[2, 3] = high[2] - own_high[2]
     tree = cKDTree(shape)
     for _ in range(ROUNDS):
         back = (seen - motion[:3, 3]) @ motion[:3, :3]

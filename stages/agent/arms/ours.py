@@ -15,6 +15,7 @@ from stages.agent.arms.skills import CommonSkills
 from stages.agent.arms.stations import around, drivable, other_sides
 from stages.agent.body import Base, Body, Position
 from stages.agent.exploration import explore
+from stages.agent.goals import CARRIERS
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from stages.agent.scene_map import Item, quarter
 
@@ -260,6 +261,10 @@ class OwnSkills(CommonSkills):
                 self._told.add(item.key)
                 said = f"{item.key} may be a {item.label} or a {item.doubt}: {len(item.votes)} views do not agree"
                 return Outcome(False, "doubtful", said, label=item.doubt)
+            if item.disputed and item.key not in self._told:
+                self._told.add(item.key)
+                said = f"{item.key} looks like a {item.label}, but not from everywhere: also like a {item.disputed}"
+                return Outcome(False, "disputed", said, label=item.disputed)
         place, candidate, tries = item.place, 0, 0
         last: Failure | None = None
         for base in self._stations(place, item.position):
@@ -340,7 +345,7 @@ class OwnSkills(CommonSkills):
         """Look at the spot from two regions of views; say where it lies if not there."""
         item = self.holding
         assert item is not None
-        wanted = {vote for vote in item.votes.values() if vote}
+        wanted, believed = {vote for vote in item.votes.values() if vote}, item.label
         self.put(place, at)
         if not self._use.recheck:
             return Outcome(True)
@@ -349,7 +354,14 @@ class OwnSkills(CommonSkills):
         for close in (True, False):
             look = self._body.look(at, close=close)
             known = self.scene.matched(look.detections, place)
-            new = [d for d, other in zip(look.detections, known, strict=True) if d.label in wanted and other is None]
+            for d, other in zip(look.detections, known, strict=True):
+                if other is not None and other.label in CARRIERS:
+                    other.position = d.position  # the hand may have pushed it
+            new = [
+                d
+                for d, other in zip(look.detections, known, strict=True)
+                if d.label in wanted and (other is None or other.label != d.label)
+            ]
             near = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new]
             away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
             if seen is not None and away < BESIDE:
@@ -357,7 +369,8 @@ class OwnSkills(CommonSkills):
                 item.votes[quarter(self._body.base, seen.position), close] = seen.label
                 self.scene.items[item.key] = item
                 if away <= AWAY and self.scene.carrier_of(item) == over:
-                    return Outcome(True)
+                    said = "" if item.label == believed else f"{item.key} looks like a {item.label} after all"
+                    return Outcome(True, message=said, label=item.label)
         self._off.append(at)
         if item.key in self.scene.items:
             return Outcome(False, "not_there", f"{item.key} lies beside {label}, not on it")

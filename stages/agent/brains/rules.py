@@ -40,7 +40,11 @@ class Style:
 
 
 class _GiveUp(Exception):
-    pass
+    word = "give_up"
+
+
+class _Ask(_GiveUp):
+    word = "ask"
 
 
 class RulesBrain:
@@ -62,15 +66,19 @@ class RulesBrain:
         """Those of them that the arm did not get."""
         self._doubted: dict[str, str] = {}
         """Key of what looked like something else in the hand -> as what."""
+        self._disputed: dict[str, str] = {}
+        """Key of what does not look like what is sought from everywhere -> like what else."""
         self._checked: set[str] = set()
         self._moved: set[str] = set()
         self._handled: set[str] = set()
         """Classes of things that were taken, which may be anywhere since."""
         self._at, self._turn, self._troubles = "", 0, 0
+        self._began = ""
+        """What the robot stood before at first: what is said of no furniture is meant of this."""
         self._lost: list[SceneObject] = []
         """Things that left the hand and were not seen again: nothing is done as long as one is missing."""
-        self._known: set[str] = set()
-        """Keys of all things that were ever on a map."""
+        self._known: set[tuple[str, str]] = set()
+        """Keys of all things that were ever on a map, with what they looked like."""
         self._held: SceneObject | None = None
         self._gathered = ""
         """Where things are being gathered."""
@@ -99,7 +107,7 @@ class RulesBrain:
                 except _Again:  # each marks a place as looked at
                     continue
         except _GiveUp as reason:
-            return Reply(str(reason), f"give_up({str(reason)!r})")
+            return Reply(str(reason), f"{reason.word}({str(reason)!r})")
 
     # ---- what came back ----
 
@@ -121,6 +129,7 @@ class RulesBrain:
         match called.name, value:
             case "explore_global", ObjectMap():
                 self._rooms, self._explored = {item.key: item for item in value}, True
+                self._at = ""  # exploring ends anywhere
             case "explore_local", ObjectMap():
                 self._mapped(value)
             case "report_observation", Observation():
@@ -143,13 +152,15 @@ class RulesBrain:
 
     def _mapped(self, found: ObjectMap) -> None:
         place = self._at or next((item.place for item in found), "")
-        self._at = place
+        self._at, self._began = place, self._began or place
         self._things = {k: t for k, t in self._things.items() if t.place != place}
         for item in found:
-            again = [lost for lost in self._lost if lost.label == item.label and item.key not in self._known]
+            again = [
+                lost for lost in self._lost if lost.label == item.label and (item.key, item.label) not in self._known
+            ]
             if again:
                 self._lost.remove(again[0])
-            self._known.add(item.key)
+            self._known.add((item.key, item.label))
             self._things[item.key] = item
             self._written[item.key] = f"{self._map_name(place)}[{item.key!r}]"
         self._looked[place] += 1
@@ -169,6 +180,9 @@ class RulesBrain:
             self._held = self._things.pop(thing.key)
             self._at = thing.place
             self._check = ("hand", thing, thing) if self._style.pictures else None
+            return
+        if outcome.kind == "disputed":
+            self._disputed[thing.key] = outcome.label
             return
         tries = self._trouble("grasp", thing.key)
         if outcome.kind == "lost":
@@ -196,7 +210,7 @@ class RulesBrain:
         if outcome.ok:
             on = target.key if target.label in CARRIERS else ""
             self._held = None
-            self._things[thing.key] = replace(thing, place=place, on=on)
+            self._things[thing.key] = replace(thing, place=place, on=on, label=outcome.label or thing.label)
             self._at = place
             if self._put_back:
                 self._put_back = False
@@ -339,7 +353,7 @@ class RulesBrain:
                 raise _GiveUp(f"there is no {goal.start}")
         if not self._held:
             all_of_them = goal.every or how == "place_among"
-            needed = starts if goal.start else [self._at] if all_of_them else []
+            needed = starts if goal.start else [self._began] if all_of_them and self._began else []
             unseen = [p for p in needed if self._looked[p] < (self._style.thorough if all_of_them else 1)]
             if unseen:
                 return self._go_and_look(unseen[0])
@@ -351,6 +365,8 @@ class RulesBrain:
         ]
         if self._held is None and ((there and not goal.every) or (goal.every and not away and there)):
             return None
+        if not goal.every:  # one is enough: rather another one, and nobody has to be brought a wrong one
+            away = [t for t in away if not self._may_be_other(t, what)]
         away.sort(key=lambda t: (t.place != self._at, -t.ahead, t.key))
         thing = self._held or next(iter(away), None)
         if thing is None:
@@ -448,6 +464,9 @@ class RulesBrain:
                 if self._looked[place] <= rounds and place not in self._rejected:
                     return self._go_and_look(place)
         seen = sum(1 for place in order if self._looked[place])
+        for thing in self._fitting(what):
+            if self._may_be_other(thing, what):
+                raise _Ask(f"is {thing.key} a {thing.label}, or a {self._disputed[thing.key]}?")
         raise _GiveUp(f"no {what.text} was found in {seen} places")
 
     def _no_way(self, onto: Description) -> Reply:
@@ -502,6 +521,10 @@ class RulesBrain:
     def _fitting(self, what: Description) -> list[SceneObject]:
         fitting = [t for t in self._things.values() if what.fits(t.label, t.color, t.used)]
         return [t for t in fitting if t.key not in self._rejected and t.doubt in ("", *what.labels)]
+
+    def _may_be_other(self, thing: SceneObject, what: Description) -> bool:
+        """Whether some view said that a thing is none of what is sought."""
+        return self._disputed.get(thing.key, thing.label) not in what.labels
 
     def _anyway(self, thing: SceneObject, goal: Goal) -> bool:
         """Whether what may as well be of a kind as not is brought: where all are to be, unless another goal is about

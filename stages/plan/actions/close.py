@@ -29,7 +29,7 @@ class Close(PlanAction):
     def manipulate(self, model: WorldModel, state: RobotState, request: MotionRequest) -> tuple[Manipulation, ...]:
         """Return the motions that push it shut. Raises MotionFailed as `plan_close` does."""
         joint = request.arguments[0]
-        return plan_close(model, state, model.owner(joint), joint, request.budgets, request.random)
+        return plan_close(model, state, model.owner(joint), joint, request)
 
     def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
         """The joint stands shut."""

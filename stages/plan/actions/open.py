@@ -29,7 +29,7 @@ class Open(PlanAction):
     def manipulate(self, model: WorldModel, state: RobotState, request: MotionRequest) -> tuple[Manipulation, ...]:
         """Return the motions that pull it open by its handle. Raises MotionFailed as `plan_open` does."""
         joint = request.arguments[0]
-        return plan_open(model, state, model.owner(joint), joint, request.budgets, request.random)
+        return plan_open(model, state, model.owner(joint), joint, request)
 
     def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
         """The joint stands open."""

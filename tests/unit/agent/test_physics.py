@@ -150,3 +150,26 @@ def test_a_way_goes_around_what_is_known() -> None:
     assert way is not None and way[0] == (0.5, 1.0) and way[-1] == (3.5, 1.0)
     assert max(y for _, y in way) > 2.9
     assert room.path(Base(0.5, 1.0, 0.0), (2.0, 1.0)) is None
+
+
+def test_who_stands_too_near_first_goes_away() -> None:
+    """Along a wall, not in its clearance all the way but out of it at once."""
+    room = ObstacleMap(Base(1.0, 0.3, 0.0), 2.7, 4.5)
+    room.add(Sweep(np.argwhere(np.ones((41, 41), bool)), np.array([(row, 0) for row in range(41)]), ()))
+    way = room.path(Base(1.0, 0.2, 0.0), (3.0, 0.9))
+    assert way is not None and all(y >= 0.29 for _, y in way[1:])
+    assert way[1][1] > way[0][1] and max(x for x, y in way if y < 0.29) < 1.2
+
+
+def test_what_is_put_into_a_box_does_not_drag_it_along() -> None:
+    box = Thing(name="fruit-box_0", label="fruit box", on="table_0", at=(2.3, 2.35), carries=True, radius=0.13)
+    apartment = APARTMENT.model_copy(update={"things": (THINGS[0], box)})
+    body = PhysicsBody(apartment, ("apple", "fruit box"), NO_ERRORS, 3)
+    body.sweep()
+    seen = {d.label: d for d in body.look(ABOVE, close=False).detections}
+    x, y, z = seen["fruit box"].position
+    assert body.grasp(seen["apple"].position, "apple", 0).ok
+    assert body.release((x - 0.06, y, z), "fruit box", gently=True).ok
+    assert body.bodies["apple_0"].on == "fruit-box_0"
+    assert np.hypot(*np.subtract(body.bodies["fruit-box_0"].at, box.at)) < 0.02
+    body.close()

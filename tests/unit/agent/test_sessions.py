@@ -318,6 +318,27 @@ def test_all_of_a_kind_is_claimed_only_of_what_was_looked_at(seed: int) -> None:
     assert score(trial.goals, "", session, world).success
 
 
+def test_what_not_every_view_takes_for_what_is_sought_is_asked_about_and_not_brought() -> None:
+    """Seed 23: most views take something for the teapot that there is not, one does not."""
+    trial = setting("absent_teapot", 23, Rates())
+    session, world = run_trial(trial, "ours")
+    assert session.end == "ask" and "teapot" in session.words
+    assert score(trial.goals, "teapot", session, world).success
+
+
+def test_what_looks_like_something_else_once_it_lies_there_is_not_claimed() -> None:
+    """Seed 13: a fruit that was taken for a toy looks like a fruit again in the box of the toys."""
+    session, _ = run_trial(setting("tidy_table", 13, Rates()), "ours")
+    assert session.end == "give_up" and "may be a banana" in session.words
+
+
+def test_a_box_is_not_matched_to_what_lies_in_it() -> None:
+    scene = ARMS["ours"].skills(FastWorld(empty(TABLE), ("banana",), NOTHING_FAILS, 0)).scene
+    banana = scene.add(Detection("banana", (2.0, 2.6, 0.76), "", None, 0.07), "table_0", (0, False))
+    assert scene.matched((Detection("fruit box", (2.01, 2.6, 0.76), "", None, 0.13),), "table_0") == [None]
+    assert scene.matched((Detection("lemon", (2.01, 2.6, 0.76), "", None, 0.07),), "table_0") == [banana]
+
+
 def test_one_cup_has_no_middle() -> None:
     trial = setting("fruit_among_cups", 300)
     cups = [thing.name for thing in trial.apartment.things if thing.label == "cup"]

@@ -12,7 +12,7 @@ import pytest
 from pydantic import Field
 
 from benchmarks import code_digest as digesting
-from benchmarks import discovery, keeping
+from benchmarks import command, discovery, keeping
 from benchmarks.code_digest import code_digest
 from benchmarks.command import run
 from benchmarks.discovery import experiment_files, load_experiment
@@ -207,3 +207,18 @@ def test_listing_imports_no_experiment(capsys) -> None:
     for file in experiment_files().values():
         assert discovery.summary_of(file).endswith("."), file
     assert not {name for name in set(sys.modules) - before if name.startswith("benchmarks.experiments.")}
+
+
+def test_what_is_published_is_whole_and_of_reporting_seeds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, folder = tmp_path / "out", tmp_path / "published"
+    folder.mkdir()
+    monkeypatch.setattr(command.publish, "__defaults__", (folder,))
+    for words in (["--quick"], ["--tuning"]):
+        with pytest.raises(UsageError, match="nothing is published"):
+            run(SMALL, ["small", "--out", str(tmp_path / words[0]), "--publish", *words])
+    assert run(SMALL, ["small", "--out", str(out), "--publish"]) == 0
+    made = json.loads((folder / "small.json").read_text())
+    assert made == json.loads((out / "figures.json").read_text())
+    assert "reporting" in made["notes"] and "FOLDER" in made["command"] and "--publish" not in made["command"]

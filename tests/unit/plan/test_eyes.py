@@ -100,6 +100,25 @@ def test_camera_eyes_fit_what_is_carried_and_know_no_truth(sight: SimpleNamespac
     assert eyes(NEVER).seen("table_3", "") is None
 
 
+def test_camera_eyes_find_furniture_nearer_than_it_was_believed(sight: SimpleNamespace) -> None:
+    """The fridge stands 4 cm nearer than in the map: its front says so, and its door is as far open as it is."""
+    robot, true = load_robot("panda"), sight.world.pose("fridge_2")
+    sight.robot.put(Configuration(np.array([0.0, 1.5, 0.0]), robot.carry, robot.opening))
+    believed = true.copy()
+    believed[0, 3] += 0.04
+    sight.model.world.set_pose("fridge_2", believed)
+    pictures = RoomPictures(sight.world, sight.room.records, sight.room.texts, load_robot("panda"))
+    random = np.random.default_rng(0)
+    seen = CameraEyes(sight.model, sight.room, pictures, sight.robot, NEVER, random, 0.5).seen("fridge_2", "")
+    assert seen is not None
+    pose = inverse(sight.robot.map_from_true()) @ np.array(seen[0].world_from_body)
+    assert pose[0, 3] == pytest.approx(true[0, 3], abs=0.012)
+    assert pose[:3, 3] == pytest.approx(true[:3, 3], abs=0.04)  # along its front the points say little
+    assert seen[0].joint_values["fridge_2__hinge"] == pytest.approx(
+        sight.world.joint_value("fridge_2", "fridge_2__hinge"), abs=0.1
+    )
+
+
 def test_a_robot_that_errs_stops_beside_where_it_was_sent_and_goes_back_as_believed(sight: SimpleNamespace) -> None:
     arm = load_robot("panda").carry
     rows = np.array([[-1.29, -0.22, -np.pi / 2, *arm], [-1.29, 0.3, -np.pi / 2, *arm]])

@@ -224,7 +224,9 @@ def test_a_door_that_something_blocks_cannot_be_shut(tmp_path: Path) -> None:
     model, _ = model_of(tmp_path, [*kitchen(), crate])
     try:
         with pytest.raises(MotionFailed) as raised:
-            plan_close(model, START, "fridge_2", "fridge_2__hinge", BUDGETS, np.random.default_rng(0))
+            plan_close(
+                model, START, "fridge_2", "fridge_2__hinge", MotionRequest((), BUDGETS, np.random.default_rng(0))
+            )
     finally:
         model.close()
     failure = raised.value.failure

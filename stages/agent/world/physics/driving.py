@@ -6,7 +6,8 @@ from math import atan2, pi
 
 import numpy as np
 
-from stages.agent.body import Base, Felt
+from stages.agent.body import Base, Felt, Sweep
+from stages.agent.obstacle_map import cell_of
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.agent.world.physics.seen import Seen
 from stages.kit.motion.failures import MotionFailed
@@ -15,6 +16,10 @@ from stages.kit.motion.segments import Segment
 from stages.kit.simulation.engine import engine
 from stages.kit.simulation.robot import Configuration
 
+TRIES = 6
+"""Ways that are tried on one drive, each around what was touched on those before."""
+TOUCHES = 0.001
+"""Contacts less deep do not count [m]."""
 STEP = 0.05
 """Between poses of the base at which collisions are looked for [m]."""
 
@@ -28,23 +33,32 @@ class Driving:
     def drive(self, base: Base, length: float, toward: str) -> Felt:
         """Drive along the robot's own map; with empty hands it is moved and asked for contacts, not simulated."""
         goal = np.array([base.x, base.y, base.yaw])
-        way = self._seen.obstacles.path(self._robot.base, (base.x, base.y))
-        failed = MotionFailed("no_way", "the obstacle map shows no way there") if way is None else None
-        if way is not None:
+        error = stop_error(self._robot.random)
+        turns_there = bool(toward) or self._seen.obstacles.at_ease(base.x, base.y)  # its head turns anywhere
+        failed: MotionFailed | None = None
+        rows: list[np.ndarray] = []
+        for number in range(TRIES):
+            way = self._seen.obstacles.path(self._robot.base, (base.x, base.y))
+            if way is None:
+                failed = failed or MotionFailed("no_way", "the obstacle map shows no way there")
+                break
             if not np.allclose(self._robot.arm, self._robot.description.carry):
                 self._robot.arm_to(self._robot.description.carry)
-            error = stop_error(self._robot.random)
             points = [np.array([*point, 0.0]) - self._robot.error for point in way[1:-1]]
             ease = [self._seen.obstacles.at_ease(*point) for point in way[1:-1]]
-            for turns in (ease, [False] * len(ease), [True] * len(ease)):
-                start = self._robot.true_base()
-                failed = self._roll_along(start, _facing_on(start, points, turns, goal - error))
-                if failed is None:
-                    break
-            self._robot.error = error
-            self._robot.believed = goal if failed is None else self._robot.true_base() + error
-            self._robot.believed[2] = (self._robot.believed[2] + pi) % (2 * pi) - pi
-            self._robot.metres += length
+            turns = (ease, [False] * len(ease), [True] * len(ease))[number % 3]
+            start = self._robot.true_base()
+            rows = _facing_on(start, points, [*turns, turns_there], goal - error)
+            failed = self._roll_along(start, rows)
+            if failed is None:
+                break
+            self._robot.believed = self._robot.true_base() + self._robot.error
+            if not points and number:
+                break  # it is there but for the turn
+        self._robot.error = error
+        self._robot.believed = (rows[-1] if failed is None else self._robot.true_base()) + error
+        self._robot.believed[2] = (self._robot.believed[2] + pi) % (2 * pi) - pi
+        self._robot.metres += length
         if toward:
             self._robot.log.done("drive", f"drive to {toward.rsplit('_', 1)[0]}", failed is None, "navigation", "")
         return Felt(True) if failed is None else Felt(False, "no_way", failed.failure)
@@ -60,29 +74,44 @@ class Driving:
             return None
         here = start
         opening = self._robot.driver.robot.configuration().opening
+        before = self._touched()  # what it leans on already does not keep it from going away
         for row in rows:
             count = max(1, int(np.ceil(np.abs(row - here)[:2].max() / STEP)))
             for k in range(1, count + 1):
                 at = here + (row - here) * k / count
                 self._robot.driver.robot.set_body(np.concatenate([at, arm]))
-                struck = self._struck()
-                if struck:
+                now = self._touched()
+                struck = next((name for name, depth in now.items() if depth > before.get(name, TOUCHES)), None)
+                before = now
+                if struck is not None:
+                    self._remember(struck)
                     back = here + (row - here) * (k - 1) / count
                     self._robot.driver.put(Configuration(back, arm, opening))
-                    return MotionFailed("path_blocked", f"the base touched {struck}", (struck,))
+                    what = self._robot.room.world.bodies[struck].record.class_name
+                    return MotionFailed("path_blocked", f"the base touched {what}", (what,))
             self._robot.seconds_aside += float(np.linalg.norm((row - here)[:2])) / self._robot.description.base_speed
             here = row
         self._robot.driver.put(Configuration(here, arm, opening))
         self._robot.seconds_aside += 1.0
         return None
 
-    def _struck(self) -> str:
-        engine.performCollisionDetection(physicsClientId=self._robot.room.world.client)
-        for contact in self._robot.room.world.contacts(self._robot.driver.robot.body_id):
-            name = self._robot.room.world.name_of(contact.other_body)
-            if name is not None and name != "floor" and contact.depth > 0.001:
-                return self._robot.room.world.bodies[name].record.class_name
-        return ""
+    def _remember(self, struck: str) -> None:
+        """Enter into the map where the base was felt to touch something that the eyes took for free."""
+        contacts = self._robot.room.world.contacts(self._robot.driver.robot.body_id)
+        of_it = [c for c in contacts if self._robot.room.world.name_of(c.other_body) == struck and c.depth > TOUCHES]
+        cells = {cell_of(*(c.point[:2] + self._robot.error[:2])) for c in of_it}
+        self._seen.obstacles.add(Sweep(np.zeros((0, 2), int), np.array(sorted(cells), int).reshape(-1, 2), ()))
+
+    def _touched(self) -> dict[str, float]:
+        """Return what the robot stands in, the floor aside, and how deep [m]."""
+        world = self._robot.room.world
+        engine.performCollisionDetection(physicsClientId=world.client)
+        depths: dict[str, float] = {}
+        for contact in world.contacts(self._robot.driver.robot.body_id):
+            name = world.name_of(contact.other_body)
+            if name is not None and name != "floor" and contact.depth > TOUCHES:
+                depths[name] = max(contact.depth, depths.get(name, 0.0))
+        return depths
 
 
 def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
@@ -92,13 +121,16 @@ def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
 
 def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:
     """Return base poses (3,) through points to a goal pose that turn little from each to the next: along the way at
-    points where it `turns`, as before at the others, for the base drives to any side."""
+    points where it `turns`, and as the goal says there if it does, as before at the others, for the base drives to any
+    side."""
     made: list[np.ndarray] = []
     before = start
-    for point, turn in zip([*points, goal], [*turns, True], strict=True):
+    for point, turn in zip([*points, goal], turns, strict=True):
         turned = point.copy()
-        if len(made) < len(points):
-            turned[2] = atan2(point[1] - before[1], point[0] - before[0]) if turn else before[2]
+        if not turn:
+            turned[2] = before[2]
+        elif len(made) < len(points):
+            turned[2] = atan2(point[1] - before[1], point[0] - before[0])
         turned[2] = before[2] + (turned[2] - before[2] + pi) % (2 * pi) - pi
         made.append(turned)
         before = turned

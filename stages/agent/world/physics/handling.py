@@ -12,6 +12,7 @@ from stages.agent.world.physics.hands import (
     JUST_OVER,
     SOME_WAY_OVER,
     Motion,
+    Spot,
     Target,
     plan_grasp,
     plan_release,
@@ -54,7 +55,7 @@ class Handling:
             self._recover()
             self._robot.log.done("grasp", step, False, "grasp", "")
             return Felt(False, _felt_kind(failed), failed.failure)
-        held = self._robot.driver.held
+        held = self._robot.driver.held or self._between_the_fingers()
         self._robot.carried = held
         right = held is not None and self._robot.room.things[held].label == label
         cause = "grasp" if held is None else "false_positive"
@@ -112,6 +113,10 @@ class Handling:
         except (MotionFailed, KeyError):
             self._robot.driver.held = None
 
+    def _between_the_fingers(self) -> str | None:
+        """What turned or slid in the hand is in it all the same."""
+        return next((name for name in self._loose() if self._robot.driver.robot.grasps(name)), None)
+
     def _loose(self) -> list[str]:
         return [name for name in self._robot.room.things if name in self._robot.room.world.bodies]
 
@@ -135,8 +140,8 @@ class Handling:
             self._robot.hold = None
             self._robot.log.done("release", step, False, "", "")
             return Felt(True)
-        here = (at[0], at[1], self._seen.support(at))
-        self._robot.beliefs.show(self._seen.boxes(at))
+        support = self._seen.support(at)
+        here = Spot((at[0], at[1], support), self._seen.rim(at, support), self._seen.boxes(), self._seen.boxes(at))
         try:
             self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:
@@ -149,8 +154,8 @@ class Handling:
         self._robot.log.done("release", step, on == label, "place", "")
         return Felt(True)
 
-    def _way_down(self, here: Position, heights: tuple[float, ...]) -> Motion:
-        """Plan to let go at the first of the heights over a position that can be got to. Raises MotionFailed."""
+    def _way_down(self, here: Spot, heights: tuple[float, ...]) -> Motion:
+        """Plan to let go at the first of the heights over a spot that can be got to. Raises MotionFailed."""
         for number, height in enumerate(heights):
             try:
                 return plan_release(

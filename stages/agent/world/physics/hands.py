@@ -32,6 +32,8 @@ DROP = 0.15
 """Height over its target at which the thesis lets go [m]."""
 JUST_OVER = 0.008
 """Height at which ours does, if nothing was touched before [m]."""
+UP, OVER_RIM = 0.06, 0.015
+"""Of the hand from where it lets go before it goes anywhere else, and of what it holds over the rim of a box [m]."""
 SOME_WAY_OVER = 0.06
 """Height at which ours does where the hand has no room farther down [m]."""
 TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6))
@@ -39,6 +41,8 @@ TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 
 SLOW = 0.35
 SAMPLES = 500
 """Of one path search."""
+HELD = "held"
+"""Name of the box of what is in the hand."""
 Box = tuple[np.ndarray, np.ndarray]
 
 
@@ -92,9 +96,10 @@ class Beliefs:
         self.world.close()
 
     def show(self, boxes: dict[str, Box]) -> None:
-        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, and in nothing else."""
+        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, and in nothing else
+        but what is held."""
         wanted = {name: (*np.round(low, 3), *np.round(high, 3)) for name, (low, high) in boxes.items()}
-        for name in [name for name, box in self._boxes.items() if wanted.get(name) != box]:
+        for name in [n for n, box in self._boxes.items() if n != HELD and wanted.get(n) != box]:
             self.world.remove_body(name)
             del self._boxes[name]
         for name, box in wanted.items():
@@ -107,17 +112,17 @@ class Beliefs:
     def hold(self, hold: Hold | None) -> None:
         """Let checks carry the box of what is held."""
         self.checker.put_down()
-        if "held" in self._boxes:
-            self.world.remove_body("held")
-            del self._boxes["held"]
+        if HELD in self._boxes:
+            self.world.remove_body(HELD)
+            del self._boxes[HELD]
         if hold is None:
             return
         half = hold.size / 2
         part = slab(tuple(-half), tuple(half))  # type: ignore[arg-type]
-        self.world.add_body(record_of("held", "box", (0, 0, 0), 0), urdf_of("held", (part,), 1.0))
-        self.checker.add_body("held")
-        self._boxes["held"] = tuple(half)
-        self.checker.carry("held", hold.tool_from_box)
+        self.world.add_body(record_of(HELD, "box", (0, 0, 0), 0), urdf_of(HELD, (part,), 1.0))
+        self.checker.add_body(HELD)
+        self._boxes[HELD] = tuple(half)
+        self.checker.carry(HELD, hold.tool_from_box)
 
 
 def reachable(beliefs: Beliefs, base: np.ndarray, at: tuple[float, float, float], random: np.random.Generator) -> bool:
@@ -222,7 +227,7 @@ def _one_grasp(
     hold = Hold(high - low, inverse(map_from_tool) @ box, float(map_from_tool[2, 3] - low[2]), map_from_tool[:3, :3])
     beliefs.world.set_pose(name, _far())
     beliefs.hold(hold)
-    checker.allow(touch=("held",))
+    checker.allow(touch=(HELD,))
     home = planner.path(base, lift[-1], beliefs.description.carry)
     return Motion(
         (Segment(whole_body(base, reach), opening), Segment(whole_body(base, approach[::-1]), opening, SLOW)),
@@ -237,25 +242,40 @@ def _far() -> np.ndarray:
     return pose
 
 
+@dataclass(frozen=True)
+class Spot:
+    """Where something is let go."""
+
+    at: tuple[float, float, float]
+    """On what was seen there, in the map [m]."""
+    rim: float
+    """Height of the top of what is around it, as of a box that it is put into [m]."""
+    around: dict[str, Box]
+    """All that stands there."""
+    beside: dict[str, Box]
+    """The same without what covers the spot, which the hand comes down into."""
+
+
 def plan_release(
     beliefs: Beliefs,
     base: np.ndarray,
     arm: np.ndarray,
     hold: Hold | None,
-    at: tuple[float, float, float],
+    spot: Spot,
     height: float,
     random: np.random.Generator,
 ) -> Motion:
-    """Return the motion that lets go with the foot of what is held `height` [m] over a position in the map.
-
-    Raises MotionFailed with what ended most attempts.
+    """Return the motion that lets go with the foot of what is held `height` [m] over a spot: to over the rim around it,
+    straight down, and back. Raises MotionFailed with what ended most attempts.
     """
+    at, up = spot.at, max(UP, spot.rim + OVER_RIM - spot.at[2] - height)
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     opening, carry = beliefs.description.opening, beliefs.description.carry
     foot = hold.foot if hold is not None else 0.0
     beliefs.hold(hold)
     beliefs.robot.set(Configuration(base, arm, opening))
-    beliefs.checker.allow(touch=("held",) if hold is not None else ())
+    beliefs.checker.allow(touch=(HELD,) if hold is not None else ())
+    beliefs.show(spot.beside)
     heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
     try:
         for turn, tilt in TURNS:
@@ -265,10 +285,11 @@ def plan_release(
             if goal is None or not planner.free(base, goal, tally):
                 continue
             above = pose.copy()
-            above[2, 3] += 0.06
+            above[2, 3] += up
             down = planner.line(base, goal, above, tally)
             if down is None:
                 continue
+            beliefs.show(spot.around)
             try:
                 reach = planner.path(base, arm, down[-1])
                 back = planner.path(base, down[-1], carry)
@@ -279,7 +300,7 @@ def plan_release(
                 (Segment(whole_body(base, reach), 0.0, 0.6), Segment(whole_body(base, down[::-1]), 0.0, SLOW)),
                 (Segment(whole_body(base, down), opening, SLOW), Segment(whole_body(base, back), opening)),
             )
-        tally.raise_for("place", ("held",))
+        tally.raise_for("place", (HELD,))
     finally:
         beliefs.hold(None)
         beliefs.checker.allow()

@@ -104,12 +104,16 @@ class Seen:
                 )
         for number, surface in enumerate(self.surfaces):
             low, high = surface.low, surface.high
-            covers = without is not None and bool(
-                np.all((np.array(without[:2]) > low[:2] - 0.03) & (np.array(without[:2]) < high[:2] + 0.03))
-            )
-            if not covers and np.hypot(*(surface.middle - [*self._robot.believed[:2], 0])[:2]) < AROUND:
+            if (
+                not (without is not None and _covers(surface, without))
+                and np.hypot(*(surface.middle - [*self._robot.believed[:2], 0])[:2]) < AROUND
+            ):
                 boxes[f"thing_{number}"] = (low, high)
         return boxes
+
+    def rim(self, at: Position, support: float) -> float:
+        """Return the height [m] of the top of what was seen around a position, `support` where that is nothing."""
+        return max([support, *(float(s.high[2]) for s in self.surfaces if _covers(s, at))])
 
     def support(self, at: Position) -> float:
         """Return the height [m] of what was seen at a position: of a thing there, else of the furniture."""
@@ -121,3 +125,9 @@ class Seen:
         if piece is None:
             return at[2]
         return self.tops.get(piece, float(self.pieces[piece].box[1][2]))
+
+
+def _covers(surface: Surface, at: Position) -> bool:
+    """Whether a position is within the outline of a surface, or a finger's breadth from it."""
+    low, high, point = surface.low[:2], surface.high[:2], np.array(at[:2])
+    return bool(np.all((point > low - 0.03) & (point < high + 0.03)))
