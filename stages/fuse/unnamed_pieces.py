@@ -66,7 +66,12 @@ def unnamed_pieces(
     parts = _components(points, voxel, None if proposed is None else proposed[members])
     whole = set() if proposed is None else set(parts[proposed[members] > 0].tolist())
     parts, standing = _cut_at_tops(points, normals[members], parts, voxel)
-    named = [vertices[instance == name] for name in np.unique(instance[(instance > 0) & ~room])]
+    names = np.where(room, 0, instance)
+    for _, top in _tops(vertices, normals, names, voxel):
+        if names[top[0]] > 0:
+            level, footprint = float(np.median(vertices[top, 2])), _Footprint(vertices[top, :2], voxel)
+            standing |= _standing_on(level, footprint, points, parts)
+    named = [vertices[names == name] for name in np.unique(names[names > 0])]
     alone = ~_of_named(points, parts, named)
     members, points, parts = members[alone], points[alone], parts[alone]
     parts = _joined(points, normals[members], parts, standing, whole, voxel, minimum_area)
@@ -76,7 +81,7 @@ def unnamed_pieces(
         extent = np.ptp(vertices[own], axis=0)
         large = len(own) * voxel**2 >= minimum_area and extent[:2].max() >= SMALLEST
         high = extent[2] >= LEAST_HEIGHT and vertices[own, 2].min() < CEILING
-        if (large and high) or (len(own) >= FEWEST and (part in whole or (part in standing and high))):
+        if (large and high) or (len(own) >= FEWEST and part in standing | whole):
             kept.append(own)
     for number, own in enumerate(sorted(kept, key=lambda own: (-len(own), own[0])), 1):
         piece[own] = number
@@ -167,7 +172,18 @@ def _cut_at_tops(
                 beside &= ~inside & _Footprint(points[own[beside & rising], :2], voxel).holds(points[own])
             result[own[beside]] = after
             after += 1
+        standing |= _standing_on(level, footprint, points, result)
     return result, standing
+
+
+def _standing_on(level: float, footprint: _Footprint, points: np.ndarray, parts: np.ndarray) -> set[int]:
+    """Return the parts that begin on a level top and lie over it."""
+    found = set()
+    for part in np.unique(parts[(points[:, 2] > level) & footprint.holds(points)]):
+        own = points[parts == part]
+        if own[:, 2].min() > level - RISE and footprint.holds(own).mean() > 0.5:
+            found.add(int(part))
+    return found
 
 
 def _cells(points: np.ndarray, voxel: float) -> np.ndarray:
