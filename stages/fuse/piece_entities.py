@@ -59,8 +59,8 @@ def by_geometry(
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return entities and labels in a place where masks name nothing; as they are without a floor.
 
-    Walls are what geometry says, and things (all of the class `unnamed` here) are but proposals to it. A piece has the
-    segments of the thing that most of it was proposed as, and none where no thing was.
+    Walls are what geometry says, and things (all of the class `unnamed` here) are but proposals to it. The largest
+    piece of what was proposed as one thing has its segments, others have none.
     """
     vertices = _over_floor(surface, labelled, classes)
     if vertices is None:
@@ -94,12 +94,11 @@ def by_geometry(
     found, result = _with_pieces(
         surface, kept, LabelledSurface(labelled.segment, class_id, instance), piece, classes.unnamed
     )
-    by_number = {e.instance: e for e in entities}
-    for place in range(len(kept), len(found)):
-        of = np.bincount(proposed[result.instance == found[place].instance])
-        if of.argmax() in by_number:
-            whose = by_number[int(of.argmax())]
-            found[place] = replace(whose, instance=found[place].instance, mesh=found[place].mesh)
+    unused = {e.instance: e for e in entities if e.class_id == classes.unnamed}
+    for place in range(len(kept), len(found)):  # the largest piece first
+        most = int(np.bincount(proposed[result.instance == found[place].instance]).argmax())
+        if most in unused:
+            found[place] = replace(unused.pop(most), instance=found[place].instance, mesh=found[place].mesh)
     return found, result
 
 
