@@ -333,7 +333,7 @@ pictures: setup ## Take the pictures of README and gallery out of the demo run
 .PHONY: train-network bench-network
 # Hours for the frames and more for the training, on one core each; minutes with OPTIONS="--device cuda --workers 12". Stop it and start
 # it again at will.
-train-network: setup ## Make the second network of `segment --backend network` anew (QUICK=1: proves the recipe in a minute or two)
+train-network: setup ## Train a network for `segment --backend network` (QUICK=1: proves the recipe in a minute or two)
 	$(PYTHON) -m benchmarks.training $(if $(QUICK),--quick) $(OPTIONS) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-network$(if $(QUICK),-quick)
 
 bench-network: setup ## Our own network on rooms held back, real clouds and real logs (QUICK=1: fewer frames)

@@ -36,7 +36,7 @@ from stages.kit.measurement.panoptic_quality import ClassQuality, average_qualit
 from stages.kit.stage import Parameters
 from stages.segment.backends.network.backend import Predictor, load_predictor
 from stages.segment.backends.network.features import mount_of_pose
-from stages.segment.backends.network.weights import GENERATED
+from stages.segment.backends.network.weights import BUNDLED
 from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import segment_depth
 from stages.segment.panoptic import PanopticFrame
@@ -72,7 +72,7 @@ class NetworkParameters(Parameters):
     """Options of the experiment."""
 
     data: Path = Field(Path("../shared/data"), description="Folder with the real logs")
-    weights: Path = Field(GENERATED, description="Checkpoint of the network")
+    weights: Path = Field(BUNDLED, description="Checkpoint of the network")
     rooms: Path | None = Field(None, description="Folder of rooms; otherwise made in OUT/rooms")
     frames: int = Field(20, ge=1, description="Frames of every room")
     thinned: int = Field(1, ge=1, description="Frames of real logs are looked at so many times more rarely")

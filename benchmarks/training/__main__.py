@@ -75,7 +75,7 @@ def main() -> int:
         lines.append(f"| {name} | " + " | ".join(f"{100 * v:.1f}" for v in values.values()) + f" | {mean.classes} |")
     lines += ["", f"{predictor.checkpoint.description}; {len(frames)} validation frames."]
     write_measured(out, metrics, "\n".join(lines) + "\n")
-    print(f"to ship it: cp {weights} data/networks/panoptic_varied.safetensors")
+    print(f"to ship it: cp {weights} data/networks/panoptic.safetensors")
     return 0
 
 

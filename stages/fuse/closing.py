@@ -13,14 +13,12 @@ from stages.fuse.counts import TripleCounts
 from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
+from stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
 from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.strange_places import without_doubtful
+from stages.fuse.strange_places import thing_score, without_names
 from stages.fuse.surface import Surface, extract_surface
-from stages.fuse.unnamed_pieces import unnamed_pieces
-from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name
+from stages.kit.formats.map_files import mesh_name
 from stages.kit.stage import Progress
-
-LAYOUT = ("floor", "wall", "ceiling")
 
 
 @dataclass(frozen=True)
@@ -61,45 +59,8 @@ def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
     )
 
 
-def with_unnamed_pieces(
-    surface: Surface,
-    entities: list[ExtractedEntity],
-    labelled: LabelledSurface,
-    layout: frozenset[int],
-    floor: int,
-    unnamed: int,
-    parameters: FuseParameters,
-) -> tuple[list[ExtractedEntity], LabelledSurface]:
-    """Return the entities and labels with the pieces of unnamed surface among them; as they are without a floor.
-
-    `layout`, `floor`, `unnamed`: class ids. Nobody voted for a piece: it has no segments, and no confidence.
-    """
-    level = surface.vertices[labelled.class_id == floor, 2]
-    if not len(level):
-        return entities, labelled
-    piece = unnamed_pieces(
-        surface.vertices - [0.0, 0.0, float(np.median(level))],
-        surface.faces,
-        labelled.instance,
-        np.isin(labelled.class_id, sorted(layout)),
-        voxel=parameters.voxel_size,
-        minimum_area=parameters.unnamed_area,
-    )
-    of_face, first = face_labels(piece, surface.faces), 1 + int(labelled.instance.max(initial=0))
-    found, number = list(entities), np.zeros(int(piece.max(initial=0)) + 1, np.int32)
-    for label in range(1, len(number)):
-        mesh = cut_mesh(surface, np.flatnonzero(of_face == label))
-        if len(mesh.faces):
-            number[label] = first + label
-            found.append(ExtractedEntity(first + label, unnamed, (), mesh, 0.0, 0))
-    new = number[piece] > 0
-    instance = np.where(new, number[piece], labelled.instance).astype(np.int32)
-    class_id = np.where(new, np.int32(unnamed), labelled.class_id)
-    return found, LabelledSurface(labelled.segment, class_id, instance)
-
-
 def is_strange(source: MaskSource, parameters: FuseParameters) -> bool:
-    """Whether the segmenter recognised so little of this place that only what most views agree on is to be believed."""
+    """Whether the segmenter recognised so little of this place that its names are not to be believed."""
     return source.recognised is not None and source.recognised < parameters.least_recognised
 
 
@@ -132,13 +93,20 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
         entities, labelled = extract_entities(
             surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
         )
-        if parameters.merging == "ours" and is_strange(source, parameters):
-            scores, things = grouping.class_scores, mapper.merging.things
-            entities, labelled = without_doubtful(entities, labelled, scores, mapper.sightings, things, unnamed)
+        strange = parameters.merging == "ours" and is_strange(source, parameters)
+        if strange:
+            things, scores = mapper.merging.things, grouping.class_scores
+            score_of = {e.instance: thing_score(e.segments, scores, things, mapper.sightings) for e in entities}
+            entities, labelled = without_names(entities, labelled, score_of, things, unnamed)
         if parameters.unnamed_area > 0 and parameters.merging == "ours":
-            layout = frozenset(entry.id for entry in vocabulary.classes if entry.name in LAYOUT)
-            floor = vocabulary.by_name("floor").id
-            entities, labelled = with_unnamed_pieces(surface, entities, labelled, layout, floor, unnamed, parameters)
+            entities, labelled = (by_geometry if strange else with_unnamed_pieces)(
+                surface,
+                entities,
+                labelled,
+                Classes(*(vocabulary.by_name(name).id for name in ("floor", "wall", "ceiling", UNNAMED))),
+                voxel=parameters.voxel_size,
+                minimum_area=parameters.unnamed_area,
+            )
     file = EntitiesFile(
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,

@@ -106,7 +106,7 @@ class FuseParameters(Parameters):
         ge=0,
         le=1,
         description="`ours`: where our own network recognised less than this share of what it took for things, its "
-        "masks and names count only where most views agree (0: everywhere)",
+        "names are not believed, walls are what geometry says and its masks are proposals (0: always believed)",
     )
     unnamed_area: float = Field(
         0.2,
@@ -147,7 +147,7 @@ def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="fuse",
-    version=6,
+    version=7,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={

@@ -1,30 +1,20 @@
 """Surface that no mask named, cut into pieces: what stands free in a room is a thing, whatever it is.
 
 Ours; the thesis leaves unnamed surface out of its entities. A detector names what it was taught; the counter, the crate
-and the chair whose back alone was seen are there all the same, and a robot must not drive into them.
+and the chair whose back alone was seen are there all the same, and a robot must not drive into them. Where masks are
+not to be relied on they propose parts, and geometry says what becomes of them.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from stages.kit.geometry.point_clouds import vertex_normals
-
-LEVEL, UPRIGHT = 0.9, 0.25
-"""Cosines to the vertical: what faces up has more, what stands upright less."""
-WALL_SEEN_BELOW, WALL_SEEN_ABOVE = 1.0, 1.95
-"""A wall is a plane that is seen below and above these heights [m]: fridges end between them."""
-COLUMN, COLUMN_AREA = 0.15, 0.01
-"""Width [m] of the columns that walls are made of, and what of one has to be seen low, and high [m^2]."""
-OPENING = 1.2
-"""Wider gaps between columns end a wall [m]."""
-WALL_DEPTH, BEHIND = 0.12, 4
-"""What lies no farther before a wall belongs to it: frames, switches, radiators [m]; and so many times that behind."""
-DIRECTIONS = 72
-"""Of walls."""
+LEVEL = 0.9
+"""Cosine to the vertical that what faces up has at least."""
 CEILING = 2.2
 """Pieces that begin higher are of the ceiling [m]."""
 FLOOR = 0.06
@@ -33,12 +23,18 @@ LOWEST_TOP, LEAST_TOP_AREA = 0.6, 0.25
 """Height [m] and area [m^2] of a level top on which other things stand; seats are lower."""
 SAME_LEVEL = 0.03
 """[m]"""
+RISE = 1.5 * SAME_LEVEL
+"""What is higher than this over a level top is not of it; so is what bends away from it a voxel above [m]."""
+APRON = 0.15
+"""What hangs together with a thing so far under its top is its body [m]."""
+SHADOW = 0.15
+"""Gaps in a level top this wide are of it: what stands there hides it [m]."""
 STACKED_SHARE, STACKED_GAP = 0.5, 0.35
 """Pieces above each other with this share of the smaller footprint in common, and this gap at most [m], are one."""
-FEWEST_JOINED = 50
-"""Vertices of a part that is joined with others."""
+FEWEST = 50
+"""Vertices of a part that is looked at, and of a thing on a level top."""
 SCRAP_SHARE, SCRAP_DISTANCE = 0.25, 0.1
-"""A part smaller than this share of another, and this close to it [m], is a scrap of it."""
+"""A part that is no piece by itself, smaller than this share of another and this close to it [m], is a scrap of it."""
 WITHIN, BESIDE = 0.6, 0.1
 """A piece is left to the named thing under or over which this share of it lies, or as far beside it [m]."""
 TOP = 0.75
@@ -49,98 +45,145 @@ SMALLEST, LEAST_HEIGHT = 0.1, 0.06
 
 def unnamed_pieces(
     vertices: np.ndarray,
-    faces: np.ndarray,
+    normals: np.ndarray,
     instance: np.ndarray,
-    layout: np.ndarray,
+    room: np.ndarray,
     *,
     voxel: float,
     minimum_area: float,
+    proposed: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return the piece of every vertex (V,), from 1 in the order of size; 0 for what is named or of the room itself.
 
-    vertices (V, 3) [m], z up, the floor at 0; faces (F, 3); instance (V,), 0 where no mask named the surface; layout
-    (V,): what masks named floor, wall or ceiling; `voxel` [m]. Left out is what has less than `minimum_area` [m^2], and
+    vertices (V, 3) [m], z up, the floor at 0; normals (V, 3); instance (V,), 0 where no mask named the surface; `room`
+    (V,): floor, walls and ceiling; `proposed` (V,): what doubtful masks took for one thing each, 0 for none; `voxel`
+    [m]. Left out is what has less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and
     what lies within the outline of a named thing and begins below its top: a leg, or a leaf that its mask missed.
     """
     piece = np.zeros(len(vertices), np.int32)
-    if not len(faces):
-        return piece
-    normals = vertex_normals(vertices, faces)
-    free = (instance == 0) & (vertices[:, 2] > FLOOR)
-    members = np.flatnonzero(free & ~of_walls(vertices, normals, free | layout, voxel))
+    members = np.flatnonzero((instance == 0) & ~room & (vertices[:, 2] > FLOOR))
     points = vertices[members]
-    parts = _cut_above_tops(points, normals[members], _components(points, voxel), voxel)
-    named = [vertices[instance == name] for name in np.unique(instance[(instance > 0) & ~layout])]
+    parts = _components(points, voxel, None if proposed is None else proposed[members])
+    whole = set() if proposed is None else set(parts[proposed[members] > 0].tolist())
+    parts, standing = _cut_at_tops(points, normals[members], parts, voxel)
+    names = np.where(room, 0, instance)
+    for _, top in _tops(vertices, normals, names, voxel):
+        if names[top[0]] > 0:
+            level, footprint = float(np.median(vertices[top, 2])), _Footprint(vertices[top, :2], voxel)
+            standing |= _standing_on(level, footprint, points, parts)
+    named = [vertices[names == name] for name in np.unique(names[names > 0])]
     alone = ~_of_named(points, parts, named)
     members, points, parts = members[alone], points[alone], parts[alone]
-    parts = _joined(points, normals[members], parts, voxel)
+    parts = _joined(points, normals[members], parts, standing, whole, voxel, minimum_area)
     kept = []
     for part in np.unique(parts):
         own = members[parts == part]
-        low, high = vertices[own].min(axis=0), vertices[own].max(axis=0)
-        large = len(own) * voxel**2 >= minimum_area and (high - low)[:2].max() >= SMALLEST
-        if large and high[2] - low[2] >= LEAST_HEIGHT and low[2] < CEILING:
+        extent = np.ptp(vertices[own], axis=0)
+        large = len(own) * voxel**2 >= minimum_area and extent[:2].max() >= SMALLEST
+        high = extent[2] >= LEAST_HEIGHT and vertices[own, 2].min() < CEILING
+        if (large and high) or (len(own) >= FEWEST and part in standing | whole):
             kept.append(own)
     for number, own in enumerate(sorted(kept, key=lambda own: (-len(own), own[0])), 1):
         piece[own] = number
     return piece
 
 
-def of_walls(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, voxel: float) -> np.ndarray:
-    """Return which of the `candidates` (V,) lie on, shortly before, or behind a wall.
-
-    A wall is made of upright columns, each of which was seen both low and high on one plane; gaps between them that are
-    no wider than a door (what hides a wall, and openings) belong to it.
-    """
-    upright = np.flatnonzero(candidates & (np.abs(normals[:, 2]) < UPRIGHT))
-    angle = np.arctan2(normals[upright, 1], normals[upright, 0])
-    found = np.zeros(len(vertices), bool)
-    fewest = COLUMN_AREA / voxel**2
-    for theta in np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS:
-        axis, along = np.array([np.cos(theta), np.sin(theta)]), np.array([-np.sin(theta), np.cos(theta)])
-        facing = upright[np.cos(angle - theta) > np.cos(2 * np.pi / DIRECTIONS)]
-        place = np.floor(vertices[:, :2] @ axis / WALL_DEPTH).astype(int)
-        column = np.floor(vertices[:, :2] @ along / COLUMN).astype(int)
-        height = vertices[facing, 2]
-        keys, inverse = np.unique(np.stack([place[facing], column[facing]], 1), axis=0, return_inverse=True)
-        low = np.bincount(inverse, height < WALL_SEEN_BELOW, len(keys))
-        high = np.bincount(inverse, height > WALL_SEEN_ABOVE, len(keys))
-        keys = keys[(low > fewest) & (high > fewest)]
-        for number in np.unique(keys[:, 0]):
-            seen = np.sort(keys[keys[:, 0] == number, 1])
-            gaps = [np.arange(a, b) for a, b in zip(seen[:-1], seen[1:], strict=True) if (b - a) * COLUMN < OPENING]
-            span = np.concatenate([seen, *gaps])
-            near = (place <= number + 1) & (place >= number - BEHIND)
-            found |= near & np.isin(column, np.concatenate([span - 1, span, span + 1]))
-    return found & candidates
-
-
-def _components(points: np.ndarray, voxel: float) -> np.ndarray:
-    """Return the connected part (N,) of points that are at most two voxels apart."""
+def _components(points: np.ndarray, voxel: float, proposed: np.ndarray | None = None) -> np.ndarray:
+    """Return the connected part (N,) of points that are at most two voxels apart; what is `proposed` (N,) is a part."""
     if not len(points):
         return np.zeros(0, int)
     pairs = cKDTree(points).query_pairs(2.0 * voxel, output_type="ndarray")
+    if proposed is not None:
+        pairs = pairs[(proposed[pairs] == 0).all(axis=1)]
     graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    return connected_components(graph, directed=False)[1]
+    parts = connected_components(graph, directed=False)[1]
+    if proposed is None:
+        return parts
+    return np.where(proposed > 0, len(points) + proposed, parts)
 
 
-def _cut_above_tops(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float) -> np.ndarray:
-    """Cut what stands on the largest level top of each part from it."""
-    result, after = parts.copy(), int(parts.max(initial=0)) + 1
+class _Footprint:
+    """Where a level top lies, seen from above: its points (N, 2) and what they surround."""
+
+    def __init__(self, points: np.ndarray, voxel: float) -> None:
+        self.cell = 2 * voxel
+        reach = round(SHADOW / self.cell)
+        cells = np.floor(points / self.cell).astype(int)
+        self.corner = cells.min(axis=0) - reach - 1
+        grid = np.zeros(cells.max(axis=0) - self.corner + reach + 2, bool)
+        grid[tuple((cells - self.corner).T)] = True
+        steps = np.arange(-reach, reach + 1)
+        disc = steps[:, None] ** 2 + steps[None] ** 2 <= reach**2
+        self.grid = ndimage.binary_fill_holes(ndimage.binary_closing(grid, disc))
+
+    def holds(self, points: np.ndarray) -> np.ndarray:
+        """Return which points (N, 2 or more) lie above, on or below it."""
+        cells = np.floor(points[:, :2] / self.cell).astype(int) - self.corner
+        inside = ((cells >= 0) & (cells < self.grid.shape)).all(axis=1)
+        result = np.zeros(len(points), bool)
+        result[inside] = self.grid[tuple(cells[inside].T)]
+        return result
+
+
+def _tops(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float) -> list[tuple[int, np.ndarray]]:
+    """Return the level tops of all parts, the largest first: the part, and the numbers of the points."""
+    found = []
     for part in np.unique(parts):
-        own = np.flatnonzero(parts == part)
-        up = own[(normals[own, 2] > LEVEL) & (points[own, 2] > LOWEST_TOP)]
+        up = np.flatnonzero((parts == part) & (normals[:, 2] > LEVEL) & (points[:, 2] > LOWEST_TOP))
         if len(up) * voxel**2 < LEAST_TOP_AREA:
             continue
-        levels, counts = np.unique(np.round(points[up, 2] / SAME_LEVEL).astype(int), return_counts=True)
-        best = int(np.argmax(counts))
-        if counts[best] * voxel**2 < LEAST_TOP_AREA:
-            continue
-        above = own[points[own, 2] > levels[best] * SAME_LEVEL + 1.5 * SAME_LEVEL]
-        if len(above):
-            result[above] = after + _components(points[above], voxel)
-            after = int(result.max()) + 1
-    return result
+        patch = _components(points[up] * [1.0, 1.0, 2.0], voxel)  # a step of more than a voxel parts two levels
+        for number in np.flatnonzero(np.bincount(patch) * voxel**2 >= LEAST_TOP_AREA):
+            found.append((int(part), up[patch == number]))
+    return sorted(found, key=lambda top: (-len(top[1]), top[1][0]))
+
+
+def _cut_at_tops(
+    points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float
+) -> tuple[np.ndarray, set[int]]:
+    """Cut what stands on the level tops of each part from it, and what rises beside them: a chair, a tall cabinet.
+
+    Return the parts (N,), and which of them stand on a top.
+    """
+    result, standing = parts.copy(), set()
+    after = int(parts.max(initial=0)) + 1
+    for part, top in _tops(points, normals, parts, voxel):
+        level, footprint = float(np.median(points[top, 2])), _Footprint(points[top, :2], voxel)
+        own = np.flatnonzero(result == part)
+        over, inside = points[own, 2] - level, footprint.holds(points[own])
+        above = own[inside & ((over > RISE) | ((over > voxel) & (normals[own, 2] < LEVEL)))]
+        component = _components(points[above], voxel)
+        for number in np.flatnonzero(np.bincount(component, minlength=1) >= FEWEST):
+            thing = above[component == number]
+            if np.ptp(points[thing, 2]) >= LEAST_HEIGHT - voxel:
+                result[thing] = after
+                standing.add(after)
+                after += 1
+        own = own[result[own] == part]
+        over, inside = points[own, 2] - level, footprint.holds(points[own])
+        body = ~inside | (np.abs(over) > RISE)
+        own, over, inside = own[body], over[body], inside[body]
+        component = _components(points[own], voxel)
+        rising = (over > RISE) & ~inside
+        under = inside & (over > -APRON) & (over < -RISE)
+        for number in np.flatnonzero(np.bincount(component[rising], minlength=1) >= FEWEST):
+            beside = component == number
+            if (beside & under).sum() >= FEWEST:  # the two hang together: cut straight down
+                beside &= ~inside & _Footprint(points[own[beside & rising], :2], voxel).holds(points[own])
+            result[own[beside]] = after
+            after += 1
+        standing |= _standing_on(level, footprint, points, result)
+    return result, standing
+
+
+def _standing_on(level: float, footprint: _Footprint, points: np.ndarray, parts: np.ndarray) -> set[int]:
+    """Return the parts that begin on a level top and lie over it."""
+    found = set()
+    for part in np.unique(parts[(points[:, 2] > level) & footprint.holds(points)]):
+        own = points[parts == part]
+        if own[:, 2].min() > level - RISE and footprint.holds(own).mean() > 0.5:
+            found.add(int(part))
+    return found
 
 
 def _cells(points: np.ndarray, voxel: float) -> np.ndarray:
@@ -166,32 +209,40 @@ def _of_named(points: np.ndarray, parts: np.ndarray, named: list[np.ndarray]) ->
     return result
 
 
-def _joined(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float) -> np.ndarray:
+def _joined(
+    points: np.ndarray,
+    normals: np.ndarray,
+    parts: np.ndarray,
+    standing: set[int],
+    whole: set[int],
+    voxel: float,
+    minimum_area: float,
+) -> np.ndarray:
     """Join each part with the closest larger one between which and it the surface was not seen: above or below it, or a
-    scrap beside it.
+    scrap beside it, which is smaller than `minimum_area` [m^2].
 
-    What stands on a level top stays apart from what has it.
+    What stands on a level top (`standing`) stays apart from what has it.
     """
     result = parts.copy()
     names, sizes = np.unique(parts, return_counts=True)
-    names = names[sizes >= FEWEST_JOINED]
+    names = np.array([name for name in names[sizes >= FEWEST] if name not in standing], int)
     own = {name: np.flatnonzero(parts == name) for name in names}
     cells = {name: _cells(points[own[name]], voxel) for name in names}
     trees = {name: cKDTree(points[own[name]]) for name in names}
     low = {name: points[own[name], 2].min() for name in names}
-    high = {name: points[own[name], 2].max() for name in names}
-    topped = {name: _level_area(points[own[name]], normals[own[name]], voxel) >= LEAST_TOP_AREA for name in names}
+    top = {name: _top_height(points[own[name]], normals[own[name]], voxel) for name in names}
 
     for small in names.tolist():
         near: list[tuple[float, int]] = []
         for large in names.tolist():
             below, above = (small, large) if (low[small], small) < (low[large], large) else (large, small)
-            on_top = topped[below] and low[above] > high[below] - SAME_LEVEL
+            on_top = low[above] > top[below] - SAME_LEVEL
             if (len(own[large]), large) <= (len(own[small]), small) or on_top:
                 continue
             gap = float(trees[large].query(points[own[small]], distance_upper_bound=STACKED_GAP)[0].min())
             stacked = _common(cells[small], cells[large]) >= STACKED_SHARE and gap < STACKED_GAP
-            if stacked or (gap < SCRAP_DISTANCE and len(own[small]) < SCRAP_SHARE * len(own[large])):
+            scrap = len(own[small]) < min(SCRAP_SHARE * len(own[large]), minimum_area / voxel**2)
+            if stacked or (scrap and gap < SCRAP_DISTANCE and small not in whole):
                 near.append((gap, large))
         if near:
             kept, gone = sorted((result[own[small][0]], result[own[min(near)[1]][0]]))
@@ -199,7 +250,9 @@ def _joined(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: f
     return result
 
 
-def _level_area(points: np.ndarray, normals: np.ndarray, voxel: float) -> float:
-    """Return the area [m^2] of the upward surface (N, 3) that lies at the most frequent height of it."""
-    levels = np.round(points[normals[:, 2] > LEVEL, 2] / SAME_LEVEL).astype(int)
-    return float(np.unique(levels, return_counts=True)[1].max(initial=0)) * voxel**2
+def _top_height(points: np.ndarray, normals: np.ndarray, voxel: float) -> float:
+    """Return the height [m] at which most of the upward surface (N, 3) lies; infinite where it is no level top."""
+    levels, counts = np.unique(np.round(points[normals[:, 2] > LEVEL, 2] / SAME_LEVEL), return_counts=True)
+    if counts.max(initial=0) * voxel**2 < LEAST_TOP_AREA:
+        return np.inf
+    return float(levels[counts.argmax()]) * SAME_LEVEL

@@ -1,4 +1,4 @@
-"""In a place that is strange to the segmenter: only the masks and the names that most views agree on."""
+"""In a place that is strange to the segmenter: no names, masks as proposals, walls and things by geometry."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ import pytest
 from stages.fuse.closing import MaskSource, is_strange
 from stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from stages.fuse.parameters import FuseParameters
-from stages.fuse.strange_places import LEAST_NAME_SCORE, LEAST_THING_SCORE, thing_score, without_doubtful
+from stages.fuse.piece_entities import Classes, by_geometry
+from stages.fuse.strange_places import LEAST_THING_SCORE, thing_score, without_names
+from stages.fuse.surface import Surface
 from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import THINGS, class_id
+from tests.unit.fuse.test_unnamed_pieces import COUNTER, ON_IT, VOXEL, room
 
-WALL, FRIDGE, CHAIR, OBJECT = (class_id(name) for name in ("wall", "fridge", "chair", "object"))
+FLOOR, WALL, CEILING, FRIDGE, CHAIR, OBJECT = (
+    class_id(name) for name in ("floor", "wall", "ceiling", "fridge", "chair", "object")
+)
 MESH = ColoredMesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.int32), np.zeros((3, 3), np.uint8))
 
 
@@ -26,19 +31,35 @@ def test_the_score_counts_views_that_had_no_mask() -> None:
     assert thing_score((7,), scores, THINGS, {}) == 0.0
 
 
-def test_what_views_do_not_agree_on_loses_its_name_or_its_surface() -> None:
-    numbers = np.array([1, 2, 3, 4, 0], np.int32)
-    labelled = LabelledSurface(numbers, np.array([WALL, FRIDGE, CHAIR, FRIDGE, 0], np.int32), numbers)
-    scores = {
-        2: {FRIDGE: 10 * LEAST_THING_SCORE - 0.1},
-        3: {CHAIR: 10 * LEAST_NAME_SCORE - 0.1, OBJECT: 4.0},
-        4: {FRIDGE: 10 * LEAST_NAME_SCORE + 0.1, OBJECT: 4.0},
-    }
-    entities = [entity(1, WALL), entity(2, FRIDGE), entity(3, CHAIR), entity(4, FRIDGE)]
-    kept, surface = without_doubtful(entities, labelled, scores, dict.fromkeys(range(1, 5), 10), THINGS, OBJECT)
-    assert [(e.instance, e.class_id) for e in kept] == [(1, WALL), (3, OBJECT), (4, FRIDGE)]
-    assert surface.class_id.tolist() == [WALL, 0, OBJECT, FRIDGE, 0]
-    assert surface.instance.tolist() == [1, 0, 3, 4, 0]
+def test_things_lose_their_names_and_doubtful_ones_their_surface() -> None:
+    numbers = np.array([1, 2, 3, 0], np.int32)
+    labelled = LabelledSurface(numbers, np.array([WALL, FRIDGE, CHAIR, 0], np.int32), numbers)
+    score_of = {1: 0.0, 2: LEAST_THING_SCORE - 0.01, 3: LEAST_THING_SCORE}
+    entities = [entity(1, WALL), entity(2, FRIDGE), entity(3, CHAIR)]
+    kept, surface = without_names(entities, labelled, score_of, THINGS, OBJECT)
+    assert [(e.instance, e.class_id) for e in kept] == [(1, WALL), (3, OBJECT)]
+    assert surface.class_id.tolist() == [WALL, 0, OBJECT, 0]
+    assert surface.instance.tolist() == [1, 0, 3, 0]
+
+
+def test_geometry_says_what_is_wall_and_what_becomes_of_a_proposal() -> None:
+    vertices, faces, owner = room(COUNTER, ON_IT)
+    surface = Surface(vertices, faces, np.zeros((len(vertices), 3), np.uint8), owner)
+    fridge = (owner == 1) & (vertices[:, 0] > 1)  # a mask took a part of the wall for a thing, one the counter for wall
+    number = np.select([owner == 0, owner == 2, fridge, owner == 3], [1, 2, 3, 4], 0)
+    class_of = np.array([0, FLOOR, WALL, OBJECT, OBJECT], np.int32)
+    labelled = LabelledSurface(owner.astype(np.int32), class_of[number], number.astype(np.int32))
+    entities = [entity(k, int(class_of[k])) for k in range(1, 5)]
+    classes = Classes(FLOOR, WALL, CEILING, OBJECT)
+    found, result = by_geometry(surface, entities, labelled, classes, voxel=VOXEL, minimum_area=0.2)
+    assert (result.class_id[owner == 1] == WALL).mean() > 0.9
+    assert sorted(e.class_id for e in found) == sorted([FLOOR, WALL, OBJECT, OBJECT])
+    counter, on_it = (int(np.bincount(result.instance[owner == part]).argmax()) for part in (2, 3))
+    assert counter != on_it and {e.instance: e.segments for e in found}[on_it] == (4,)
+    assert {e.instance: e.segments for e in found}[counter] == ()
+    assert set(np.unique(result.instance)) <= {0, *(e.instance for e in found)}
+    without = LabelledSurface(owner.astype(np.int32), np.zeros_like(class_of[number]), np.zeros_like(labelled.instance))
+    assert by_geometry(surface, [], without, classes, voxel=VOXEL, minimum_area=0.2) == ([], without), "no floor"
 
 
 def test_only_a_segmenter_that_says_so_is_doubted() -> None:

@@ -1,11 +1,13 @@
-"""Unnamed surface: a box on the floor is a piece, a wall is none, what stands on a counter is one of its own."""
+"""Unnamed surface: what stands free, on a top or beside one is a piece of its own, a wall is none."""
 
 from __future__ import annotations
 
 import numpy as np
 import trimesh
 
-from stages.fuse.unnamed_pieces import unnamed_pieces
+from stages.fuse.unnamed_pieces import FLOOR, unnamed_pieces
+from stages.fuse.walls import of_walls
+from stages.kit.geometry.point_clouds import vertex_normals
 
 VOXEL = 0.02
 
@@ -40,11 +42,17 @@ def room(*boxes: Corners) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def pieces(
-    scene: tuple[np.ndarray, np.ndarray, np.ndarray], named: tuple[int, ...] = (0,), area: float = 0.05
+    scene: tuple[np.ndarray, np.ndarray, np.ndarray],
+    named: tuple[int, ...] = (0,),
+    area: float = 0.05,
+    proposed: np.ndarray | None = None,
 ) -> np.ndarray:
     vertices, faces, owner = scene
+    normals = vertex_normals(vertices, faces)
     instance = np.where(np.isin(owner, named), owner + 1, 0)
-    return unnamed_pieces(vertices, faces, instance, owner == 0, voxel=VOXEL, minimum_area=area)
+    walls = of_walls(vertices, normals, (instance == 0) & (vertices[:, 2] > FLOOR), VOXEL)
+    room = walls | (owner == 0)
+    return unnamed_pieces(vertices, normals, instance, room, voxel=VOXEL, minimum_area=area, proposed=proposed)
 
 
 def of_part(piece: np.ndarray, owner: np.ndarray, part: int) -> int:
@@ -82,11 +90,38 @@ def test_parts_above_each_other_are_one_unless_one_carries_the_other() -> None:
     assert of_part(piece, owner, 2) == of_part(piece, owner, 3) == 1
 
 
+def test_small_things_on_a_top_are_pieces_and_flat_ones_where_a_mask_proposed_them() -> None:
+    cup, book = ((0.3, 1.6, 0.9), (0.4, 1.7, 1.0)), ((0.9, 1.6, 0.9), (1.2, 1.8, 0.92))
+    scene = room(COUNTER, cup, book)
+    owner = scene[2]
+    piece = pieces(scene, area=0.2)
+    assert of_part(piece, owner, 3) not in (0, of_part(piece, owner, 2)) and of_part(piece, owner, 4) in (0, 1)
+    piece = pieces(scene, area=0.2, proposed=np.where(owner == 4, 7, 0))
+    assert len({of_part(piece, owner, part) for part in (2, 3, 4)} - {0}) == 3
+
+
+def test_a_chair_beside_a_table_and_a_tall_cabinet_beside_a_counter_are_things_of_their_own() -> None:
+    table, seat, back = (
+        ((-1.0, -1.0, 0.68), (0.2, -0.2, 0.72)),
+        ((-0.6, -0.3, 0.4), (-0.2, 0.1, 0.44)),
+        ((-0.6, -0.18, 0.44), (-0.2, -0.14, 0.95)),
+    )
+    scene = room(table, seat, back)
+    piece, owner = pieces(scene), scene[2]
+    assert of_part(piece, owner, 2) != of_part(piece, owner, 4) > 0
+    tall = ((1.5, 1.4, 0.0), (2.0, 2.0, 1.8))
+    scene = room(COUNTER, tall)
+    piece, owner = pieces(scene), scene[2]
+    front = (owner == 3) & (scene[0][:, 1] < 1.41)
+    assert 0 < of_part(piece, owner, 2) != of_part(piece, owner, 3) > 0
+    assert (piece[front] == of_part(piece, owner, 3)).mean() > 0.8
+
+
 def test_small_and_empty() -> None:
     scene = room(BOX)
     assert pieces(scene, area=5.0).max() == 0
     nothing = unnamed_pieces(
-        np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, int), np.zeros(0, bool), voxel=VOXEL, minimum_area=0.1
+        np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int), np.zeros(0, bool), voxel=VOXEL, minimum_area=0.1
     )
     assert nothing.shape == (0,)
     assert pieces(scene, named=(0, 1, 2)).max() == 0, "all is named"

@@ -1,5 +1,7 @@
 """COLMAP projects: images/ and a sparse model, with depth/ or COLMAP's own dense maps when they are there.
 
+Where there is depth the images may be missing.
+
 Poses in the files are camera-from-world, OpenCV axes; they are inverted. Pixel coordinates put the centre of the first
 pixel at (0.5, 0.5); ours are half a pixel less. Worlds from pictures alone have no scale.
 """
@@ -71,6 +73,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     depths, depth_words = _depths(root, images)
     refuse_exr((path.name for path in depths if path), str(root))
     has_depth = depth_words is not None
+    has_color = not has_depth or any(path.is_file() for path in colors)
     recorded, given = _recorded(model, images, colors, depths, parameters)
     groups, group_notes = grouped(recorded, [str(image.camera) for image in images])
     unregistered = _unregistered(image_folder, colors)
@@ -86,7 +89,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if index is None:
             entries.append(Entry(name, time, None, _never, "missing_pose", chosen[0]))
         elif group_of[index].name in chosen:
-            form = FrameFormat(recorded[index], group_of[index].camera, True, has_depth, units)
+            form = FrameFormat(recorded[index], group_of[index].camera, has_color, has_depth, units)
             load = frame_loader(FrameFiles(colors[index], depths[index]), form)
             pose = images[index].world_from_camera
             problem = "non_rigid_pose" if pose is None else None
@@ -105,7 +108,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         *_scale_notes(depth_words, unit_note),
         f"times assumed: order of the names / {parameters.frame_rate:g} per second",
     )
-    streams = [stream(image_folder.name, "color", [*colors, *unregistered])]
+    streams = [stream(image_folder.name, "color", [*colors, *unregistered])] if has_color else []
     if has_depth:
         streams.append(stream(str(depth_words), "depth", [path for path in depths if path]))
     streams.append(text_stream(model.folder.name, "pose", len(images)))

@@ -52,7 +52,7 @@ LARGEST_SIZE = 100_000
 class _Frame:
     where: str
     name: str
-    color: Path
+    color: Path | None
     depth: Path | None
     pose: np.ndarray | None
     problem: str | None
@@ -98,6 +98,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if stamped:
         frames.sort(key=lambda frame: frame.time or 0.0)
     has_depth = any(frame.depth is not None for frame in frames)
+    has_color = not has_depth or any(frame.color is not None and frame.color.is_file() for frame in frames)
     refuse_exr((frame.depth.name for frame in frames if frame.depth is not None), str(file))
     default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
     if not default_unit > 0:
@@ -114,7 +115,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         group = group_of[index]
         if group.name not in chosen:
             continue
-        form = FrameFormat(recorded[index], group.camera, True, has_depth, units)
+        form = FrameFormat(recorded[index], group.camera, has_color, has_depth, units)
         load = frame_loader(FrameFiles(frame.color, frame.depth), form)
         pose = None if frame.pose is None else world(frame.pose)
         time = index / parameters.frame_rate if frame.time is None or not stamped else frame.time
@@ -139,7 +140,9 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         else f"times assumed: order of the names / {parameters.frame_rate:g} per second",
     )
     stamps = np.array([round((frame.time or 0.0) * 1e9) for frame in frames if stamped], np.int64)
-    streams = [stream("file_path", "color", [frame.color for frame in frames], stamps)]
+    streams = []
+    if has_color:
+        streams.append(stream("file_path", "color", [frame.color for frame in frames if frame.color], stamps))
     if has_depth:
         streams.append(stream("depth_file_path", "depth", [frame.depth for frame in frames if frame.depth]))
     streams.append(text_stream("transform_matrix", "pose", sum(frame.pose is not None for frame in frames)))
@@ -166,13 +169,14 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
         where = f"{file}: frame {index}"
         if not isinstance(fields, dict):
             raise BadInput(f"{where}: is no object")
-        color = _with_suffix(named_file(root, fields.get("file_path"), where))
         depth = fields.get("depth_file_path")
+        named = fields.get("file_path")
+        color = None if named is None and depth is not None else _with_suffix(named_file(root, named, where))
         pose, problem = _pose(fields.get("transform_matrix"))
         frames.append(
             _Frame(
                 where,
-                str(fields["file_path"]),
+                str(depth if named is None else named),
                 color,
                 None if depth is None else named_file(root, depth, where),
                 pose,
@@ -221,7 +225,11 @@ def _recorded(
     notes: tuple[str, ...] = ()
     for one, same in alike.items():
         where = same[0].where
-        color_size = color_image_size(frame.color for frame in same) if one.size is None or not has_depth else None
+        color_size = (
+            color_image_size(frame.color for frame in same if frame.color)
+            if one.size is None or not has_depth
+            else None
+        )
         depth_size = depth_image_size(frame.depth for frame in same if frame.depth is not None) if has_depth else None
         camera = _camera(one, one.size or color_size or depth_size, all_intrinsics_given(parameters), where)
         known[one], notes = overridden_recording(camera.at(depth_size or color_size, where), parameters)

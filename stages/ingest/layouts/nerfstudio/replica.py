@@ -1,5 +1,5 @@
-"""Replica as rendered for RGB-D mapping: traj.txt (4x4 camera-to-world a line), results/frame*.jpg and depth*.png,
-cam_params.json in the folder or the one above it. Cameras are OpenCV's, depth is 1/6553.5 m."""
+"""Replica as rendered for RGB-D mapping: traj.txt (4x4 camera-to-world a line), results/frame*.jpg (or none) and
+depth*.png, cam_params.json in the folder or the one above it. Cameras are OpenCV's, depth is 1/6553.5 m."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ RENDERED = ((1200, 680), (600.0, 600.0, 599.5, 339.5))
 
 def matches(root: Path) -> str | None:
     """Return the rule that matched, or None."""
-    if (root / TRAJECTORY).is_file() and any(root.glob(f"{RESULTS}/frame*")):
-        return f"folder with {TRAJECTORY} and {RESULTS}/frame*: Replica"
-    return None
+    if not (root / TRAJECTORY).is_file():
+        return None
+    seen = next((name for name in ("frame", "depth") if any(root.glob(f"{RESULTS}/{name}*"))), None)
+    return f"folder with {TRAJECTORY} and {RESULTS}/{seen}*: Replica" if seen else None
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
@@ -60,7 +61,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             f"frame {number}",
             number / parameters.frame_rate,
             rows[number][1].reshape(4, 4) if number < len(rows) else None,
-            image_loader(colors.get(number), depths.get(number), camera, units),
+            image_loader(colors.get(number), depths.get(number), camera, units, has_color=bool(colors)),
         )
         for number in numbers
     )
@@ -72,7 +73,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         f"times assumed: frame number / {parameters.frame_rate:g} per second",
     )
     streams = (
-        stream(f"{RESULTS}/frame", "color", colors.values()),
+        *((stream(f"{RESULTS}/frame", "color", colors.values()),) if colors else ()),
         stream(f"{RESULTS}/depth", "depth", depths.values()),
         text_stream(TRAJECTORY, "pose", len(rows)),
     )

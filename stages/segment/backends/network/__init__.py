@@ -1,4 +1,4 @@
-"""Backend `network`: our own RGB-D panoptic networks, trained on generated rooms (docs/NETWORK.md)."""
+"""Backend `network`: our own RGB-D panoptic network, trained on generated rooms (docs/NETWORK.md)."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from stages.segment.registry import BackendDeclaration
 
 BACKEND = BackendDeclaration(
     name="network",
-    summary="compact RGB-D networks of our own, for generated rooms and for all others",
+    summary="a compact RGB-D network of our own, trained on generated rooms",
     order=50,
     automatic=True,
     weights="a .safetensors checkpoint of our own, where the one that comes with the project is not wanted",
     libraries=("torch",),
-    data_files=lambda parameters: ("networks/panoptic.safetensors", "networks/panoptic_varied.safetensors"),
+    data_files=lambda parameters: ("networks/panoptic.safetensors",),
 )

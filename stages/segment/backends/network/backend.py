@@ -17,16 +17,11 @@ from schemas.vocabulary import UNNAMED, Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.segment.backends.network.features import STRIDE, Mount, features, input_camera, mount_of_pose, resized
 from stages.segment.backends.network.grouping import GroupingSettings, Named, group, raise_to_depth
-from stages.segment.backends.network.weights import GENERATED, VARIED, Checkpoint, load_checkpoint
+from stages.segment.backends.network.weights import BUNDLED, Checkpoint, load_checkpoint
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame
 
-LOOKED_AT = 12
-"""Frames of a log that say whether its place is familiar."""
-FAMILIAR = 0.57
-"""Share of the area of things with a name from which on a place is familiar to the network of generated rooms: half way
-between the living room that its successor was taught in (0.51) and the least of five generated rooms (0.62)."""
 LEAST_CONTRAST = 4.0
 """Standard deviation of the brightest channel (0..255) under which a picture shows nothing."""
 
@@ -89,10 +84,8 @@ def load_predictor(path: Path, vocabulary: Vocabulary, settings: GroupingSetting
 class NetworkBackend:
     """Masks of our own network; of a bundled one when no weights are given. Colour is used where there is any.
 
-    Two are bundled: one that knows generated rooms well, and one for everywhere else, which was taught with far more
-    varied rooms and with real frames, finds things in one piece and names few of them. `is_familiar` chooses by what
-    the first makes of the log. Without a sequence (frames that a service receives) the second is taken, nothing is
-    known of gravity, and the camera is that of the points.
+    Without a sequence (frames that a service receives) nothing is known of gravity, and the camera is that of the
+    points.
     """
 
     name = "network"
@@ -114,18 +107,10 @@ class NetworkBackend:
         method = sequence.gravity.method if sequence is not None else "none"
         self._gravity_known = method != "none"
         self._floor_is_zero = method in ("given", "floor_plane")
-        self._predictor = load_predictor(weights or GENERATED, vocabulary, settings)
+        self._predictor = load_predictor(weights or BUNDLED, vocabulary, settings)
         self.label = "own network, trained on generated rooms" if weights is None else f"network {weights.stem}"
-        if weights is None and not (reader is not None and self._is_familiar(reader)):
-            self._predictor = load_predictor(VARIED, vocabulary, settings)
-            self.label = "own network, trained on varied rooms and a few real frames"
         if not colored:
             self.label += ", without colour"
-
-    def _is_familiar(self, reader: FrameReader) -> bool:
-        frames = [reader.read(int(k), streams=self.streams) for k in np.linspace(0, len(reader) - 1, LOOKED_AT)]
-        masks = [self._masks(frame, reader.cameras[frame.camera_name]) for frame in frames if frame.depth is not None]
-        return is_familiar(masks, self._predictor)
 
     def _masks(self, frame: Frame, camera: Camera) -> PanopticFrame:
         assert frame.depth is not None
@@ -143,19 +128,6 @@ class NetworkBackend:
         if frame.depth is None or camera is None:
             return PanopticFrame(np.zeros(geometric.labels.shape, dtype=np.int32))
         return self._masks(frame, camera)
-
-
-def is_familiar(frames: list[PanopticFrame], predictor: Predictor) -> bool:
-    """Whether the predictor has a name for most of what it takes for things in these frames: what it was taught in
-    looks like this place."""
-    unnamed = None if predictor.unnamed is None else predictor.classes[predictor.unnamed].category_id
-    total = named = 0
-    for frame in frames:
-        area = np.bincount(frame.ids.ravel(), minlength=1 + max(frame.masks, default=0))
-        things = {number: mask for number, mask in frame.masks.items() if mask.is_thing}
-        total += sum(int(area[number]) for number in things)
-        named += sum(int(area[number]) for number, mask in things.items() if mask.category_id != unnamed)
-    return named >= FAMILIAR * total
 
 
 def shows_something(color: np.ndarray) -> bool:

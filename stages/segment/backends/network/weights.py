@@ -16,9 +16,8 @@ from stages.segment.backends.network.model import PanopticNetwork, Widths
 
 FORMAT = "scenewright panoptic network"
 VERSION = 1
-NETWORKS = Path(__file__).resolve().parents[4] / "data" / "networks"
-GENERATED, VARIED = NETWORKS / "panoptic.safetensors", NETWORKS / "panoptic_varied.safetensors"
-"""What comes with the project: for places like the generated rooms, and for all others."""
+BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "panoptic.safetensors"
+"""What comes with the project."""
 _OTHER = "give a checkpoint that `make train-network` wrote, or leave --weights out"
 
 

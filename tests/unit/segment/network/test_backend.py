@@ -11,10 +11,8 @@ from schemas.errors import BadInput, UsageError
 from schemas.sequence import Sequence
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.cameras import back_project
-from stages.segment.backends.network.backend import FAMILIAR, Predictor, camera_of_points, is_familiar, shows_something
-from stages.segment.backends.network.grouping import GroupingSettings, Named
+from stages.segment.backends.network.backend import camera_of_points, shows_something
 from stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
-from stages.segment.panoptic import PanopticFrame, PanopticMask
 from stages.segment.parameters import SegmentParameters
 from tests.unit.segment.network.test_weights import tiny_checkpoint
 from tests.unit.segment.test_box_masks import WIDE
@@ -28,7 +26,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Written:
 
 def test_the_bundled_network_segments_twice_the_same(room: Written, tmp_path: Path) -> None:
     made = segment(room.sequence, tmp_path / "a", backend="network")
-    assert made.info.backend == "network" and made.info.label.startswith("own network, trained on")
+    assert made.info.backend == "network" and made.info.label == "own network, trained on generated rooms"
     assert made.outcome == "ok" and any(frame.segments for frame in made.info.frames)
     assert payload(made) == payload(segment(room.sequence, tmp_path / "b", backend="network"))
 
@@ -71,17 +69,6 @@ def test_colour_may_be_missing_in_the_log_and_in_a_frame(room: Written) -> None:
         # A service knows neither reader nor sequence; the camera is that of the points.
         served = choose_backend(BackendRequest(parameters))(frame, geometric, np.random.default_rng(0))
         assert served.ids.shape == frame.depth.shape
-
-
-def test_a_place_is_familiar_where_most_of_its_things_have_names() -> None:
-    predictor = Predictor(None, (Named(4, True), Named(40, True), Named(2, False)), GroupingSettings(), 1)  # type: ignore[arg-type]
-    ids = np.zeros((10, 100), np.int32)
-    edge = round(100 * FAMILIAR)
-    ids[:5, :edge], ids[:5, edge:], ids[5:] = 1, 2, 3
-    masks = {1: PanopticMask(4, True, 0.9), 2: PanopticMask(40, True, 0.2), 3: PanopticMask(2, False, 0.9)}
-    assert is_familiar([PanopticFrame(ids, masks)], predictor)
-    ids[:5, edge - 3 : edge] = 2
-    assert not is_familiar([PanopticFrame(ids, masks)], predictor)
 
 
 def test_night_and_lens_caps_show_nothing() -> None:

@@ -14,7 +14,7 @@ from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 from stages.segment.backends.network.features import CHANNELS
 from stages.segment.backends.network.model import PanopticNetwork, Widths
-from stages.segment.backends.network.weights import GENERATED, load_checkpoint, save_checkpoint
+from stages.segment.backends.network.weights import BUNDLED, load_checkpoint, save_checkpoint
 
 TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
 CLASSES = ("floor", "wall", "chair")
@@ -107,7 +107,7 @@ def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_checkpoint_that_ships() -> None:
-    assert GENERATED.stat().st_size < 10_000_000
-    shipped = load_checkpoint(GENERATED, VOCABULARY)
+    assert BUNDLED.stat().st_size < 10_000_000
+    shipped = load_checkpoint(BUNDLED, VOCABULARY)
     assert {"floor", "wall", "chair", "table", "cup", "object"} <= set(shipped.classes)
     assert "generated rooms" in shipped.description

@@ -1,0 +1,125 @@
+"""Pieces of unnamed surface as entities of the map, beside what masks named and in places where they name nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from stages.fuse.surface import Surface
+from stages.fuse.unnamed_pieces import CEILING, FLOOR, unnamed_pieces
+from stages.fuse.walls import of_walls
+from stages.kit.formats.map_files import cut_mesh, face_labels
+from stages.kit.geometry.point_clouds import vertex_normals
+
+
+@dataclass(frozen=True)
+class Classes:
+    """Ids of the classes that geometry can tell."""
+
+    floor: int
+    wall: int
+    ceiling: int
+    unnamed: int
+
+
+def with_unnamed_pieces(
+    surface: Surface,
+    entities: Sequence[ExtractedEntity],
+    labelled: LabelledSurface,
+    classes: Classes,
+    *,
+    voxel: float,
+    minimum_area: float,
+) -> tuple[list[ExtractedEntity], LabelledSurface]:
+    """Return the entities and labels with the pieces of unnamed surface among them; as they are without a floor.
+
+    `voxel` [m], `minimum_area` [m^2] of a piece. Nobody voted for one: it has no segments, and no confidence.
+    """
+    vertices = _over_floor(surface, labelled, classes)
+    if vertices is None:
+        return list(entities), labelled
+    normals = vertex_normals(vertices, surface.faces)
+    room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling))
+    walls = of_walls(vertices, normals, (room | (labelled.instance == 0)) & (vertices[:, 2] > FLOOR), voxel)
+    piece = unnamed_pieces(vertices, normals, labelled.instance, room | walls, voxel=voxel, minimum_area=minimum_area)
+    return _with_pieces(surface, entities, labelled, piece, classes.unnamed)
+
+
+def by_geometry(
+    surface: Surface,
+    entities: Sequence[ExtractedEntity],
+    labelled: LabelledSurface,
+    classes: Classes,
+    *,
+    voxel: float,
+    minimum_area: float,
+) -> tuple[list[ExtractedEntity], LabelledSurface]:
+    """Return entities and labels in a place where masks name nothing; as they are without a floor.
+
+    Walls are what geometry says, and things (all of the class `unnamed` here) are but proposals to it. The largest
+    piece of what was proposed as one thing has its segments, others have none.
+    """
+    vertices = _over_floor(surface, labelled, classes)
+    if vertices is None:
+        return list(entities), labelled
+    normals = vertex_normals(vertices, surface.faces)
+    class_id, instance = labelled.class_id.copy(), labelled.instance.copy()
+    known = (class_id == classes.floor) | ((class_id == classes.ceiling) & (vertices[:, 2] > CEILING))
+    walls = of_walls(vertices, normals, ~known & (vertices[:, 2] > FLOOR), voxel)
+    proposed = np.where(class_id == classes.unnamed, instance, 0)
+    piece = unnamed_pieces(
+        vertices,
+        normals,
+        np.zeros_like(instance),
+        known | walls,
+        voxel=voxel,
+        minimum_area=minimum_area,
+        proposed=proposed,
+    )
+    class_id[proposed > 0], instance[proposed > 0] = 0, 0
+    wall = next((e.instance for e in entities if e.class_id == classes.wall), 1 + int(labelled.instance.max(initial=0)))
+    class_id[walls], instance[walls] = classes.wall, wall
+    class_id[piece > 0], instance[piece > 0] = 0, 0
+    room = {e.instance: e for e in entities if e.class_id != classes.unnamed}
+    if walls.any() and wall not in room:
+        room[wall] = ExtractedEntity(wall, classes.wall, (), cut_mesh(surface, np.zeros(0, int)), 0.0, 0)
+    of_face = face_labels(instance, surface.faces)
+    cut = [replace(e, mesh=cut_mesh(surface, np.flatnonzero(of_face == number))) for number, e in sorted(room.items())]
+    kept = [e for e in cut if len(e.mesh.faces)]
+    lost = ~np.isin(instance, [e.instance for e in kept])
+    class_id[lost], instance[lost] = 0, 0
+    found, result = _with_pieces(
+        surface, kept, LabelledSurface(labelled.segment, class_id, instance), piece, classes.unnamed
+    )
+    unused = {e.instance: e for e in entities if e.class_id == classes.unnamed}
+    for place in range(len(kept), len(found)):  # the largest piece first
+        most = int(np.bincount(proposed[result.instance == found[place].instance]).argmax())
+        if most in unused:
+            found[place] = replace(unused.pop(most), instance=found[place].instance, mesh=found[place].mesh)
+    return found, result
+
+
+def _over_floor(surface: Surface, labelled: LabelledSurface, classes: Classes) -> np.ndarray | None:
+    """Return the vertices (V, 3) [m] with the floor at 0, None where there is none."""
+    level = surface.vertices[labelled.class_id == classes.floor, 2]
+    return surface.vertices - [0.0, 0.0, float(np.median(level))] if len(level) else None
+
+
+def _with_pieces(
+    surface: Surface, entities: Sequence[ExtractedEntity], labelled: LabelledSurface, piece: np.ndarray, unnamed: int
+) -> tuple[list[ExtractedEntity], LabelledSurface]:
+    """Return entities and labels with those of every piece (V,) after them, by its number."""
+    of_face, first = face_labels(piece, surface.faces), 1 + int(labelled.instance.max(initial=0))
+    found, number = list(entities), np.zeros(int(piece.max(initial=0)) + 1, np.int32)
+    for label in range(1, len(number)):
+        mesh = cut_mesh(surface, np.flatnonzero(of_face == label))
+        if len(mesh.faces):
+            number[label] = first + label
+            found.append(ExtractedEntity(first + label, unnamed, (), mesh, 0.0, 0))
+    new = number[piece] > 0
+    instance = np.where(new, number[piece], labelled.instance).astype(np.int32)
+    class_id = np.where(new, np.int32(unnamed), labelled.class_id)
+    return found, LabelledSurface(labelled.segment, class_id, instance)
