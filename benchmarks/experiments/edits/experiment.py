@@ -20,6 +20,7 @@ from benchmarks.experiments.edits.truth import truth_of
 from benchmarks.generated_rooms import RECIPES, STEPS, make_library, make_room
 from benchmarks.graph_scores import read_room
 from benchmarks.steps import opened, step
+from benchmarks.tabulation import Figure
 from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence as SequenceArtifact
 from stages.edit.map_state import MapState, read_state
@@ -116,9 +117,9 @@ def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
     make_library(bench.out / "rooms")
 
 
-def all_others(results: Results) -> dict[str, float | Interval | None]:
+def all_others(results: Results) -> dict[str, Figure]:
     """Return the figures over all maps but the one on which the edits were made, with intervals over rooms."""
-    flat: dict[str, float | Interval | None] = {}
+    flat: dict[str, Figure] = {}
     for arm in results.arms():
         rooms: dict[str, list[Landed]] = {}
         for trial, record in results.records.items():
@@ -127,7 +128,10 @@ def all_others(results: Results) -> dict[str, float | Interval | None]:
         groups = list(rooms.values())
         for name, measure in MEASURES.items() if groups else ():
             value = measure.of([record for group in groups for record in group])
-            flat[f"{arm}/all_others/{name}"] = _interval(measure, groups) if measure.interval else value
+            interval = _interval(measure, groups) if measure.interval else None
+            low, high = (None, None) if interval is None else (interval.low, interval.high)
+            if value is not None:
+                flat[f"{arm}/all_others/{name}"] = Figure(value, low, high, len(groups), measure.unit)
     return flat
 
 
