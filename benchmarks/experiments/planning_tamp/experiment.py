@@ -244,11 +244,9 @@ def more_figures(results: Results) -> dict[str, Figure | None]:
 EXPERIMENT = Experiment(
     name="planning_tamp",
     title="Tasks by name, planned and executed",
-    simulated="Rooms, robot, execution in physics; in the reconstructed case the log too, with masks that are the true "
-    "ones with errors of level 0.2.",
-    knows="The scene: exact, or as it was reconstructed; before an action the truth of the bodies that it names. In "
-    "`perceived` what rendered depth pictures tell of them, in `noisy_look` the truth through a robot and a "
-    "segmentation that err, in `open_loop` nothing.",
+    simulated="Household rooms, a mobile arm, physics; but in exact scenes the log too, with true masks made worse.",
+    knows="The scene, exact or reconstructed; before an action the bodies that it names: the truth, or what rendered depth "
+    "pictures tell (perceived), the truth with errors (noisy_look), nothing (open_loop).",
     does_not_show="Execution on a robot. Whether an action had its effect and whether the goal holds is told by the "
     "truth, with any eyes.",
     arms={task: task for task in TASKS},
