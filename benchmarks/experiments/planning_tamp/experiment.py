@@ -244,9 +244,8 @@ def more_figures(results: Results) -> dict[str, Figure | None]:
 EXPERIMENT = Experiment(
     name="planning_tamp",
     title="Tasks by name, planned and executed",
-    simulated="Household rooms, a mobile arm, physics; but in exact scenes the log too, with true masks made worse.",
-    knows="The scene, exact or reconstructed; before an action the bodies that it names: the truth, or what rendered depth "
-    "pictures tell (perceived), the truth with errors (noisy_look), nothing (open_loop).",
+    simulated="household rooms, a mobile arm, physics; the log, spoiled true masks",
+    knows="before an action, rendered depth pictures (oracle: the truth)",
     does_not_show="Execution on a robot. Whether an action had its effect and whether the goal holds is told by the "
     "truth, with any eyes.",
     arms={task: task for task in TASKS},
