@@ -22,7 +22,8 @@ SETS: dict[str, tuple[Callable[[], QuerySet], dict[str, Band]]] = {
     "drawer": (drawer_set, {"samples": (85, 113), "mesh_checks": (850, 940), "mean_length": (5.1, 5.35)}),
 }
 """Today samples are 226, 1209 and 99, mesh checks 939, 1126 and 896, lengths 5.504, 6.157 and 5.222 rad; the bands hold
-where one query's tree grows otherwise (of the same code one whole run took 88 samples for the drawer; why was not found)."""
+where one query's tree grows otherwise (of the same code one whole run took 88 samples for the drawer; why was not
+found)."""
 SPACE = SearchSpace(CHAIN.lower, CHAIN.upper, np.full(7, 0.05))
 
 
