@@ -89,7 +89,7 @@ class PlanAction:
         """Prepare the model before a motion is sought."""
 
     def manipulate(self, model: WorldModel, state: RobotState, request: MotionRequest) -> tuple[Manipulation, ...]:
-        """Return its motions, one after another. Raises MotionFailed."""
+        """Return its motions, one after another; never asked of an action without `has_motion`. Raises MotionFailed."""
         raise NotImplementedError(self.name)
 
     def grasp_style(self, model: WorldModel, item: str, arguments: tuple[str, ...]) -> GraspStyle | None:
@@ -123,7 +123,8 @@ class PlanAction:
     def moved_along(
         self, model: WorldModel, arguments: tuple[str, ...], manipulation: Manipulation, shift: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return base and grasp or place of a planned motion whose body stands `shift` (3,) [m] away from there."""
+        """Return base and grasp or place of a planned motion whose body stands `shift` (3,) [m] away from there; never
+        asked of an action without `tied_to`."""
         raise NotImplementedError(self.name)
 
     def after_motion(self, conduct: Execution, state: RobotState, arguments: tuple[str, ...]) -> RobotState:

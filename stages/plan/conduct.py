@@ -170,18 +170,15 @@ class Conduct:
         with the grasp or place of the planned ones where it still serves. `before`: the model before they were planned.
         Raises MotionFailed."""
         drive, step = steps[:2]
-        assert step.manipulation is not None
-        action, arguments = action_named(step.name), step.arguments
         self._execute(drive)
         there = replace(state, base=drive.segments[-1].path[-1, :3])
         self.model.restore(before)
         hold_for_checks(self.model, there)
         anchor = self._anchor(step)
-        self._look(step.name, arguments)
-        if anchor is None or action.tied_to is None:
+        self._look(step.name, step.arguments)
+        if anchor is None:
             return refine_action(self.model, there, step.name, replace(request, base=there.base), origin)
-        shift = self.model.pose(arguments[action.tied_to])[:3, 3] - anchor[:3, 3]
-        _, target = action.moved_along(self.model, arguments, step.manipulation, shift)
+        _, target = self._re_anchored(step, anchor)
         return refine_action(self.model, there, step.name, replace(request, preferred=(there.base, target)), origin)
 
     def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
