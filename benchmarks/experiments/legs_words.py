@@ -1,9 +1,12 @@
 """Rooms that are asked: language in a splat (`ours`), the thesis's way to an answer, entities of our map.
 
+Cases: `rooms`, generated; the real logs of data/annotations/real, asked for what somebody boxed there.
+
 The same pictures and poses; `ours` and `thesis` ask the same field. `thesis` takes the size that fits best in the
 view in which a right thing is seen best (the user's choice there), then the Gaussian that fits best at that size, and
 always answers. `langsplat` is asked the same way, of its three levels instead of sizes; `lerf` in the same view, along
-rays. `entities` asks what pictures show of every entity of a perfect map: more than our map would be.
+rays. `entities` asks what pictures show of every entity of a perfect map, which generated rooms have: more than our
+map would be.
 """
 
 from __future__ import annotations
@@ -11,16 +14,18 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.experiments.real import EXPECTED
 from benchmarks.generated_rooms import STEPS
 from benchmarks.splats.langsplat import langsplat
 from benchmarks.splats.lerf import Lerf
-from benchmarks.words.asked import AskedRoom, Query
+from benchmarks.words.asked import ANNOTATIONS, AskedLog, AskedPlace, AskedRoom, Query
 from stages.kit.geometry.boxes import box_iou
 from stages.kit.geometry.cameras import scaled
 from stages.kit.open_words.finding import Finder
@@ -34,20 +39,26 @@ from stages.splat.language.pyramid import pyramid
 from stages.splat.ply import read_gaussians
 
 ROOMS = ("kitchen", "office", "bedroom", "room")
-REPORTING = tuple(f"{ROOMS[k % 4]}-{1500 + k}" for k in range(20))
+REPORTING = tuple(f"{ROOMS[k % 4]}-{1520 + k}" for k in range(20))
 TUNING = ("kitchen-40",)
+GENERATED = "rooms"
+LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))
 LEAST = 0.5
 """Probability from which on something is an answer: one for all rooms."""
 BOX_OVERLAP = 0.25
-SMALLER, LERF_SMALLER = 0.5, 0.2
+RENDERED_WIDTH, LERF_WIDTH = 160, 64
+"""Of the pictures that `thesis` and `langsplat`, and `lerf`, are asked in [px]."""
 LERF_SIDES = (0.05, 0.5)
 """Of its squares, over the height."""
 BINS = 10
+REJECTED = 0.9
+"""Share of absent words that are rejected at the threshold where recall is looked at."""
 
 
 class WordsParameters(Parameters):
     """Options of the experiment."""
 
+    data: Path = Field(Path("../shared/data"), description="Folder with the real logs")
     frames: int = Field(24, ge=8, description="Frames of a room")
     steps: int = Field(200, ge=1, description="Steps of training the field")
     lerf_steps: int = Field(300, ge=1, description="Steps of training LERF")
@@ -93,15 +104,21 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
     """Ask a room in every arm."""
     trial = trials[0]
     given = bench.parameters
-    room = AskedRoom(bench.out / "rooms", trial.seed, given.frames, given.steps)
+    room: AskedPlace
+    if trial.case == GENERATED:
+        room = AskedRoom(bench.out / "rooms", trial.seed, given.steps, given.frames)
+    else:
+        told = EXPECTED[trial.case]
+        room = AskedLog(bench.out, trial.case, given.steps, given.data / told["log"], told["every"])
     for trial in trials:
         yield trial, asked(room, trial.arm, given.lerf_steps)
 
 
-def asked(room: AskedRoom, arm: str, lerf_steps: int) -> Asked:
+def asked(room: AskedPlace, arm: str, lerf_steps: int) -> Asked:
     """Return what an arm makes of a room's queries."""
     encoder = open_encoder(EncoderParameters.model_validate({}), None)
-    finder = Finder(room.entities if arm == "entities" else room.language, encoder)
+    language = room.entities if arm == "entities" and isinstance(room, AskedRoom) else room.language
+    finder = Finder(language, encoder)
     always = always_answering(room, finder, arm, lerf_steps)
     present, absent = room.queries
     found: dict[str, list[Place]] = {}
@@ -139,12 +156,12 @@ def asked(room: AskedRoom, arm: str, lerf_steps: int) -> Asked:
     )
 
 
-def places(room: AskedRoom, finder: Finder, query: Query) -> list[Place]:
+def places(room: AskedPlace, finder: Finder, query: Query) -> list[Place]:
     """Return what a finder answers."""
     result = []
     for found in finder.find(query.text):
         box = finder.info.regions[found.region].box
-        overlaps = any(box_iou(box, room.objects[k].box) >= BOX_OVERLAP for k in query.right)
+        overlaps = any(box_iou(box, room.boxes[k]) >= BOX_OVERLAP for k in query.right)
         result.append(Place(np.array(box.center), found.probability, overlaps))
     return result
 
@@ -156,7 +173,7 @@ class AlwaysAnswering(Protocol):
         """Return it."""
 
 
-def always_answering(room: AskedRoom, finder: Finder, arm: str, lerf_steps: int) -> AlwaysAnswering | None:
+def always_answering(room: AskedPlace, finder: Finder, arm: str, lerf_steps: int) -> AlwaysAnswering | None:
     """Return the way of an arm that never says that there is none."""
     if arm == "thesis":
         return ThesisWay(room, finder, finder.vectors.vectors)
@@ -170,7 +187,7 @@ def always_answering(room: AskedRoom, finder: Finder, arm: str, lerf_steps: int)
 class LerfWay:
     """One size for a view, the best along its rays; the surface at its pixel that fits best."""
 
-    def __init__(self, room: AskedRoom, finder: Finder, steps: int) -> None:
+    def __init__(self, room: AskedPlace, finder: Finder, steps: int) -> None:
         self.room, self.finder = room, finder
         pyramids = [pyramid(sight.color, finder.encoder, *LERF_SIDES) for _, sight in room.pictures]
         self.model = Lerf([view for view, _ in room.pictures], 0, pyramids, finder.encoder.width)
@@ -183,8 +200,9 @@ class LerfWay:
         frame = self.room.best_view(query)
         frame = next(iter(self.room.sights)) if frame is None else frame
         if frame not in self.shown:
-            camera = scaled(self.room.truth.info.camera, LERF_SMALLER)
-            self.shown[frame] = self.model.view_vectors(camera, self.room.sights[frame][1], self.finder.info.sizes)
+            sight = self.room.sights[frame]
+            camera = scaled(sight.camera, LERF_WIDTH / sight.camera.width)
+            self.shown[frame] = self.model.view_vectors(camera, sight.camera_from_world, self.finder.info.sizes)
         vectors, points = self.shown[frame]
         fits = relevancy(margins(vectors, query_rows(self.finder.encoder, query.text)))
         pixel, size = np.unravel_index(int(fits.argmax()), fits.shape)
@@ -195,10 +213,9 @@ class ThesisWay:
     """One size for all Gaussians, the best in a rendered view; the Gaussian that fits best at it. `vectors`
     (N, sizes or levels, width)."""
 
-    def __init__(self, room: AskedRoom, finder: Finder, vectors: np.ndarray) -> None:
+    def __init__(self, room: AskedPlace, finder: Finder, vectors: np.ndarray) -> None:
         self.room, self.finder, self.vectors = room, finder, vectors
         self.gaussians = read_gaussians(room.splat.path("splat.ply"))
-        self.camera = scaled(room.truth.info.camera, SMALLER)
 
     def find(self, query: Query) -> list[Place]:
         """Return its one answer."""
@@ -207,7 +224,8 @@ class ThesisWay:
         frame = self.room.best_view(query)
         frame = next(iter(self.room.sights)) if frame is None else frame
         arrays = {**self.gaussians.arrays(), "features": fits}
-        view = View(self.camera, self.room.sights[frame][1])
+        sight = self.room.sights[frame]
+        view = View(scaled(sight.camera, RENDERED_WIDTH / sight.camera.width), sight.camera_from_world)
         shown = CompiledRasterizer().draw(type(self.gaussians)(**arrays), view).picture.features
         size = int(shown.max(axis=(0, 1)).argmax())
         best = int(fits[:, size].argmax())
@@ -224,6 +242,17 @@ def share(top: str, bottom: str) -> Measure:
     return Measure(of)
 
 
+def recall_at_rejection(records: Sequence[Asked]) -> float | None:
+    """Return the share of things found at the one threshold that rejects REJECTED of all absent words."""
+    if any(len(record.chances) != record.present + record.absent for record in records):
+        return None
+    chances = [np.split(np.array(record.chances), [record.present]) for record in records]
+    least = np.quantile(np.concatenate([absent for _, absent in chances]), REJECTED)
+    hits = [np.array(record.hits[: record.present]) for record in records]
+    found = np.concatenate(hits) & (np.concatenate([present for present, _ in chances]) > least)
+    return float(found.mean())
+
+
 def calibration_error(records: Sequence[Asked]) -> float | None:
     """Return the expected calibration error over BINS bins of the first places' probabilities."""
     chances = np.array([chance for record in records for chance in record.chances])
@@ -236,7 +265,9 @@ def calibration_error(records: Sequence[Asked]) -> float | None:
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
-    """The first rooms."""
+    """The first rooms, or the one log of that name, where it is there."""
+    if case != GENERATED:
+        return [case] if (bench.parameters.data / EXPECTED[case]["log"]).is_dir() else []
     return TUNING if bench.tuning else REPORTING[: bench.parameters.rooms]
 
 
@@ -254,7 +285,8 @@ EXPERIMENT = Experiment(
         "langsplat": "LangSplat",
         "lerf": "LERF",
     },
-    cases=("rooms",),
+    cases=(GENERATED, *LOGS),
+    runs=lambda arm, case: arm != "entities" or case == GENERATED,
     measure=measure,
     record=Asked,
     measures={
@@ -263,6 +295,7 @@ EXPERIMENT = Experiment(
         "recall_2d": share("in_picture", "shown"),
         "precision": share("right_answers", "answers"),
         "absent_rejected": share("rejected", "absent"),
+        "recall_at_rejection": Measure(recall_at_rejection),
         "calibration_error": Measure(calibration_error),
         "query_ms": Measure(lambda records: float(np.median([record.query_ms for record in records])), "ms", False),
         "gaussians": Measure(lambda records: float(np.mean([record.gaussians for record in records])), "", False),
@@ -270,10 +303,11 @@ EXPERIMENT = Experiment(
     tuning=TUNING,
     reporting=REPORTING,
     seeds_of=seeds_of,
-    together=lambda trial: trial.seed,
+    together=lambda trial: (trial.case, trial.seed),
     pairs=(("ours", "thesis"), ("ours", "entities"), ("ours", "langsplat"), ("ours", "lerf")),
     compared=("recall_3d", "recall_2d", "precision", "absent_rejected"),
     parameters=WordsParameters,
+    places=frozenset({"data"}),
     quick={"rooms": 2, "steps": 100, "lerf_steps": 30},
     steps=(*STEPS, "splat build", "splat language", "splat label"),
 )

@@ -88,7 +88,7 @@ def main() -> None:
     lines = []
     for source, names in ROOMS.items():
         some = names[: 1 if options.quick else None]
-        rooms = [AskedRoom(options.out / "rooms", name, options.frames, options.steps) for name in some]
+        rooms = [AskedRoom(options.out / "rooms", name, options.steps, options.frames) for name in some]
         found = fit(rooms, source)
         values = {name: getattr(found, name) for name in ("bias", "looks", "field", "extent", "extent_squared")}
         entry = [f'source = "{source}"', f'encoder = "{EmbeddedEncoder().label}"']
