@@ -78,7 +78,8 @@ class SplatViewsFile(Model):
 
 
 class SplatViews(Artifact):
-    """`views.json` and `pictures/<frame>.png`: what the camera saw, what the splat shows, how the depths differ."""
+    """`views.json`; `pictures/<frame>.png`: what the camera saw, what the splat shows, how the depths differ;
+    `turntable.png`, `turntable.gif`: the splat from all sides."""
 
     kind: ClassVar[str] = "splat_views"
     description: ClassVar[str] = "pictures of a splat beside the camera's"

@@ -52,6 +52,7 @@ class RenderParameters(Parameters):
 
     views: Literal["held_out", "learned", "all"] = Field("held_out", description="Which pictures are compared")
     pictures: int = Field(12, ge=0, le=10_000, description="At most so many are written, evenly spread")
+    turntable: int = Field(36, ge=0, le=360, description="Pictures of a turn about the whole, from above; 0: none")
 
 
 class LanguageParameters(EncoderParameters):
@@ -104,8 +105,8 @@ BUILD = Stage(
 )
 RENDER = Stage(
     name="splat render",
-    version=2,
-    summary="Show what a splat shows where the camera stood, beside what the camera saw",
+    version=3,
+    summary="Show what a splat shows where the camera stood, beside what the camera saw, and from all sides",
     parameters=RenderParameters,
     reads={"splat": Splat, "sequence": Sequence},
     writes=SplatViews,

@@ -15,6 +15,7 @@ from stages.splat.build_stage import rasterizer_of
 from stages.splat.losses import signal_to_noise, structural_similarity
 from stages.splat.parameters import RenderParameters
 from stages.splat.ply import read_gaussians
+from stages.splat.turntable import opened, turn, write_turn
 from stages.splat.views import PosedView, evenly, posed_frames, read_view
 
 FULL_RED = 0.2
@@ -49,6 +50,12 @@ def run(splat: Splat, sequence: Sequence, *, parameters: RenderParameters, conte
             if frame in drawn_frames:
                 (context.output / "pictures").mkdir(exist_ok=True)
                 Image.fromarray(beside(view, picture)).save(context.output / "pictures" / f"{frame:06d}.png")
+    if parameters.turntable and len(gaussians):
+        inside = opened(gaussians, np.array([pose[:3, 3] for pose in poses.values()]))
+        turned = turn(inside, rasterizer, parameters.turntable)
+        write_turn(
+            context.output, list(context.progress.track(turned, total=parameters.turntable, description="turntable"))
+        )
     errors = [each.depth_error for each in figures if each.depth_error is not None]
     file = SplatViewsFile(
         views=tuple(figures),

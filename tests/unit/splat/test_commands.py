@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from schemas.errors import BadInput
 from schemas.sequence import Sequence
@@ -21,8 +22,10 @@ from stages.splat import build_stage, render_stage
 from stages.splat.parameters import BuildParameters, RenderParameters
 from stages.splat.ply import COLUMNS, read_gaussians, write_gaussians
 from stages.splat.triangulation import with_points
+from stages.splat.turntable import opened
 from stages.splat.views import posed_frames, read_view
 from tests.unit.poses.textured_room import round_walk, write_sequence
+from tests.unit.report.test_report import parse, report
 
 WALK = round_walk(49)[:13]
 
@@ -76,15 +79,33 @@ def test_the_file_is_one_that_others_read(made: tuple[Sequence, Splat], tmp_path
 
 def test_pictures_are_compared(made: tuple[Sequence, Splat], tmp_path: Path) -> None:
     sequence, splat = made
-    parameters = RenderParameters(pictures=1)
+    parameters = RenderParameters(pictures=1, turntable=4)
     views = render_stage.run(splat, sequence, parameters=parameters, context=context(tmp_path / "views"))
     assert views.outcome == "ok" and [view.frame for view in views.info.views] == [2, 6, 10]
     assert views.info.psnr > 12 and 0 < (views.info.depth_error or 0) < 0.2
     assert len(list(views.path("pictures").iterdir())) == 1
+    with Image.open(views.path("turntable.gif")) as moving, Image.open(views.path("turntable.png")) as sheet:
+        assert getattr(moving, "n_frames", 0) == 4 and sheet.size == (960, 720)
+        shown = [np.asarray(moving.convert("RGB"), float) for k in range(4) if moving.seek(k) is None]
+    page = report(tmp_path / "report", splat_views=views)
+    assert page.summary["pictures"] == 2 and "3 pictures beside" in parse(page.path("report.html").read_text()).text
+    assert all((picture.mean(axis=2) < 250).mean() > 0.05 for picture in shown)
+    assert np.abs(shown[0] - shown[2]).mean() > 1
     all_views = render_stage.run(
-        splat, sequence, parameters=RenderParameters(views="all", pictures=0), context=context(tmp_path / "all")
+        splat,
+        sequence,
+        parameters=RenderParameters(views="all", pictures=0, turntable=0),
+        context=context(tmp_path / "all"),
     )
     assert len(all_views.info.views) == 12
+
+
+def test_what_is_higher_than_the_cameras_is_left_out_of_the_turn(made: tuple[Sequence, Splat]) -> None:
+    gaussians = read_gaussians(made[1].path("splat.ply"))
+    height = float(np.median(gaussians.means[:, 2]))
+    kept = opened(gaussians, np.array([[0.0, 0.0, height]]))
+    assert 0 < len(kept) < len(gaussians) and kept.means[:, 2].max() <= height
+    assert len(opened(gaussians, np.array([[0.0, 0.0, -99.0]]))) > len(kept)
 
 
 def test_the_same_seed_gives_the_same_bytes(made: tuple[Sequence, Splat], tmp_path: Path) -> None:

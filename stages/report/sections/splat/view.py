@@ -1,0 +1,32 @@
+"""A splat for the page: the whole as it turns, and pictures beside the camera's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from schemas.splat import SplatViews
+from stages.report.images import animation, from_file
+from stages.report.page import Page
+
+WIDTH, MOST_PICTURES = 1100, 4
+
+
+def view(page: Page) -> dict[str, Any] | None:
+    """Return the figures and pictures, or None without them. Raises BadInput for a picture that cannot be read."""
+    views = page.given("splat_views", SplatViews)
+    if views is None:
+        return None
+    shown = [
+        (each, path) for each in views.info.views if (path := views.path(f"pictures/{each.frame:06d}.png")).is_file()
+    ]
+    count = min(MOST_PICTURES, len(shown))
+    moving = views.path("turntable.gif")
+    words = "what the camera saw, what the splat shows, how the depths differ"
+    return {
+        "file": views.info,
+        "pictures": [
+            {"frame": each.frame, "use": each.use, "psnr": each.psnr, "image": from_file(path, words, WIDTH)}
+            for each, path in (shown[len(shown) * k // count] for k in range(count))
+        ],
+        "moving": animation(moving, "the splat as it turns") if moving.is_file() else None,
+    }
