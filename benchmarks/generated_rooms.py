@@ -81,13 +81,21 @@ def room_at(root: Path, name: str, frames: int) -> RoomFolder:
 
 
 def make_room(
-    root: Path, name: str, frames: int, *, size: tuple[int, int] = (640, 480), clutter: str = CLUTTER, opened: int = 0
+    root: Path,
+    name: str,
+    frames: int,
+    *,
+    size: tuple[int, int] = (640, 480),
+    clutter: str = CLUTTER,
+    opened: int = 0,
+    cameras: int = 1,
 ) -> RoomFolder:
     """Make a room of this name under `root` unless it is up to date; size (width, height) [px]; up to so many doors and
-    drawers are `opened` or shut half-way. Raises StepFailed."""
+    drawers are `opened` or shut half-way; frames are of so many `cameras` in turn. Raises StepFailed."""
     library, room = make_library(root), room_at(root, name, frames)
     recipe, seed = name.rsplit("-", 1)
     options = ("--recipe", recipe, "--seed", seed, "--clutter", clutter, "--frames", frames, "--opened", opened)
-    made("synthesize", room.ground_truth, "--library", library, *options, "--width", size[0], "--height", size[1])
+    camera = ("--width", size[0], "--height", size[1], "--cameras", cameras)
+    made("synthesize", room.ground_truth, "--library", library, *options, *camera)
     made("ingest", room.sequence, "--log", room.ground_truth / "log.mcap")
     return room

@@ -6,7 +6,8 @@ takes all pictures at once, so that it begins when the last has arrived. Cases `
 pictures when the clock shows the budget. `<scene>/drifting` and `<scene>/mended` have poses that drift as odometry
 does, without and with `--adjust-every --refine-poses`, at POSES_BUDGET: where they drift, held-out pictures stand where
 the drifting path has them; mended, where depth and colour place them among the learned. Generated logs have a picture a
-second; they are played ROOM_RATE times as fast.
+second; they are played ROOM_RATE times as fast. `cameras/one` and `cameras/three`: the same drive with a camera ahead,
+and with two more turned to the sides; held out, and the same for both, are pictures of all three.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from benchmarks.splats.lerf import Lerf
 from benchmarks.steps import made, opened
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence as SequenceArtifact
-from stages.kit.formats.frames import FrameReader
+from stages.kit.formats.frames import CAMERA_FRAME, FrameReader
 from stages.kit.geometry.transforms import inverse
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Parameters
@@ -54,12 +55,15 @@ REPORTING = tuple(f"{ROOMS[k % 4]}-{1400 + k}" for k in range(20))
 """In the reporting range of the recipes."""
 ROOM_RATE = 4.0
 TUNING = ("kitchen-40", "office-41", "bedroom-40")
-GENERATED = "rooms"
+GENERATED, CAMERAS = "rooms", "cameras"
+NUMBERS = ("one", "three")
+SEVERAL = 3
+"""Cameras of the drive that the cases CAMERAS are of."""
 BUDGETS = {"10s": 10.0, "30s": 30.0, "1min": 60.0, "5min": 300.0, "20min": 1200.0}
 QUICK_BUDGETS, WHOLE_BUDGETS = ("10s", "30s"), ("1min", "5min", "20min")
 POSES = ("drifting", "mended")
 POSES_BUDGET = {True: "30s", False: "1min"}
-"""With `--quick` and without."""
+"""With `--quick` and without; that of several cameras too."""
 HOLD_OUT_EVERY = 8
 GOOD = 20.0
 """PSNR at which a splat counts as made (Srinivas 2024, section 10.1) [dB]."""
@@ -94,18 +98,20 @@ class Splatted:
     reached_20: bool
 
 
-def sequence_of(bench: Bench, seed: str) -> SequenceArtifact:
+def sequence_of(bench: Bench, seed: str, cameras: int) -> SequenceArtifact:
     """Ingest a real log, or make a room."""
-    folder = bench.out / "logs"
     if seed in REAL:
-        return opened(SequenceArtifact, made("ingest", folder / seed, "--log", bench.parameters.data / REAL[seed]))
-    return opened(SequenceArtifact, make_room(folder, seed, bench.parameters.frames, size=(320, 240)).sequence)
+        log = bench.parameters.data / REAL[seed]
+        return opened(SequenceArtifact, made("ingest", bench.out / "logs" / seed, "--log", log))
+    folder = bench.out / ("logs" if cameras == 1 else f"logs-of-{cameras}")
+    room = make_room(folder, seed, cameras * bench.parameters.frames, size=(320, 240), cameras=cameras)
+    return opened(SequenceArtifact, room.sequence)
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The rooms, or the one log of that name, where it is there."""
     scene = case.split("/")[0]
-    if scene == GENERATED:
+    if scene in (GENERATED, CAMERAS):
         return TUNING if bench.tuning else REPORTING[: 1 if bench.quick else bench.parameters.rooms]
     return [scene] if (bench.parameters.data / REAL[scene]).is_dir() else []
 
@@ -113,7 +119,12 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
 def default_cases(bench: Bench) -> list[str]:
     """Short budgets with `--quick`."""
     budgets = QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS
-    return [f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*budgets, *POSES) if adjusts(scene, part)]
+    return [*cases_of((*budgets, *POSES)), *(f"{CAMERAS}/{number}" for number in NUMBERS)]
+
+
+def cases_of(parts: Sequence[str]) -> list[str]:
+    """Return the cases of these parts of all scenes."""
+    return [f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in parts if adjusts(scene, part)]
 
 
 def adjusts(scene: str, part: str) -> bool:
@@ -121,11 +132,12 @@ def adjusts(scene: str, part: str) -> bool:
     return part not in POSES or scene not in WITHOUT_DEPTH
 
 
-def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView], list[PosedView]]:
+def split_views(bench: Bench, seed: str, part: str) -> tuple[list[PosedView], list[PosedView]]:
     """Return the views to learn from and those held out."""
-    with FrameReader(sequence_of(bench, seed).path("frames.mcap")) as reader:
-        posed = posed_frames(reader, sequence_of(bench, seed), None)
-        if drifting:
+    sequence = sequence_of(bench, seed, SEVERAL if part in NUMBERS else 1)
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        posed = posed_frames(reader, sequence, None)
+        if part in POSES:
             drifted = drifting_poses(np.array([pose for _, pose in posed]), np.random.default_rng(error_seed(seed)))
             posed = [(frame, pose) for (frame, _), pose in zip(posed, drifted, strict=True)]
         poses = dict(posed)
@@ -133,6 +145,8 @@ def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView
         read = {frame: read_view(reader, frame, poses[frame], bench.parameters.width) for frame in frames}
     kept = {frames[k] for k in held_out(len(frames), HOLD_OUT_EVERY)}
     learned = [view for frame, view in read.items() if view is not None and frame not in kept]
+    if part == NUMBERS[0]:
+        learned = [view for view in learned if view.camera_name == CAMERA_FRAME]
     if seed in WITHOUT_DEPTH:
         learned = with_points(learned, 0)
     return learned, [view for frame, view in read.items() if view is not None and frame in kept]
@@ -143,14 +157,14 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Spla
     numba.set_num_threads(1)
     warm_up()
     part = {trial: trial.case.split("/")[1] for trial in trials}
-    rate = ROOM_RATE if trials[0].case.split("/")[0] == GENERATED else 1.0
-    poses = next((each for each in part.values() if each in POSES), "exact")
-    stops = {trial: BUDGETS[POSES_BUDGET[bench.quick] if each in POSES else each] for trial, each in part.items()}
-    learned, kept = split_views(bench, trials[0].seed, poses != "exact")
+    rate = ROOM_RATE if trials[0].case.split("/")[0] in (GENERATED, CAMERAS) else 1.0
+    first = part[trials[0]]
+    stops = {trial: BUDGETS.get(each, BUDGETS[POSES_BUDGET[bench.quick]]) for trial, each in part.items()}
+    learned, kept = split_views(bench, trials[0].seed, first)
     learner: Learner = (
         Volume()
         if trials[0].arm == "lerf"
-        else Splats(trials[0].arm, bench.parameters.adjust_every if poses == "mended" else 0)
+        else Splats(trials[0].arm, bench.parameters.adjust_every if first == "mended" else 0)
     )
     waiting, start, looked, reached = list(learned), learned[0].time, 0.0, float("inf")
     clock = 0.0 if not learner.at_once else (learned[-1].time - start) / rate
@@ -302,7 +316,7 @@ def regained(results: Results) -> dict[str, float | Interval | None]:
 def together(trial: Trial) -> object:
     """Budgets of one scene with the same poses are one training."""
     part = trial.case.split("/")[1]
-    return (trial.arm, trial.seed, part if part in POSES else "exact")
+    return (trial.arm, trial.seed, "exact" if part in BUDGETS else part)
 
 
 EXPERIMENT = Experiment(
@@ -312,12 +326,10 @@ EXPERIMENT = Experiment(
     "processor time of one thread beside the stamps of the log.",
     knows="Colour, depth, calibration and poses (exact, given, or drifting) of every picture that has arrived.",
     does_not_show="Language: nothing is asked. A GPU, on which the thesis's method and LERF make far more steps in the "
-    "same time. Several cameras, and pictures without depth.",
+    "same time.",
     arms={"ours": "ours", "thesis": "thesis's method", "lerf": "LERF"},
-    runs=lambda arm, case: arm != "lerf" or case.split("/")[1] not in POSES,
-    cases=tuple(
-        f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES) if adjusts(scene, part)
-    ),
+    runs=lambda arm, case: arm != "lerf" or case.split("/")[1] in BUDGETS,
+    cases=(*cases_of((*BUDGETS, *POSES)), *(f"{CAMERAS}/{number}" for number in NUMBERS)),
     default_cases=default_cases,
     seeds_of=seeds_of,
     tuning=TUNING,

@@ -40,7 +40,8 @@ from stages.splat.ply import read_gaussians
 
 ROOMS = ("kitchen", "office", "bedroom", "room")
 REPORTING = tuple(f"{ROOMS[k % 4]}-{1520 + k}" for k in range(20))
-TUNING = ("kitchen-40",)
+TUNING = ("kitchen-40", "office-41", "bedroom-42", "room-43")
+"""The probabilities were fitted on them too."""
 GENERATED = "rooms"
 LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))
 LEAST = 0.5

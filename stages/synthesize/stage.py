@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth, GroundTruthFile
@@ -31,6 +32,8 @@ from stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true
 from stages.synthesize.viewpoints import blocked_floor, choose_views
 from stages.synthesize.walk import Walk, frame_times, plan_walk
 
+CAMERAS = {CAMERA_FRAME: 0.0, "camera_left": 60.0, "camera_right": -60.0}
+"""By name: how far each is turned to the left of the one ahead, about the vertical [deg]."""
 VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM, PICTURE_STREAM, OPENED_STREAM = 1, 2, 3, 4, 5
 
 
@@ -133,16 +136,19 @@ def _record(
     labels += [LabelEntry(instance=thing.instance, class_name=thing.class_name) for thing in arrangement.objects]
     visible = np.zeros(len(gloss), dtype=np.int64)
     poses, valid = [], 0
+    names = tuple(CAMERAS)[: parameters.cameras]
     with FrameWriter(
         context.output / "log.mcap",
         camera,
+        cameras=dict.fromkeys(names, camera),
         labels=True,
         label_table=labels,
-        baselines={CAMERA_FRAME: baseline} if baseline > 0 else None,
+        baselines=dict.fromkeys(names, baseline) if baseline > 0 else None,
     ) as writer:
-        for time in context.progress.track(times, total=len(times), description="rendering"):
+        for number, time in enumerate(context.progress.track(times, total=len(times), description="rendering")):
+            name = names[number % len(names)]
             again = len(renderers) > 1 and time * pace > walk.duration
-            pose = walk.pose(2 * walk.duration - time * pace if again else time * pace)
+            pose = turned(walk.pose(2 * walk.duration - time * pace if again else time * pace), CAMERAS[name])
             renderer = renderers[-1 if again else 0]
             view = renderer.render(camera, pose)
             depth = view.depth
@@ -157,9 +163,16 @@ def _record(
             if baseline > 0:
                 right = renderer.render(camera, pose @ left_from_right).color
                 right = disturbed_picture(right, parameters.picture_noise, pictures)
-            writer.write(float(time), color, depth if parameters.depth else None, pose, view.instance, right=right)
+            shown = depth if parameters.depth else None
+            writer.write(float(time), color, shown, pose, view.instance, right=right, camera_name=name)
             poses.append(pose)
     return Recording(times, np.array(poses), visible, valid / (len(times) * camera.width * camera.height))
+
+
+def turned(world_from_camera: np.ndarray, degrees: float) -> np.ndarray:
+    """Return a pose (4, 4) turned to the left where it stands, about the world's vertical."""
+    rotation = Rotation.from_euler("z", degrees, degrees=True).as_matrix() @ world_from_camera[:3, :3]
+    return transform_from(rotation, world_from_camera[:3, 3])
 
 
 def disturbed_picture(color: np.ndarray, deviation: float, random: np.random.Generator) -> np.ndarray:

@@ -176,6 +176,27 @@ def test_a_second_eye_sees_the_same_points_further_left(
         assert moved < 0.4 * np.abs(pair.right.astype(int) - pair.color)[seen].mean()
 
 
+def test_three_cameras_see_in_turn_ahead_and_to_both_sides(library: CadLibrary, tmp_path: Path) -> None:
+    for name in ("several", "alone"):
+        (tmp_path / name).mkdir()
+    several = make(library, tmp_path / "several", frames=4, depth_noise=False, cameras=3)
+    alone = make(library, tmp_path / "alone", frames=4, depth_noise=False)
+    with FrameReader(alone.path("log.mcap")) as one, FrameReader(several.path("log.mcap")) as three:
+        frames, ahead = list(three.frames()), list(one.frames())
+        assert [frame.camera_name for frame in frames] == ["camera", "camera_left", "camera_right", "camera"]
+        assert np.array_equal(frames[3].color, ahead[3].color)
+        assert not np.array_equal(frames[1].color, ahead[1].color)
+        poses = [
+            (np.asarray(a.world_from_camera), np.asarray(b.world_from_camera))
+            for a, b in zip(ahead, frames, strict=True)
+        ]
+    for (a, b), degrees in zip(poses, (0, 60, -60, 0), strict=True):
+        turn = b[:3, :3] @ a[:3, :3].T
+        np.testing.assert_allclose(turn[2], (0, 0, 1), atol=1e-6)
+        assert np.rad2deg(np.arctan2(turn[1, 0], turn[0, 0])) == pytest.approx(degrees, abs=1e-3)
+        np.testing.assert_allclose(b[:3, 3], a[:3, 3], atol=1e-6)
+
+
 def test_a_log_must_say_something_of_distance() -> None:
     with pytest.raises(UsageError, match="without distances"):
         check(SynthesizeParameters(depth=False), {})  # type: ignore[call-arg]
