@@ -75,8 +75,9 @@ def _likeliest(
         there = [(k, node) for k, node in there if len(names[k]) == longest and words[-longest:] == names[k]]
     best = max(((float(fits.probabilities[k]), node.id) for k, node in there), default=(0.0, "nothing"))
     if best[0] < LEAST_PROBABILITY and longest < len(words):
+        strange = ", for the encoder has learned no pictures like these" if finder.is_strange else ""
         raise UsageError(
-            f"goal: the scene has no {text!r}: {best[1]} is the likeliest, with probability {best[0]:.2f}",
+            f"goal: the scene has no {text!r}: {best[1]} is the likeliest, with probability {best[0]:.2f}{strange}",
             hint="name the node, or say it in other words",
         )
     return best[1]

@@ -144,7 +144,7 @@ LABEL = Stage(
 )
 QUERY = Stage(
     name="splat query",
-    version=3,
+    version=4,
     summary="Find what words ask for, with probabilities, or say that the room has none",
     parameters=QueryParameters,
     reads={"language": LanguageMap, "contact_graph": Optionally(ContactGraph), "weights": WEIGHTS},

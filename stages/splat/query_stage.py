@@ -51,6 +51,8 @@ def run(
         text=text,
         encoder=encoder.label,
         calibrated=finder.calibration.fitted,
+        recognised=round(finder.recognised, 4),
+        strange=finder.is_strange,
         least_probability=least,
         unread=unread,
         relation=" ".join(relation) if relation is not None else "",
@@ -64,6 +66,14 @@ def run(
     if kept:
         summary["best"] = round(kept[0].probability, 3)
         summary["center"] = [round(v, 3) for v in info.regions[kept[0].region].box.center]
+    if finder.is_strange:
+        context.logger.warning(
+            "its pictures are near nothing that the encoder has learned (%.2f, from %.2f on they count as known): "
+            "answers would be guesses; --least-probability 0 shows them, --encoder names other encoders",
+            finder.recognised,
+            finder.calibration.least_recognised,
+        )
+        summary["strange"] = True
     if unread:
         context.logger.warning("the encoder has never read %s: what is found for it is a guess", ", ".join(unread))
         summary["unread"] = " ".join(unread)

@@ -45,6 +45,7 @@ window.addEventListener("scenewright-ready", function () {
     const words = [told.answers.length ? `${told.answers.length} of “${told.text}”` : `The room has no “${told.text}”.`];
     if (!told.answers.length && told.next_best) words.push(`Nearest: ${told.next_best.probability.toFixed(2)} at ${told.next_best.center.map((v) => v.toFixed(2)).join(", ")} m.`);
     if (told.unread.length) words.push(`Never read: ${told.unread.join(", ")}.`);
+    if (told.strange) words.push("The encoder has learned no pictures like these: hardly anything is believed.");
     if (!told.calibrated) words.push("Not calibrated: numbers are relevancies.");
     words.push(`${told.milliseconds} ms`);
     said.textContent = words.join(" ");

@@ -60,6 +60,7 @@ class Asking:
             "next_best": None if below is None else self._place(below),
             "unread": list(finder.encoder.unread(text)),
             "calibrated": finder.calibration.fitted,
+            "strange": finder.is_strange,
             "milliseconds": round(1e3 * seconds, 1),
             **self._warmth(fits.gaussians),
         }

@@ -13,6 +13,8 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.outside import file_toml
+from schemas.vocabulary import load_vocabulary
+from stages.kit.open_words.encoder import Encoder
 
 FILE = "words/calibration.toml"
 """Below data/."""
@@ -33,6 +35,10 @@ class Calibration:
     extent: float
     extent_squared: float
     fitted: bool = True
+    least_recognised: float = -1.0
+    """A place of which the encoder recognises less (`recognised`) is strange to it ..."""
+    strange: float = 1.0
+    """... and a probability there is this share of what was fitted elsewhere."""
 
     def probabilities(self, looks: np.ndarray, field: np.ndarray | None, extents: np.ndarray) -> np.ndarray:
         """Return (R,) of relevancies (R,) and edges (R,); those of regions that no picture shows are 0."""
@@ -43,9 +49,26 @@ class Calibration:
         return np.where(looks > 0, 1.0 / (1.0 + np.exp(-odds)), 0.0)
 
 
+def recognised(regions: np.ndarray, extents: np.ndarray, encoder: Encoder) -> float:
+    """Return how alike regions (R, width), rows of zeros where no picture shows one, and the nearest name of the
+    vocabulary are, on the mean (cosine), by their greatest edges (R,) [m]; 0 where none is seen.
+
+    Pictures of another kind than the encoder learned from are near no name, however well they fit one rather than
+    another.
+    """
+    seen = (regions != 0).any(axis=1)
+    names = [entry.name.replace("_", " ") for entry in load_vocabulary().classes]
+    known = [name for name in names if not encoder.unread(name)]
+    if not seen.any() or not known:
+        return 0.0
+    nearest = (regions[seen].astype(np.float32) @ encoder.texts(known).T).max(axis=1)
+    return float(np.average(nearest, weights=np.maximum(extents[seen], SHORTEST)))
+
+
 UNFITTED = Calibration(0.0, 1.0, 0.0, 0.0, 0.0, fitted=False)
 """Of an encoder that nothing was fitted for: the relevancy of the looks."""
 WEIGHTS = ("bias", "looks", "field", "extent", "extent_squared")
+OF_PLACES = ("least_recognised", "strange")
 
 
 def log_odds(shares: np.ndarray) -> np.ndarray:
@@ -54,10 +77,10 @@ def log_odds(shares: np.ndarray) -> np.ndarray:
     return np.log(kept / (1 - kept))
 
 
-def fitted(weights: Sequence[float]) -> Calibration:
+def fitted(weights: Sequence[float], least_recognised: float = -1.0, strange: float = 1.0) -> Calibration:
     """Return the calibration with weights in the order of WEIGHTS. Raises ValueError for another number of them."""
     bias, looks, field, extent, extent_squared = weights
-    return Calibration(bias, looks, field, extent, extent_squared)
+    return Calibration(bias, looks, field, extent, extent_squared, True, least_recognised, strange)
 
 
 def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibration:
@@ -66,7 +89,8 @@ def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibrati
     for entry in file_toml(path).get("fit", ()):
         try:
             if (entry["source"], entry["encoder"]) == (source, encoder):
-                return fitted([float(entry[name]) for name in WEIGHTS])
+                weights = [float(entry[name]) for name in WEIGHTS]
+                return fitted(weights, float(entry["least_recognised"]), float(entry["strange"]))
         except (KeyError, TypeError, ValueError):
-            raise BadInput(f"{path}: an entry lacks source, encoder or {', '.join(WEIGHTS)}") from None
+            raise BadInput(f"{path}: an entry lacks source, encoder or {', '.join((*WEIGHTS, *OF_PLACES))}") from None
     return UNFITTED

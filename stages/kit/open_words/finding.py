@@ -9,7 +9,7 @@ import numpy as np
 from schemas.contact_graph import ContactGraphFile
 from schemas.language_map import LanguageMap
 from stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
-from stages.kit.open_words.calibration import Calibration, calibration_of
+from stages.kit.open_words.calibration import Calibration, calibration_of, recognised
 from stages.kit.open_words.encoder import Encoder
 from stages.kit.open_words.relations import related
 from stages.kit.open_words.relevancy import query_rows
@@ -30,17 +30,24 @@ class Found:
 
 
 class Finder:
-    """A language map with its encoder. Raises BadInput for damaged vectors."""
+    """A language map with its encoder. Raises BadInput for damaged vectors.
+
+    `recognised`: how much of it the encoder knows; `is_strange`: too little, so that hardly anything is believed.
+    """
 
     def __init__(self, language: LanguageMap, encoder: Encoder, calibration: Calibration | None = None) -> None:
         self.info, self.encoder = language.info, encoder
         self.vectors = read_vectors(language)
         self.index = region_index(self.vectors.pieces, self.info)
         self.calibration = calibration or calibration_of(self.info.source, self.info.encoder)
+        self.recognised = recognised(self.vectors.regions, self.index.extents, encoder)
+        self.is_strange = self.recognised < self.calibration.least_recognised
 
     def fits(self, text: str) -> Fits:
         """Return how well a text fits every region."""
-        return fits(self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration)
+        found = fits(self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration)
+        believed = self.calibration.strange if self.is_strange else 1.0
+        return replace(found, probabilities=believed * found.probabilities)
 
     def find(self, text: str) -> list[Found]:
         """Return places, the likeliest first, of which no two are one."""

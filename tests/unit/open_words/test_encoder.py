@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from schemas.errors import BadInput, UsageError
-from stages.kit.open_words.calibration import UNFITTED, Calibration, calibration_of, log_odds
+from stages.kit.open_words.calibration import UNFITTED, Calibration, calibration_of, log_odds, recognised
 from stages.kit.open_words.embedded import BUNDLED, EmbeddedEncoder
 from stages.kit.open_words.encoder import check_width, checked_text, unit
 from stages.kit.open_words.relevancy import CANONICAL, margins, query_rows, relevancy
@@ -107,8 +108,30 @@ def test_probabilities_rise_with_relevancy_and_unseen_regions_have_none(tmp_path
     np.testing.assert_allclose(UNFITTED.probabilities(looks, None, np.ones(3)), looks)
     np.testing.assert_allclose(log_odds(np.array([0.5, 2.0])), [0, np.log(0.9999 / 1e-4)], rtol=1e-6)
     path = tmp_path / "calibration.toml"
-    path.write_text('fit = [{source="splat", encoder="e", bias=1, looks=2, field=3, extent=0, extent_squared=0}]')
-    assert calibration_of("splat", "e", path).looks == 2 and calibration_of("splat", "other", path) == UNFITTED
+    path.write_text(
+        'fit = [{source="splat", encoder="e", bias=1, looks=2, field=3, extent=0, extent_squared=0, '
+        "least_recognised=0.1, strange=0.2}]"
+    )
+    assert calibration_of("splat", "e", path).looks == 2 and calibration_of("splat", "e", path).strange == 0.2
+    assert calibration_of("splat", "other", path) == UNFITTED
     path.write_text('fit = [{source="splat", encoder="e", bias=1}]')
     with pytest.raises(BadInput, match="lacks"):
         calibration_of("splat", "e", path)
+
+
+def test_a_place_is_recognised_by_how_near_it_is_to_names() -> None:
+    class Names(ColorEncoder):
+        """Knows chairs (red) and tables (green)."""
+
+        def texts(self, texts: Sequence[str]) -> np.ndarray:
+            known = {"chair": (1.0, 0.0, 0.0), "table": (0.0, 1.0, 0.0)}
+            return unit(np.array([known[text] for text in texts], np.float32))
+
+        def unread(self, text: str) -> tuple[str, ...]:
+            return tuple(word for word in text.split() if word not in ("chair", "table"))
+
+    near, far = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    regions, extents = np.stack([near, far, np.zeros(3)]), np.array([1.0, 3.0, 9.0])
+    assert recognised(regions, extents, Names()) == pytest.approx(0.25)
+    assert recognised(regions[2:], extents[2:], Names()) == 0.0
+    assert recognised(regions[:1], extents[:1], Names()) == pytest.approx(1.0)

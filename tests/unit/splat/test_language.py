@@ -16,7 +16,7 @@ from schemas.sequence import Sequence
 from schemas.splat import Splat
 from stages.kit.geometry.boxes import points_in_box
 from stages.kit.geometry.transforms import transform_from
-from stages.kit.open_words.calibration import UNFITTED
+from stages.kit.open_words.calibration import UNFITTED, Calibration
 from stages.kit.open_words.finding import Finder
 from stages.kit.open_words.relevancy import margins, query_rows
 from stages.kit.open_words.vectors import read_vectors
@@ -171,6 +171,16 @@ def test_a_splat_answers(room: tuple[Sequence, Splat], language: LanguageMap, co
     assert none.outcome == "absent" and not none.info.answers and none.info.next_best is not None
     again = language_of(room, tmp_path / "again")
     assert again.path("vectors.npz").read_bytes() == language.path("vectors.npz").read_bytes()
+
+
+def test_in_a_strange_place_hardly_anything_is_believed(language: LanguageMap) -> None:
+    known, strange = (
+        Finder(language, ColorEncoder(), Calibration(0.0, 1.0, 0.0, 0.0, 0.0, True, least, 0.1))
+        for least in (-1.0, 2.0)
+    )
+    assert strange.is_strange and not known.is_strange and strange.recognised == known.recognised
+    first, again = known.find("red")[0], strange.find("red")[0]
+    assert first.region == again.region and again.probability == pytest.approx(0.1 * first.probability)
 
 
 def test_a_room_of_balls_has_its_balls_and_no_fourth(shown: tuple[Gaussians, list[Sight]], tmp_path: Path) -> None:
