@@ -151,8 +151,8 @@ bench-built-ins: setup ## What stands for counters and cabinets that no model fi
 	OMP_NUM_THREADS=1 $(EXPERIMENT) built_ins --out $(OUTPUTS)/experiments/bench-built-ins$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: gap
-gap: setup ## Boxes of a real scan, outlines in a real bin, boxes of generated rooms after `make bench-built-ins`
-	$(EXPERIMENT) gap --built $(OUTPUTS)/experiments/bench-built-ins --data $(REAL_DATA) --out $(OUTPUTS)/experiments/gap $(ASKED)
+gap: setup ## Boxes of a real scan and outlines in a real bin beside those of generated rooms (QUICK=1: one room)
+	$(EXPERIMENT) gap --data $(REAL_DATA) --out $(OUTPUTS)/experiments/gap$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: bench-edits
 bench-edits: setup ## Edits by hand, applied again to maps fused with other parameters (QUICK=1: four rooms)

@@ -1,8 +1,9 @@
 """Cups of a real kitchen put on its counter by `plan`, in the scene that the chain made of the log, after `make real`.
 
-A case is a cup of the kitchen, told apart by eye (data/annotations/real); a seed is that of the planner. The goal names
-the largest level top that no mask named: that this is the counter is not told to anyone. Where the cup came to rest is
-held against the annotated counter.
+The robot starts where the camera was with most room around it: somebody stood there, inside the walls. A case is a cup
+of the kitchen, told apart by eye (data/annotations/real); a seed is that of the planner. The goal names the largest
+level top that no mask named: that this is the counter is not told to anyone. Where the cup came to rest is held against
+the annotated counter.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from benchmarks.steps import made, opened
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
+from schemas.sequence import Sequence as SequenceArtifact
+from stages.kit.geometry.boxes import bottom, transform_points_to_box, upright_box
 from stages.kit.stage import Parameters
 from stages.truth.support_annotation import AnnotatedNode, read_support_annotation
 
@@ -50,6 +53,8 @@ class Put:
     replanned: int
     why: str
     """The last failure, in words; empty when the goal was reached."""
+    behind_wall: bool = False
+    """The base was somewhere on the other side of an annotated wall than the camera: nobody knows what is there."""
 
 
 def scene_folder(bench: Bench) -> Path:
@@ -97,23 +102,59 @@ def rests_on(node: GraphNode, counter: AnnotatedNode) -> bool:
     return bool(np.all(np.abs(turned) <= np.array(box.size[:2]) / 2) and across[2] > 0.25 * box.size[2])
 
 
+def stand_of(cameras: np.ndarray, graph: ContactGraphFile) -> tuple[float, float, float]:
+    """Return x, y [m] and yaw [deg] under the camera (N, 3) that is farthest from what stands on the floor and about;
+    yaw is to the middle of these things."""
+    boxes = [n.box for n in graph.nodes if n.box is not None and n.node_type != "layout" and bottom(n.box) < LOWEST_TOP]
+    away = np.full(len(cameras), np.inf)
+    for box in boxes:
+        local = np.abs(transform_points_to_box(box, cameras)[:, :2]) - np.array(box.size[:2]) / 2
+        away = np.minimum(away, np.linalg.norm(np.maximum(local, 0.0), axis=1))
+    place = cameras[int(np.argmax(away)), :2]
+    ahead = np.mean([box.center[:2] for box in boxes], axis=0) - place
+    return float(place[0]), float(place[1]), float(np.degrees(np.arctan2(ahead[1], ahead[0])))
+
+
+def is_behind(walls: Sequence[AnnotatedNode], bases: np.ndarray, camera: np.ndarray) -> bool:
+    """Whether any of the places (N, 2) of the base is beyond the middle plane of an annotated wall, along its length,
+    seen from the `camera` (2,)."""
+    for wall in walls:
+        assert wall.find.box is not None
+        box = upright_box(wall.find.box)
+        thin = int(np.argmin(box.size[:2]))
+        local = transform_points_to_box(box, np.column_stack([bases, np.full(len(bases), box.center[2])]))
+        of_camera = transform_points_to_box(box, np.array([[*camera, box.center[2]]]))[0, thin]
+        along = np.abs(local[:, 1 - thin]) < box.size[1 - thin] / 2
+        if (along & (local[:, thin] * np.sign(of_camera) < 0)).any():
+            return True
+    return False
+
+
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Put]]:
     """Plan and execute; a cup or counter that the map does not have is a failure like any other."""
     scene = scene_folder(bench)
     graph = opened(InteractiveScene, scene).graph
     told = {node.name: node for node in read_support_annotation(ANNOTATION).nodes}
+    walls = [node for node in told.values() if node.class_name == "wall"]
+    path = opened(SequenceArtifact, scene.parent / "sequence").path("trajectory.tum")
+    cameras = np.loadtxt(path, ndmin=2)[:, 1:4]
+    stand = stand_of(cameras, graph)
     for trial in trials:
         item, counter = find_annotated(graph, told[trial.case]), find_counter(graph)
         if item is None or counter is None:
             missing = trial.case if item is None else COUNTER
             yield trial, Put(False, False, "not_found", 0, f"{missing} is not in the map")
             continue
-        goal = ["--goal", f"on({item},{counter})", "--seed", trial.seed]
+        goal = ["--goal", f"on({item},{counter})", "--seed", trial.seed, *(f"--stand={value:.3f}" for value in stand)]
         plan = opened(Plan, made("plan", bench.folder(trial) / "plan", "--scene", scene, *goal))
         reached = plan.info.status == "executed"
         on_counter = reached and rests_on(plan.graph.node(item), told[COUNTER])
         why = "" if reached or not plan.info.failures else plan.info.failures[-1].message
-        yield trial, Put(reached, on_counter, plan.info.status, len(plan.info.replanned), why)
+        behind = False
+        if plan.path("trajectory.npz").is_file():
+            with np.load(plan.path("trajectory.npz"), allow_pickle=False) as moved:
+                behind = is_behind(walls, moved["executed_world_from_base"][:, :2, 3], cameras[:, :2].mean(axis=0))
+        yield trial, Put(reached, on_counter, plan.info.status, len(plan.info.replanned), why, behind)
 
 
 def share(name: str) -> Measure:
@@ -143,12 +184,13 @@ EXPERIMENT = Experiment(
     measures={
         "reached": share("reached"),
         "on_counter": share("on_counter"),
+        "behind_wall": share("behind_wall"),
         "replanned": Measure(statistic("replanned", np.mean)),
     },
     quick_seeds=1,
     parameters=RealPlanParameters,
     places=frozenset({"runs"}),
-    inputs=lambda bench, trial: [ANNOTATION, scene_folder(bench)],
+    inputs=lambda bench, trial: [ANNOTATION, scene_folder(bench), scene_folder(bench).parent / "sequence"],
     steps=("plan",),
     pictures=write_failures,
 )

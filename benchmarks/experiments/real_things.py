@@ -90,32 +90,45 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Thin
 def judge(told: SupportAnnotation, made: PanopticMap) -> Things:
     """Hold a map against the annotated boxes."""
     vertices = np.asarray(read_mesh(made.path("mesh.ply")).vertices, float)
+    _, owner = instances_of(told, vertices, np.zeros(len(vertices), np.int64), None, 0.0)
+    return counted(owner, [Told(node.class_name, node.optional) for node in told.nodes], made)
+
+
+@dataclass(frozen=True)
+class Told:
+    """One true thing."""
+
+    class_name: str
+    optional: bool = False
+
+
+def counted(owner: np.ndarray, told: Sequence[Told], made: PanopticMap) -> Things:
+    """Hold a map against the true thing (V,) of every vertex: 1, 2, ... in the order of `told`, 0 none."""
     with np.load(made.path("mesh_labels.npz"), allow_pickle=False) as labels:
         instance = labels["instance"]
-    _, owner = instances_of(told, vertices, np.zeros(len(vertices), np.int64), None, 0.0)
     layout = {entry.name for entry in load_vocabulary().classes if entry.is_layout}
     class_of = {entity.instance: entity.class_name for entity in made.info.entities}
-    shared = np.zeros((len(told.nodes) + 1, max([int(instance.max(initial=0)), *class_of]) + 1), np.int64)
+    shared = np.zeros((len(told) + 1, max([int(instance.max(initial=0)), *class_of]) + 1), np.int64)
     np.add.at(shared, (owner, instance), 1)
     overlap = shared / np.maximum(shared.sum(1)[:, None] + shared.sum(0)[None] - shared, 1)
     overlap[0], overlap[:, 0] = 0, 0
     best = overlap.argmax(axis=1)
 
-    large = [k for k, node in enumerate(told.nodes, 1) if node.class_name in LARGE and not node.optional]
+    large = [k for k, node in enumerate(told, 1) if node.class_name in LARGE and not node.optional]
     found = [k for k in large if overlap[k, best[k]] >= ONE_PIECE]
-    named = [k for k in found if class_of[int(best[k])] == told.nodes[k - 1].class_name]
+    named = [k for k in found if class_of[int(best[k])] == told[k - 1].class_name]
 
     names = false_names = false_things = 0
     for entity, name in class_of.items():
         if name in layout or 2 * shared[1:, entity].sum() < shared[:, entity].sum():
             continue
         most = int(shared[1:, entity].argmax()) + 1
-        node = told.nodes[most - 1]
+        node = told[most - 1]
         if name != UNNAMED:
             names += 1
             false_names += not (node.class_name == name and (node.optional or best[most] == entity))
         false_things += not node.optional and overlap[most, entity] < ONE_PIECE
-    things = [k for k, node in enumerate(told.nodes, 1) if node.class_name not in layout and not node.optional]
+    things = [k for k, node in enumerate(told, 1) if node.class_name not in layout and not node.optional]
     pairs = [overlap[k, best[k]] for k in things if overlap[k, best[k]] >= ONE_PIECE]
     half_errors = (false_things + len(things) - len(pairs)) / 2
     recognised = made.summary.get("recognised_share")

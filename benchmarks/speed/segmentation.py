@@ -3,7 +3,9 @@
     python -m benchmarks.speed.segmentation --out FOLDER [--quick] [--weights detector.onnx]
 
 Peers do a comparable part each: OpenCV's RgbdNormals and Open3D's estimate_normals for the normals, OpenCV's
-findPlanes as another way to cut a depth image up, and the same convexity algorithm written with numpy alone.
+findPlanes as another way to cut a depth image up, and the same convexity algorithm written with numpy alone. Our own
+network, and a whole frame by it (geometry, masks, both fused), stand beside them; its pictures are noise, which takes
+as long.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from pydantic import Field
 from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
 from schemas.scene_parts import Camera
+from schemas.vocabulary import load_vocabulary
 from stages.kit.geometry.cameras import back_project, intrinsic_matrix
 from stages.kit.geometry.transforms import look_at
 from stages.kit.rendering.ray_casting import SceneRenderer
@@ -215,13 +218,31 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
         "opencv-findPlanes/whole": median_seconds(planes, repeats),
         "open3d/normals": median_seconds(lambda k: open3d_normals(pick(smooth, k)), slow),
     }
+    from stages.segment.backends.network.backend import load_predictor
+    from stages.segment.backends.network.features import mount_of_pose
+    from stages.segment.backends.network.weights import BUNDLED
+
+    predictor = load_predictor(BUNDLED, load_vocabulary())
+    nowhere = mount_of_pose(None, gravity_known=False, floor_is_zero=False)
+    picture = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
+
+    def by_network(k: int) -> object:
+        found, geometric = (
+            predictor.predict(pick(depths, k), picture, CAMERA, nowhere),
+            segment_depth(pick(depths, k), CAMERA),
+        )
+        return fuse(geometric.labels, found, geometric.points, FusionSettings())
+
+    seconds["ours/network"] = median_seconds(
+        lambda k: predictor.predict(pick(depths, k), picture, CAMERA, nowhere), slow
+    )
+    seconds["ours/frame-by-network"] = median_seconds(by_network, slow)
     if weights is not None:
         from stages.segment.backends.detector.yolox import Detector
 
-        color = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
         for name, side in (("detector-whole-image", 0), ("detector-tiles", 480)):
             detector = Detector(weights, score_threshold=0.3, suppression_overlap=0.5, tile_side=side)
-            seconds[f"ours/{name}"] = median_seconds(partial(_detect, detector, color), slow)
+            seconds[f"ours/{name}"] = median_seconds(partial(_detect, detector, picture), slow)
     return seconds
 
 

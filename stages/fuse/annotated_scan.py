@@ -19,7 +19,7 @@ from schemas.errors import BadInput
 from schemas.outside import file_text
 from stages.fuse.parts import connected_parts
 from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.formats.numpy_files import read_all_arrays, read_arrays
 from stages.kit.formats.scenenn_annotation import read_annotation
 
 LARGEST_JSON = 2**28
@@ -104,8 +104,6 @@ def read_scan(root: Path) -> AnnotatedScan:
         raise BadInput(
             f"{root}: {len(scan.faces)} faces, at most {MOST_FACES} are read", hint="simplify the mesh first"
         )
-    if not (scan.labels > 0).any():
-        raise BadInput(f"{root}: nothing of it is labelled", hint=HINT)
     return scan
 
 
@@ -223,9 +221,15 @@ def _labelled_ply(files: list[Path]) -> AnnotatedScan | None:
 
 
 def _points(files: list[Path]) -> AnnotatedScan | None:
-    """An NPZ with `points` (N, 3), `instance` (N,), 0 none, `id` (K,) and `classes` (K,) names, `colors` if wanted."""
+    """An NPZ with `points` (N, 3), `instance` (N,), 0 none, `id` (K,) and `classes` (K,) names, `colors` if wanted; or
+    points alone."""
     for file in (f for f in files if f.suffix == ".npz"):
-        points, labels, ids, classes = read_arrays(file, "points", "instance", "id", "classes", hint=HINT)
+        arrays = read_all_arrays(file, hint=HINT)
+        if "instance" not in arrays and "points" in arrays:
+            labels, ids = np.zeros(len(arrays["points"]), np.int64), np.zeros(0, np.int64)
+            points, classes = arrays["points"], np.zeros(0, "U1")
+        else:
+            points, labels, ids, classes = read_arrays(file, "points", "instance", "id", "classes", hint=HINT)
         if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or len(points) > MOST_POINTS:
             raise BadInput(
                 f"{file}: `points` is {points.dtype} {points.shape}, not (N, 3) up to {MOST_POINTS}", hint=HINT
@@ -246,12 +250,22 @@ def _points(files: list[Path]) -> AnnotatedScan | None:
     return None
 
 
+def _bare(files: list[Path]) -> AnnotatedScan | None:
+    """One PLY whose vertices have no labels."""
+    plys = [file for file in files if file.suffix == ".ply"]
+    if len(plys) != 1:
+        return None
+    mesh = read_mesh(plys[0], hint=HINT)
+    return _scan("mesh", mesh, np.zeros(len(mesh.vertices), np.int64), {}, False)
+
+
 LAYOUTS: tuple[Callable[[list[Path]], AnnotatedScan | None], ...] = (
     _scannet,
     _replica,
     _scenenn,
     _labelled_ply,
     _points,
+    _bare,
 )
 
 

@@ -1,4 +1,4 @@
-"""A scan that others annotated, as a panoptic map: `fuse --from-mesh`, without frames and masks."""
+"""A scan of others, annotated or bare, as a panoptic map: `fuse --from-mesh`, without frames and masks."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from schemas.base import as_vector
 from schemas.errors import BadInput
 from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.fuse.annotated_scan import AnnotatedScan, instances_by_class, read_scan
+from stages.fuse.bare_scan import told_apart
 from stages.fuse.parameters import FuseParameters
+from stages.fuse.point_surface import thinned, tiles_of_points
 from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name, write_arrays
 from stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
 from stages.kit.labels import ANYTHING, OWN, Label, LabelSet, load_label_set, plain, read_label_file
@@ -22,8 +23,6 @@ from stages.kit.stage import Context
 
 KEPT_FACES = 2_000_000
 """Finer meshes are thinned to one vertex in each cube of --voxel-size."""
-NEIGHBOURS = 12
-"""Points around one that say how the surface lies there."""
 LEVEL = np.cos(np.radians(0.5))
 VOID = frozenset(
     {"mirror", "otherstructure", "paper", "picture", "poster", "remove", "unannotated", "undefined", "unknown"}
@@ -36,13 +35,18 @@ SMALLEST_FLOOR = 100
 
 
 def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters, context: Context) -> PanopticMap:
-    """Write the map of an annotated scan: an entity for each label of a known class, all of a stuff class in one.
+    """Write the map of a scan: an entity for each label of a known class, all of a stuff class in one; without any
+    label, what geometry tells apart.
 
     What is not in the vocabulary is an `object`, and counted. Raises BadInput when the scan is of no known layout,
     broken, or nothing says what its labels are.
     """
     with context.progress.step("read the scan"):
         read = read_scan(scan)
+        bare = not (read.labels > 0).any()
+        if bare:
+            context.logger.warning("%s: nothing of it is labelled: things are told apart by geometry, z is up", scan)
+            read = told_apart(read, parameters.voxel_size, parameters.unnamed_area, scan)
         given = read_label_file(labels) if labels is not None else None
         table = classes_of(read, given, scan)
     vocabulary = load_vocabulary()
@@ -69,7 +73,7 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
             voxel_size=parameters.voxel_size,
             truncation_distance=parameters.truncation_voxels * parameters.voxel_size,
             frames_integrated=0,
-            segmentation=f"annotated by hand, {read.layout}",
+            segmentation=f"{'geometry alone' if bare else 'annotated by hand'}, {read.layout}",
             entities=tuple(entities),
         ).write(context.output / "entities.json")
         write_ply(context.output / "mesh.ply", surface)
@@ -169,50 +173,6 @@ def _entities(
             parameters.voxel_size,
         )
     return ColoredMesh(vertices.astype(np.float32), faces.astype(np.int32), colors), instance, class_of
-
-
-def thinned(
-    vertices: np.ndarray, faces: np.ndarray, colors: np.ndarray, instance: np.ndarray, edge: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices, faces, colours and instances with one vertex, the mean, for what an instance has in each cube of
-    `edge` [m]; faces that collapse or come twice are gone."""
-    cubes = np.floor(vertices / edge).astype(np.int64)
-    keys = np.column_stack([cubes, instance])
-    _, inverse = np.unique(keys, axis=0, return_inverse=True)
-    inverse = inverse.reshape(-1)
-    count = np.bincount(inverse)
-    means = np.stack([np.bincount(inverse, weights=vertices[:, k]) / count for k in range(3)], axis=1)
-    paint = np.stack([np.bincount(inverse, weights=colors[:, k]) / count for k in range(3)], axis=1)
-    owner = np.zeros(len(count), dtype=np.int64)
-    owner[inverse] = instance
-    corners = inverse[faces]
-    corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
-    turn = corners.argmin(axis=1)[:, None] if len(corners) else np.zeros((0, 1), dtype=np.int64)
-    corners = np.unique(np.take_along_axis(corners, (turn + np.arange(3)) % 3, axis=1), axis=0)
-    return means, corners, np.rint(paint).astype(np.uint8), owner
-
-
-def tiles_of_points(
-    points: np.ndarray, colors: np.ndarray, instance: np.ndarray, edge: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices, faces, colours and instances of a small square for each cube of `edge` [m] that holds points of
-    an instance, in the plane of the NEIGHBOURS nearest points; it looks up."""
-    none = np.zeros((0, 3), dtype=np.int64)
-    middles, _, paint, owner = thinned(points, none, colors, instance, edge)
-    tree = cKDTree(middles)
-    distance, near = tree.query(middles, k=min(NEIGHBOURS, len(middles)))
-    near = near.reshape(len(middles), -1)
-    around = middles[near] - middles[near].mean(axis=1, keepdims=True)
-    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
-    normal, first, second = axes[:, :, 0], axes[:, :, 2], axes[:, :, 1]
-    spacing = 0.5 * np.clip(np.median(distance.reshape(len(middles), -1)[:, 1:5], axis=1), edge, 4 * edge)[:, None]
-    flip = (normal[:, 2] < 0) ^ (np.einsum("ni,ni->n", np.cross(first, second), normal) < 0)
-    second = np.where(flip[:, None], -second, second)
-    corners = [-first - second, first - second, first + second, -first + second]
-    vertices = np.stack([middles + spacing * corner for corner in corners], axis=1).reshape(-1, 3)
-    base = 4 * np.arange(len(middles))[:, None]
-    faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]])
-    return vertices, faces, np.repeat(paint, 4, axis=0), np.repeat(owner, 4)
 
 
 def upright(

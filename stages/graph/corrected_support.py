@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from schemas.scene_parts import Box
-from stages.graph.nodes import Entity, level_patch
+from stages.graph.nodes import SAME_HEIGHT, Entity, level_patch
 from stages.graph.parameters import GraphParameters
 from stages.graph.support import (
     ORDER_TOLERANCE,
@@ -20,7 +20,7 @@ from stages.graph.support import (
     support_score,
 )
 from stages.graph.touching import SINKING, hidden_reach, seam_share, smaller_share, touches
-from stages.kit.geometry.boxes import clip_polygon, footprint, polygon_area
+from stages.kit.geometry.boxes import clip_polygon, footprint, polygon_area, transform_points_to_box
 from stages.kit.geometry.planes import plane_height
 
 HIDDEN_FACTOR = 0.8
@@ -45,6 +45,8 @@ HIGHEST_FOOT = 0.5
 """What is farther above furniture does not stand on it [m]: a hood hangs over the hob. Legs on the floor are longer."""
 LEAST_SEAM = 0.2
 """Share of its foot along which a plane must be seen to reach up to an object that is hardly over it."""
+LOWER_CELL = 0.03
+"""Squares of a footprint in which something lower was seen, or not: a voxel of a coarse map and a half [m]."""
 LEAST_SMALLER_SHARE = 0.4
 """Share of the smaller footprint that must lie in the other where an object lies on something narrower than itself."""
 
@@ -76,7 +78,8 @@ def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParam
         # A shelf shows its boards to a camera that is too low to see its top, on which the child stands.
         close = [candidate for candidate in accepted if abs(candidate.gap) <= HIDDEN_TOP_DISTANCE]
         if not close and parent.node_type != "layout":
-            hidden = hidden_candidate(child, parent, parameters)
+            hidden = continued_candidate(child, parent, entities, parameters)
+            hidden = hidden or hidden_candidate(child, parent, parameters)
             if hidden is not None:
                 candidates.append(hidden)
     return prefer_contact(prefer_the_highest(best_first(candidates, entities), parameters))
@@ -165,6 +168,48 @@ def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters)
     relation: Literal["supports", "contains"] = "contains" if inside else "supports"
     patch = level_patch(outline, height, hidden=True)
     return Candidate(child.name, parent.name, score, relation, 0.0, share, height, None, patch, touching)
+
+
+def continued_candidate(
+    child: Entity, parent: Entity, entities: list[Entity], parameters: GraphParameters
+) -> Candidate | None:
+    """Return the relation over the largest seen top at the child's bottom, where that top goes on, or None.
+
+    A worktop of dark stone shows a depth camera its edge alone, and what stands farther back on it seems to hang on the
+    wall behind. Where a top does end, a camera above it sees what is lower. So the top goes on within the parent's box
+    where nothing lower was seen: in `area_threshold` of the child's footprint at least.
+    """
+    tops = []
+    for patch in (parent.patches[k] for k in parent.supporting):
+        gap = height_gap(child.box, patch)
+        if not patch.plane.hidden and -parameters.maximum_sinking <= gap <= HIDDEN_TOP_DISTANCE:
+            tops.append((patch.plane.area, gap))
+    if not tops or child.class_name in parameters.wall_classes:
+        return None
+    area, gap = max(tops)
+    outline = clip_polygon(footprint(parent.box), footprint(child.box))
+    if area < polygon_area(footprint(child.box)) or len(outline) < 3:
+        return None
+    height = child.bottom - gap
+    share = inside_share(child.box, parent.box) - seen_lower(child, height, entities)
+    score = HIDDEN_FACTOR * support_score(gap, share)
+    if share < parameters.area_threshold or score < parameters.minimum_score:
+        return None
+    patch = level_patch(outline, height, hidden=True)
+    return Candidate(child.name, parent.name, score, "supports", gap, share, height, None, patch)
+
+
+def seen_lower(child: Entity, height: float, entities: list[Entity]) -> float:
+    """Return the share of the child's footprint in which a surface that is not its own was seen below `height` [m]."""
+    box = child.box
+    cells = np.zeros(np.maximum(1, np.round(np.array(box.size[:2]) / LOWER_CELL)).astype(int), bool)
+    for entity in entities:
+        if entity.name != child.name and len(entity.points):
+            points = entity.points[entity.points[:, 2] < height - SAME_HEIGHT]
+            place = transform_points_to_box(box, points)[:, :2] / box.size[:2] + 0.5
+            place = place[((place >= 0) & (place < 1)).all(axis=1)]
+            cells[tuple((place * cells.shape).astype(int).T)] = True
+    return float(cells.mean())
 
 
 def prefer_contact(ranked: list[Candidate]) -> list[Candidate]:

@@ -87,7 +87,7 @@ class GraphParameters(Parameters):
 
 STAGE = Stage(
     name="graph",
-    version=10,
+    version=11,
     summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},

@@ -16,11 +16,14 @@ from benchmarks.experiments.gap import (
     Compared,
     GapParameters,
     mean_of,
+    of_outlines,
     outlined,
     precision_at,
     seeds_of,
+    surface_of,
 )
-from schemas.scene_parts import Camera
+from schemas.scene_parts import Camera, Joint
+from stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape
 from stages.kit.formats.frames import Frame
 
 CAMERA = Camera(width=40, height=40, fx=40.0, fy=40.0, cx=19.5, cy=19.5)
@@ -71,8 +74,28 @@ def test_a_things_outline_goes_on_behind_what_hides_it_and_not_into_free_space(t
     assert (other == nothing).all(), "a mask that no entity covers stays as it was given"
 
 
+def test_a_thing_is_hidden_where_a_good_part_of_its_outline_is_not_seen() -> None:
+    whole = np.zeros((2, 40, 40), bool)
+    whole[:, 10:30, 10:30] = True
+    seen = whole.copy()
+    seen[0, 10] = seen[1, 10:20] = False  # a twentieth, and half
+    compared = of_outlines(list(seen), list(seen), list(whole))
+    assert compared.amodal == pytest.approx((0.95, 0.5)) and compared.hidden == pytest.approx((0.5,))
+
+
+def test_a_models_surface_stands_where_it_is_with_its_door_open() -> None:
+    """A leaf of half a metre, open by a quarter turn, in a cupboard that is twice as large as its model and turned."""
+    leaf = np.array([[[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.5, 0.0, 1.0]]])
+    joint = Joint(name="door", type="revolute", part="leaf", axis=(0, 0, 1), origin=(0, 0, 0), lower=0, upper=2)
+    parts = {"body": PartShape(leaf, (0, 0, 0)), "leaf": PartShape(leaf, (0, 0, 0))}
+    shape = ModelShape("cupboard", "cabinet", parts, (joint,))
+    pose = np.array([[0.0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    corners = surface_of(PlacedShape(shape, pose, 2.0, {"door": np.pi / 2}))
+    assert corners[1] == pytest.approx([1, 1, 0]) and corners[4] == pytest.approx([0, 0, 0])
+
+
 def test_what_is_not_there_is_not_measured(tmp_path: Path) -> None:
-    bench: Any = SimpleNamespace(parameters=GapParameters(data=tmp_path, built=tmp_path))
-    assert seeds_of(bench, SCANNET) == [] and seeds_of(bench, GENERATED) == []
+    bench: Any = SimpleNamespace(parameters=GapParameters(data=tmp_path))
+    assert seeds_of(bench, SCANNET) == [] and len(seeds_of(bench, GENERATED)) > 1
     (tmp_path / "mmdet3d_boxes").mkdir()
     assert seeds_of(bench, SCANNET) == [SCANNET]

@@ -229,8 +229,9 @@ def test_broken_scans(tmp_path: Path) -> None:
     def nothing(root: Path) -> None:
         (root / "readme.txt").write_text("a scan")
 
-    def unlabelled(root: Path) -> None:
-        write_ply(root / "a.labels.ply", room()[0], label=np.zeros(len(room()[1]), int))
+    def leaning(root: Path) -> None:
+        turn = trimesh.transformations.rotation_matrix(1.0, [1, 1, 0])[:3, :3]
+        write_ply(root / "scan.ply", room(up=turn)[0])
 
     segments, group = "scene_vh_clean_2.0.010000.segs.json", "scene.aggregation.json"
     cases = [
@@ -243,7 +244,7 @@ def test_broken_scans(tmp_path: Path) -> None:
         (without("*.ply"), "no mesh is beside it"),
         (without("info_semantic.json", replica), "info_semantic.json is not beside it"),
         (nothing, "no labelled mesh or points that are read here"),
-        (unlabelled, "nothing of it is labelled"),
+        (leaning, "nothing of it is labelled, and no floor is seen"),
     ]
     for k, (write, message) in enumerate(cases):
         root = tmp_path / str(k)
@@ -252,6 +253,25 @@ def test_broken_scans(tmp_path: Path) -> None:
         with pytest.raises(BadInput) as caught:
             made(root, tmp_path / f"out {k}")
         assert message in caught.value.message and "\n" not in caught.value.message
+
+
+@pytest.mark.parametrize("form", ["mesh", "points", "empty labels"])
+def test_a_bare_scan_is_told_apart_by_geometry(form: str, tmp_path: Path) -> None:
+    """The box on the table is lower than what stands on level tops by itself, so the two are one piece."""
+    mesh, _ = room()
+    if form == "points":
+        np.savez(tmp_path / "scan.npz", points=trimesh.sample.sample_surface(mesh, 30000, seed=0)[0].astype("f4"))
+    else:
+        columns = {"label": np.zeros(len(mesh.vertices), int)} if form == "empty labels" else {}
+        write_ply(tmp_path / "scan.ply", mesh, **columns)
+    panoptic_map = made(tmp_path, tmp_path / "out")
+    found = {entity.class_name: entity for entity in panoptic_map.info.entities}
+    assert panoptic_map.info.segmentation.startswith("geometry alone")
+    assert {"floor", "wall"} <= set(found)
+    assert found["wall"].box_minimum[1] > 1.1 and found["floor"].box_maximum[2] < 0.1
+    things = [entity for entity in panoptic_map.info.entities if entity.class_name == "object"]
+    table = max(things, key=lambda entity: entity.vertices)
+    assert 0.7 < table.box_maximum[2] < 1.0 and table.box_minimum[2] < 0.2
 
 
 def test_a_scan_takes_no_frames() -> None:

@@ -192,6 +192,21 @@ def test_the_seam_before_the_foot_tells_what_a_hidden_top_cannot(rise, parent):
     assert candidates_for(upper, [table, lower, upper], GraphParameters())[0].parent == parent
 
 
+@pytest.mark.parametrize(("shown", "carried"), [(0.2, False), (0.89, True)])
+def test_a_worktop_goes_on_where_nothing_lower_was_seen(shown, carried):
+    """Of a dark worktop the front edge alone gave depth: what stands farther back stands on it, unless the camera saw
+    something lower there (at 0.2 m); what lies at the height of the top itself is not lower."""
+    front = level_patch(np.array([[0, 0], [2, 0], [2, 0.15], [0, 0.15]]), 0.9, hidden=False)
+    counter = entity("object_1", box_from_bounds((0, 0, 0), (2, 0.6, 1.1)), [front], "object", movable=False)
+    boards = solid("sink_2", (1.0, 0.3, 0.88), (1.4, 0.6, 1.0), class_name="sink", movable=False)
+    spread = np.stack(np.meshgrid(np.arange(1.0, 1.4, 0.01), np.arange(0.3, 0.6, 0.01)), axis=-1).reshape(-1, 2)
+    below = entity("object_3", box_from_bounds((1, 0.3, 0), (1.4, 0.6, shown)), (), "object", movable=False)
+    below = replace(below, points=np.column_stack([spread, np.full(len(spread), shown)]))
+    ranked = candidates_for(boards, [counter, boards, below], GraphParameters())
+    found = [(c.height, c.hidden.plane.hidden) for c in ranked if c.parent == "object_1"]
+    assert found == ([(pytest.approx(0.9), True)] if carried else [])
+
+
 def test_a_board_lies_on_a_post_that_is_narrower_than_itself():
     table = solid("table_1", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
     post = entity("object_2", box_from_bounds((0.45, 0.45, 0.75), (0.55, 0.55, 0.95)), (), "object", movable=False)
