@@ -29,7 +29,7 @@ from stages.plan.world_model import RobotState, Snapshot, WorldModel, hold_for_c
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
 JOINT_TOLERANCE = 0.05
-"""A joint further than this from where a motion should have left it is looked at again [rad or m]."""
+"""A joint further than this from where a motion should have left it is taken to be where it is [rad or m]."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Conduct:
                 for offset, step in enumerate(steps):
                     self.physical.action = number + min(offset, len(group) - 1)
                     self._execute(step)
-                    self._check_joints(step)
+                    self._check_joints(step, ended=step is steps[-1])
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 lost = state.holding is not None and self.physical.held is None
@@ -269,19 +269,23 @@ class Conduct:
             self.physical.follow(segment, item)
         self.physical.recording.keyframe(self.physical.action, step.name)
 
-    def _check_joints(self, step: Step) -> None:
-        """Raises MotionFailed `condition_not_met` when a joint is not where the motion should have brought it: what
-        follows was planned around it."""
+    def _check_joints(self, step: Step, *, ended: bool) -> None:
+        """Take over where joints are that a motion did not leave where it should have. Raises MotionFailed
+        `condition_not_met` for such a joint while the action has not `ended`: what follows was planned around it, but
+        the next action is planned anew."""
         for planned, goal in step.manipulation.joint_values.items() if step.manipulation is not None else ():
             there, body = self.joint_names[planned], self.matched(self.model.owner(planned))
             value = self.physical.world.joint_value(body, there)
-            if abs(value - goal) > JOINT_TOLERANCE:
+            if abs(value - goal) <= JOINT_TOLERANCE:
+                continue
+            if not ended:
                 raise MotionFailed(
                     "condition_not_met",
                     f"the joint {there} stands at {value:.3f} instead of {goal:.3f}",
                     (planned,),
                     {"value": value, "goal": goal},
                 )
+            self.model.move_joint(planned, value)
 
     def _check_effect(self, name: str, arguments: tuple[str, ...]) -> None:
         """Raises MotionFailed `condition_not_met` when the room is not as the action should leave it."""
