@@ -25,7 +25,7 @@ CAMERA = Camera(width=240, height=180, fx=260.0, fy=260.0, cx=119.5, cy=89.5)
 EYES = ((0.0, 1.35), (0.2, 0.85))
 """How far before the middle of the base and how high the cameras are [m]: the head's, and one that the hand holds up,
 which is not there while the hand holds something. **Assumed**: the arm gets there and back."""
-BEFORE_IT, OVER_IT = 1.0, (0.1, 0.45)
+BEFORE_IT, OVER_IT = 1.2, (0.1, 0.45)
 """A carrier nearer to the base than this is looked at closely [m], and by the free hand from over it: so far on the
 robot's side of it, so high [m]."""
 SAME = 0.1
@@ -114,7 +114,7 @@ class CameraEyes:
                 def of_joint(value: float, name: str = joint.name) -> np.ndarray:
                     return points_at(found | {name: value})
 
-                found[joint.name] = fit_joint(seen, of_joint, joint.lower, joint.upper)
+                found[joint.name] = fit_joint(seen, of_joint, joint.lower, joint.upper, joints[joint.name])
             if turn == 0:
                 motion = fit_upright(points, points_at(found), as_believed=True)
                 if np.linalg.norm(motion[:3, 3] + (motion[:3, :3] - np.eye(3)) @ points.mean(axis=0)) > MOST_MOVED:
