@@ -28,6 +28,8 @@ which is not there while the hand holds something. **Assumed**: the arm gets the
 BEFORE_IT, OVER_IT = 1.2, (0.1, 0.45)
 """A carrier nearer to the base than this is looked at closely [m], and by the free hand from over it: so far on the
 robot's side of it, so high [m]."""
+HIDDEN = 0.015
+"""A carrier that looks smaller than it did by more is partly hidden [m]."""
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
@@ -56,6 +58,8 @@ class CameraEyes:
         self._errors, self._random, self._radius = errors, random, radius
         self._names = dict(enumerate(room.records, start=1))
         """Instance number of a picture -> body of the room."""
+        self._carriers: dict[str, SeenCarrier] = {}
+        """Planned body -> its shape, as the last look showed it that showed all of it."""
 
     def seen(self, body: str, here: str) -> Seen | None:
         """Return the planned body where the pictures show it; None where they do not, and for what neither is carried
@@ -68,22 +72,30 @@ class CameraEyes:
         if len(points) < LEAST_POINTS:
             return None
         text, planes = self._model.text(body), self._model.planes[body]
-        if carrier and (shape := self._carrier(body, points)) is not None:
+        shape = self._carrier(body, points) if carrier else None
+        if shape is not None:
             record, text = moved_record(record, shape.pose, {}), carrier_text(body, shape, record.mass)
             return record, text, body_planes(record, text)
         pose, joints = self._model.pose(body), {j.name: self._model.joint_value(body, j.name) for j in record.joints}
         if record.carriable:
-            pose = fit_upright(points, apply(pose, self._model.points(body, POINTS))) @ pose
+            seen_before = body in self._carriers
+            pose = fit_upright(points, apply(pose, self._model.points(body, POINTS)), as_believed=seen_before) @ pose
         else:
             motion, joints = self._furniture(body, points, joints)
             pose = motion @ pose
         return moved_record(record, pose, joints), text, planes
 
     def _carrier(self, body: str, points: np.ndarray) -> SeenCarrier | None:
-        """Return what points (N, 3) of a carrier show of its shape."""
+        """Return what points (N, 3) of a carrier show of its shape, None where that is less than was seen before: an
+        arm or what stands on it hides the rest."""
         load = [[*self._model.pose(name)[:2, 3], self._model.footprint(name)[0]] for name in self._model.load(body)]
         pose = self._model.pose(body)
-        return seen_carrier(points, np.array(load).reshape(-1, 3), float(np.arctan2(pose[1, 0], pose[0, 0])))
+        shape = seen_carrier(points, np.array(load).reshape(-1, 3), float(np.arctan2(pose[1, 0], pose[0, 0])))
+        before = self._carriers.get(body)
+        if shape is None or (before is not None and np.any(shape.size < before.size - HIDDEN)):
+            return None
+        self._carriers[body] = shape
+        return shape
 
     def _distance(self, body: str) -> float:
         """Return how far from the base a body is believed [m]."""

@@ -42,7 +42,12 @@ class SeenCarrier:
     pose: np.ndarray
     """(4, 4) to the frame of the points: below the middle of the rectangle, axes along its sides."""
     boxes: tuple[tuple[np.ndarray, np.ndarray], ...]
-    """Centre and edge lengths (3,) of what it is made of, own frame [m]."""
+    """Centre and edge lengths (3,) of what it is made of, own frame [m]; its floor first."""
+
+    @property
+    def size(self) -> np.ndarray:
+        """Length and breadth (2,) [m]."""
+        return self.boxes[0][1][:2]
 
 
 def seen_carrier(points: np.ndarray, load: np.ndarray, yaw: float) -> SeenCarrier | None:
