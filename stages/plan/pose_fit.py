@@ -58,7 +58,11 @@ def _planar(source: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def fit_joint(
-    seen: np.ndarray, points_at: Callable[[float], np.ndarray], lower: float, upper: float, believed: float | None = None
+    seen: np.ndarray,
+    points_at: Callable[[float], np.ndarray],
+    lower: float,
+    upper: float,
+    believed: float | None = None,
 ) -> float:
     """Return the value of a joint [rad or m] at which points of its furniture (N, 3) lie nearest to the shape that
     `points_at` a value gives (M, 3): the mean distance of the seen points, each `FAR` at most. Where it is `believed`

@@ -1,8 +1,8 @@
 """What a tray or plate looks like from near by: its floor, and the rim that a hand takes it by.
 
-A map of 2 cm voxels keeps a tray's floor and loses its rim, so that the model chosen for it may be another tray. A robot
-that stands before it sees the rim. Seen from above a carrier is a height over every cell of its rectangle; what is
-under that is taken to be solid, what was not seen to be floor.
+A map of 2 cm voxels keeps a tray's floor and loses its rim, so that the model chosen for it may be another tray. Before
+it a robot sees the rim. Seen from above a carrier is a height over every cell of its rectangle; what is under that is
+taken to be solid, what was not seen to be floor.
 """
 
 from __future__ import annotations
