@@ -130,7 +130,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=7,
+    version=8,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from stages.cad.obstacles import floor_levels, obstacles_of
 from stages.cad.ours import Ours
 from stages.cad.parameters import CadParameters
 from stages.cad.records import cad_graph, scene_file
+from stages.cad.shapes import Placement
 from stages.cad.surroundings import footing
 from stages.cad.surroundings_files import area_of, surroundings_of, write_surroundings
 from stages.cad.target import Surroundings, Target
@@ -107,7 +109,7 @@ def choose_and_write(
         if nameless is not None:
             write_surroundings(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
-        evidence = grounds_of_joints(graph, arranged, surfaces, panoptic_map, moved, method)
+        evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
         scene = scene_file(graph, shortlists, arranged, colors, evidence, selection, conflicts_after)
         scene.write(context.output / "scene.json")
         cad_graph(graph, arranged, surfaces).write(context.output / "graph.json")
@@ -220,13 +222,15 @@ def colors_of_parts(
 def grounds_of_joints(
     graph: ContactGraphFile,
     arranged: Arrangement,
+    shortlists: dict[str, Shortlist],
     surfaces: dict[str, ModelSurface],
     panoptic_map: PanopticMap,
     moved: Sequence[Articulation],
     method: CadMethod,
 ) -> dict[str, dict[str, JointEvidence]]:
     """Return node -> joint -> why it is believed, for every placed model with joints; nothing where the method does
-    not ask. Raises UsageError for a vouched name that is neither a node nor a class."""
+    not ask. What the map shows is compared with the model where it fits the map, not where the arrangement moved it.
+    Raises UsageError for a vouched name that is neither a node nor a class."""
     vouched = set(method.parameters.vouched)
     known = {node.id for node in graph.nodes} | {entry.name for entry in load_vocabulary().classes}
     if unknown := sorted(vouched - known):
@@ -240,5 +244,16 @@ def grounds_of_joints(
         looked = Looked(mesh.vertices, vertex_normals(mesh.vertices, mesh.faces), mesh.colors)
         known_to_move = bool(vouched & {name, node.class_name})
         surface = surfaces[placement.shape.model.id]
-        evidence[name] = joint_evidence(surface, placement, looked, vouched=known_to_move, articulations=moved)
+        fitted = as_fitted(placement, shortlists[name].placements)
+        evidence[name] = joint_evidence(surface, fitted, looked, vouched=known_to_move, articulations=moved)
     return evidence
+
+
+def as_fitted(placement: Placement, candidates: Sequence[Placement]) -> Placement:
+    """Return an arranged placement where it was before it was moved: at the candidate whose model, turn and size it
+    has. As it is where there is none (it was made smaller to have room)."""
+    for candidate in candidates:
+        same = candidate.shape.model.id == placement.shape.model.id and candidate.scale == placement.scale
+        if same and np.array_equal(candidate.rotation, placement.rotation):
+            return replace(placement, translation=candidate.translation)
+    return placement

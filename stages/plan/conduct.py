@@ -29,7 +29,18 @@ from stages.plan.world_model import RobotState, Snapshot, WorldModel, hold_for_c
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
 JOINT_TOLERANCE = 0.05
-"""A joint further than this from where a motion should have left it is looked at again [rad or m]."""
+"""A joint further than this from where a motion should have left it is taken to be where it is [rad or m]."""
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A body that a planned motion is tied to, as it is believed."""
+
+    body: str
+    pose: np.ndarray
+    """(4, 4), world."""
+    text: str
+    """URDF text: its shape."""
 
 
 @dataclass
@@ -123,8 +134,7 @@ class Conduct:
             self.physical.action = number
             anchor = self._anchor(group[-1]) if attempt == 0 else None
             try:
-                self._look(name, arguments)
-                preferred = None if anchor is None else self._re_anchored(group[-1], anchor)
+                preferred = self._looked(group[-1], anchor)
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style)
                 again = self.eyes is not None and self.eyes.again
@@ -141,7 +151,7 @@ class Conduct:
                 for offset, step in enumerate(steps):
                     self.physical.action = number + min(offset, len(group) - 1)
                     self._execute(step)
-                    self._check_joints(step)
+                    self._check_joints(step, ended=step is steps[-1])
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 lost = state.holding is not None and self.physical.held is None
@@ -174,12 +184,11 @@ class Conduct:
         there = replace(state, base=drive.segments[-1].path[-1, :3])
         self.model.restore(before)
         hold_for_checks(self.model, there)
-        anchor = self._anchor(step)
-        self._look(step.name, step.arguments)
-        if anchor is None:
+        preferred = self._looked(step, self._anchor(step))
+        if preferred is None:
             return refine_action(self.model, there, step.name, replace(request, base=there.base), origin)
-        _, target = self._re_anchored(step, anchor)
-        return refine_action(self.model, there, step.name, replace(request, preferred=(there.base, target)), origin)
+        preferred = (there.base, preferred[1])
+        return refine_action(self.model, there, step.name, replace(request, preferred=preferred), origin)
 
     def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
         """Return the state after the way back, None (and a note) when the arm does not get there either."""
@@ -230,17 +239,27 @@ class Conduct:
             elif record.carriable or record.joints:
                 self._see(body, match.matched)
 
-    def _anchor(self, step: Step) -> np.ndarray | None:
-        """Return the pose (4, 4) of the body that a planned motion is tied to, before the look."""
+    def _anchor(self, step: Step) -> Anchor | None:
+        """Return the body that a planned motion is tied to, before the look."""
         tied_to = action_named(step.name).tied_to
-        return None if tied_to is None else self.model.pose(step.arguments[tied_to])
+        if tied_to is None:
+            return None
+        body = step.arguments[tied_to]
+        return Anchor(body, self.model.pose(body), self.model.text(body))
 
-    def _re_anchored(self, step: Step, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return base pose and grasp (or place) of the planned step, moved along with the body they are tied to."""
-        action = action_named(step.name)
-        assert step.manipulation is not None and action.tied_to is not None
-        shift = self.model.pose(step.arguments[action.tied_to])[:3, 3] - before[:3, 3]
-        return action.moved_along(self.model, step.arguments, step.manipulation, shift)
+    def _looked(self, step: Step, before: Anchor | None) -> tuple[np.ndarray, np.ndarray] | None:
+        """Look, and return base pose and grasp (or place) of the planned step, moved along with the body they are tied
+        to; None where there is no such body, and where it is a thing of another shape than the motion was planned for.
+        """
+        self._look(step.name, step.arguments)
+        if before is None:
+            return None
+        model, action = self.model, action_named(step.name)
+        if model.records[before.body].carriable and model.text(before.body) != before.text:
+            return None
+        assert step.manipulation is not None
+        shift = model.pose(before.body)[:3, 3] - before.pose[:3, 3]
+        return action.moved_along(model, step.arguments, step.manipulation, shift)
 
     def _execute(self, step: Step) -> None:
         item = None
@@ -250,19 +269,23 @@ class Conduct:
             self.physical.follow(segment, item)
         self.physical.recording.keyframe(self.physical.action, step.name)
 
-    def _check_joints(self, step: Step) -> None:
-        """Raises MotionFailed `condition_not_met` when a joint is not where the motion should have brought it: what
-        follows was planned around it."""
+    def _check_joints(self, step: Step, *, ended: bool) -> None:
+        """Take over where joints are that a motion did not leave where it should have. Raises MotionFailed
+        `condition_not_met` for such a joint while the action has not `ended`: what follows was planned around it, but
+        the next action is planned anew."""
         for planned, goal in step.manipulation.joint_values.items() if step.manipulation is not None else ():
             there, body = self.joint_names[planned], self.matched(self.model.owner(planned))
             value = self.physical.world.joint_value(body, there)
-            if abs(value - goal) > JOINT_TOLERANCE:
+            if abs(value - goal) <= JOINT_TOLERANCE:
+                continue
+            if not ended:
                 raise MotionFailed(
                     "condition_not_met",
                     f"the joint {there} stands at {value:.3f} instead of {goal:.3f}",
                     (planned,),
                     {"value": value, "goal": goal},
                 )
+            self.model.move_joint(planned, value)
 
     def _check_effect(self, name: str, arguments: tuple[str, ...]) -> None:
         """Raises MotionFailed `condition_not_met` when the room is not as the action should leave it."""

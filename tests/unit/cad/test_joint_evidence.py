@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from schemas.scene_parts import Joint
 from stages.cad.joint_evidence import Looked, joint_evidence
 from stages.cad.model_surfaces import load_surface
 from stages.cad.shapes import Placement, shape_of_state
+from stages.cad.stage import as_fitted
 from stages.kit.formats.cad_models import model_folder
 from stages.kit.formats.scene_links import model_links
 from stages.kit.geometry.transforms import transform_from_yaw
@@ -152,3 +155,15 @@ def test_the_step_holds_what_nothing_speaks_for(room, replace_objects):
     assert decisions(told)["fridge_2"].joint_evidence["door_hinge"].grounds == ("user",)
     with pytest.raises(UsageError, match="--vouched gate: no thing"):
         replace_objects(*room, name="wrong", vouched=("gate",))
+
+
+def test_grounds_are_looked_for_where_the_model_fits_the_map(cupboards):
+    """Arranging moves a cupboard aside; what the map shows stays where it was seen."""
+    model = model_named(cupboards, "with_handles")
+    shape = shape_of_state(model, model.states[0])
+    fitted = Placement(shape, 1.0, np.eye(3), np.array([1.0, 2.0, 0.0]), 0.0, 0.01, 0.01)
+    turned = replace(fitted, rotation=transform_from_yaw(0.3, np.zeros(3))[:3, :3])
+    arranged = replace(fitted, translation=np.array([1.08, 2.0, 0.01]))
+    assert as_fitted(arranged, [turned, fitted]).translation == pytest.approx(fitted.translation)
+    smaller = replace(arranged, scale=0.97)
+    assert as_fitted(smaller, [turned, fitted]) is smaller

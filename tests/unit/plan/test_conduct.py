@@ -279,6 +279,26 @@ def test_what_was_lost_on_the_way_cannot_be_placed(tries: Tries) -> None:
     assert len(tries.failures) == 1  # no second try with an empty hand
 
 
+def test_a_door_short_of_where_it_was_pulled_stands_where_it_is(tries: Tries) -> None:
+    """Within one action the next motion was planned around the joint; after it all is planned anew."""
+    moved: list[tuple[str, float]] = []
+    tries.model = SimpleNamespace(owner=lambda joint: "fridge", move_joint=lambda *given: moved.append(given))  # type: ignore[assignment]
+    tries.physical.world = SimpleNamespace(joint_value=lambda body, joint: 1.29)
+    tries.matches = {"fridge": BodyMatch(body="fridge", matched="fridge_9")}
+    tries.joint_names = {"fridge__hinge": "fridge_9__hinge"}
+
+    def pulled(goal: float) -> Step:
+        motion = Manipulation(np.zeros(3), (), joint_values={"fridge__hinge": goal})
+        return Step("open", ("fridge__hinge",), (), motion)
+
+    with pytest.raises(MotionFailed, match=r"stands at 1\.290 instead of 1\.400"):
+        tries._check_joints(pulled(1.4), ended=False)
+    assert not moved
+    tries._check_joints(pulled(1.4), ended=True)
+    tries._check_joints(pulled(1.31), ended=True)
+    assert moved == [("fridge__hinge", 1.29)]
+
+
 # --- looks at a room ------------------------------------------------------------------------------------------
 
 
