@@ -292,7 +292,12 @@ def mean_of(name: str) -> Measure:
 
 def total(name: str) -> Measure:
     """Return a sum over rooms."""
-    return Measure(lambda records: float(sum(getattr(r, name) for r in records if r.quality is not None)), "", False)
+
+    def figure(records: Sequence[Compared]) -> float | None:
+        values = [getattr(record, name) for record in records if record.quality is not None]
+        return float(sum(values)) if values else None
+
+    return Measure(figure, "", interval=False)
 
 
 def mean_quality(records: Sequence[Compared]) -> float | None:

@@ -47,7 +47,9 @@ def test_how_many(monkeypatch: pytest.MonkeyPatch) -> None:
     assert worker_count(10_000, True, "cpu") == 1
 
 
-@pytest.mark.parametrize("options", [{"backend": "geometric"}, {"backend": "ground-truth", "corruption": 0.4}])
+@pytest.mark.parametrize(
+    "options", [{"backend": "geometric"}, {"backend": "network"}, {"backend": "ground-truth", "corruption": 0.4}]
+)
 def test_same_bytes(options: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sequence = write_sequence(tmp_path / "sequence", 9, labels=True, without={4: ("depth",)})
     here = segmented(sequence, tmp_path / "here", **options)

@@ -8,6 +8,7 @@ BACKEND = BackendDeclaration(
     name="network",
     summary="a compact RGB-D network of our own, trained on generated rooms",
     order=50,
+    apart=True,
     automatic=True,
     weights="a .safetensors checkpoint of our own, where the one that comes with the project is not wanted",
     libraries=("torch",),
