@@ -58,8 +58,8 @@ NOISY = (
 )
 CAMERAS = (
     "before each action the planned shapes of what it names were fitted to two rendered depth pictures, poses of what "
-    "can be carried and joint values of furniture; all else it knew from the planned scene. Whether an action had its "
-    "effect is told by the room"
+    "can be carried and joint values of furniture; of a tray from near by the shape was seen too, from over it where "
+    "the hand was free; all else it knew from the planned scene. Whether an action had its effect is told by the room"
 )
 PROPRIOCEPTION = "the pose of a held item in the hand was read from the simulation"
 GRIP = "items are held by friction of the two fingers alone; no constraint is added"
