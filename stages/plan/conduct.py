@@ -18,6 +18,7 @@ from stages.kit.motion.physical_robot import PhysicalRobot
 from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.simulation.robot import base_pose
 from stages.plan.action import MotionRequest, action_named
+from stages.plan.affordances import CARRIER_CLASSES
 from stages.plan.carriers import NOTHING, carrier
 from stages.plan.correspondence import match_joint
 from stages.plan.eyes import Eyes, Room
@@ -249,13 +250,15 @@ class Conduct:
 
     def _looked(self, step: Step, before: Anchor | None) -> tuple[np.ndarray, np.ndarray] | None:
         """Look, and return base pose and grasp (or place) of the planned step, moved along with the body they are tied
-        to; None where there is no such body, and where it is a thing of another shape than the motion was planned for.
+        to; None where there is no such body, and where it is a tray that eyes which err give another shape than the
+        motion was planned for: its frame is another, its rim elsewhere.
         """
         self._look(step.name, step.arguments)
         if before is None:
             return None
         model, action = self.model, action_named(step.name)
-        if model.records[before.body].carriable and model.text(before.body) != before.text:
+        reshaped = model.text(before.body) != before.text and model.records[before.body].class_name in CARRIER_CLASSES
+        if reshaped and self.eyes is not None and self.eyes.again:
             return None
         assert step.manipulation is not None
         shift = model.pose(before.body)[:3, 3] - before.pose[:3, 3]
