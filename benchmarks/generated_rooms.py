@@ -97,5 +97,7 @@ def make_room(
     options = ("--recipe", recipe, "--seed", seed, "--clutter", clutter, "--frames", frames, "--opened", opened)
     camera = ("--width", size[0], "--height", size[1], "--cameras", cameras)
     made("synthesize", room.ground_truth, "--library", library, *options, *camera)
-    made("ingest", room.sequence, "--log", room.ground_truth / "log.mcap")
+    made(
+        "ingest", room.sequence, "--log", room.ground_truth / "log.mcap", *(("--camera", "all") if cameras > 1 else ())
+    )
     return room
