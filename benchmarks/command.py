@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -66,7 +68,7 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
     missing = [trial for trial in trials if trial not in records]
     print(write_results(results, _as_recorded(words, options), missing))
     if options.publish:
-        print(f"{publish(results, missing)}: `make figures` shows it", file=sys.stderr)
+        print(f"{publish(results, missing, options.kept)}: `make figures` shows it", file=sys.stderr)
     problems = experiment.problems(results) if experiment.problems else ()
     for problem in problems:
         print(f"expectation not met: {problem}", file=sys.stderr)
@@ -79,14 +81,19 @@ def _as_recorded(words: Sequence[str], options: argparse.Namespace) -> tuple[str
     return ("python", "-m", "benchmarks", *kept)
 
 
-def publish(results: Results, missing: Sequence[Trial], folder: Path = PUBLISHED) -> Path:
-    """Copy figures.json to where pages take it from, and return that file. Raises UsageError for figures of tuning
-    seeds or of a quick run, and for an unfinished one."""
-    if results.bench.quick or results.bench.tuning or missing:
+def publish(results: Results, missing: Sequence[Trial], kept: bool, folder: Path = PUBLISHED) -> Path:
+    """Copy figures.json to where pages take it from, and return that file. Of what is `kept` parts may be missing,
+    which the file, and the head of its page, then name. Raises UsageError for figures of tuning seeds or of a quick
+    run, and for another unfinished one."""
+    if results.bench.quick or results.bench.tuning or (missing and not kept):
         what = f"{len(missing)} trials are missing" if missing else "this is no run over reporting seeds"
         raise UsageError(f"nothing is published: {what}", hint="run it without --quick and --tuning to its end")
     file = folder / f"{results.experiment.name}.json"
-    file.write_bytes((results.bench.out / "figures.json").read_bytes())
+    made = json.loads((results.bench.out / "figures.json").read_text())
+    if missing:
+        counts = Counter(f"{trial.arm}/{trial.case}" for trial in missing)
+        made["not_measured"] = {name: counts[name] for name in sorted(counts)}
+    file.write_text(json.dumps(made, indent=1, sort_keys=True) + "\n")
     return file
 
 

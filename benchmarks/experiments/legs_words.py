@@ -277,8 +277,8 @@ EXPERIMENT = Experiment(
     title="Rooms that are asked",
     simulated="The rooms, their pictures and noisy depth; the map of `entities`: the true surface that was seen.",
     knows="Colour, depth and exact poses. `thesis`, `langsplat`, `lerf` are given the view that shows it best.",
-    does_not_show="CLIP, SigLIP: the encoder is ours, small, trained on other generated rooms of the same makers. Real "
-    "logs. SAM, whose segments LangSplat has. Words that people choose: they are of the encoder's own.",
+    does_not_show="CLIP, SigLIP: the encoder is ours, small, trained on other generated rooms of the same makers. SAM, "
+    "whose segments LangSplat has. Words that people choose: they are of the encoder's own.",
     arms={
         "ours": "ours",
         "thesis": "thesis's method",

@@ -156,9 +156,21 @@ def about(experiment: Experiment) -> str:
         f"- **Measured:** {', '.join(str(experiment.about[name]) for name in ('date', 'commit', 'machine'))}.",
         f"- **Command:** `{experiment.about['command']}`",
     ]
+    if experiment.about.get("not_measured"):
+        lines.append(f"- **Asked for and not measured:** {missing_of(experiment)}.")
     if experiment.about.get("notes"):
         lines.append(f"- {text_of(experiment, 'notes')}")
     return "\n".join(lines) + "\n"
+
+
+def missing_of(experiment: Experiment) -> str:
+    """Return which arms of which cases were asked for and not measured, in how many trials."""
+    parts = []
+    for name, count in experiment.about["not_measured"].items():
+        arm, *case = name.split("/")
+        trials = "" if count == 1 else f" ({count} trials)"
+        parts.append(f"{experiment.shown(arm)}, {', '.join(experiment.shown(part) for part in case)}{trials}")
+    return "; ".join(parts)
 
 
 def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pages: Mapping[str, str]) -> str:

@@ -222,3 +222,8 @@ def test_what_is_published_is_whole_and_of_reporting_seeds(
     made = json.loads((folder / "small.json").read_text())
     assert made == json.loads((out / "figures.json").read_text())
     assert "reporting" in made["notes"] and "FOLDER" in made["command"] and "--publish" not in made["command"]
+    (lost,) = [path for path in out.rglob("record.json")][:1]
+    lost.unlink()
+    assert run(SMALL, ["small", "--out", str(out), "--publish", "--kept"]) == 0
+    (name,) = json.loads((folder / "small.json").read_text())["not_measured"]
+    assert name == "/".join(lost.relative_to(out / "trials").parts[:-2])
