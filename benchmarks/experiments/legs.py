@@ -326,7 +326,7 @@ EXPERIMENT = Experiment(
     "processor time of one thread beside the stamps of the log.",
     knows="Colour, depth, calibration and poses (exact, given, or drifting) of every picture that has arrived.",
     does_not_show="Language: nothing is asked. A GPU, on which the thesis's method and LERF make far more steps in the "
-    "same time.",
+    "same time. Budgets that stand in no row.",
     arms={"ours": "ours", "thesis": "thesis's method", "lerf": "LERF"},
     runs=lambda arm, case: arm != "lerf" or case.split("/")[1] in BUDGETS,
     cases=(*cases_of((*BUDGETS, *POSES)), *(f"{CAMERAS}/{number}" for number in NUMBERS)),
