@@ -80,8 +80,8 @@ class AnswersFile(Model):
     encoder: str
     calibrated: bool
     """Whether probabilities were fitted to right and wrong answers of this encoder; else they are relevancies."""
-    recognised: float = 1.0
-    """How alike what pictures show and the nearest names are, on the mean (cosine)."""
+    recognised: float | None = None
+    """How alike what pictures show and the nearest names are, on the mean (cosine); None: not looked at."""
     strange: bool = False
     """Whether that is so little that probabilities are small for whatever is asked."""
     least_probability: float

@@ -28,6 +28,8 @@ from benchmarks.splats.lerf import Lerf
 from benchmarks.words.asked import ANNOTATIONS, AskedLog, AskedPlace, AskedRoom, Query
 from stages.kit.geometry.boxes import box_iou
 from stages.kit.geometry.cameras import scaled
+from stages.kit.open_words.calibration import BUNDLED as CALIBRATION
+from stages.kit.open_words.embedded import BUNDLED as ENCODER
 from stages.kit.open_words.finding import Finder
 from stages.kit.open_words.opening import open_encoder
 from stages.kit.open_words.options import EncoderParameters
@@ -265,6 +267,12 @@ def calibration_error(records: Sequence[Asked]) -> float | None:
     return float(sum(gaps))
 
 
+def inputs(bench: Bench, trial: Trial) -> list[Path]:
+    """What answers are read off: calibration, encoder, and of a real log what somebody boxed."""
+    told = [] if trial.case == GENERATED else [ANNOTATIONS / f"{trial.case}.json"]
+    return [CALIBRATION, ENCODER, *told]
+
+
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The first rooms, or the one log of that name, where it is there."""
     if case != GENERATED:
@@ -309,6 +317,7 @@ EXPERIMENT = Experiment(
     compared=("recall_3d", "recall_at_rejection", "recall_2d", "precision", "absent_rejected"),
     parameters=WordsParameters,
     places=frozenset({"data"}),
+    inputs=inputs,
     quick={"rooms": 2, "steps": 100, "lerf_steps": 30},
     steps=(*STEPS, "splat build", "splat language", "splat label"),
 )

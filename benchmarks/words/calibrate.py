@@ -21,7 +21,8 @@ from scipy.optimize import minimize
 from benchmarks.experiments.real import EXPECTED
 from benchmarks.options import Recipe, asked
 from benchmarks.words.asked import AskedLog, AskedRoom
-from stages.kit.open_words.calibration import BUNDLED, SHORTEST, WEIGHTS, Calibration, fitted, log_odds
+from schemas.language_map import LanguageMap
+from stages.kit.open_words.calibration import BUNDLED, SHORTEST, WEIGHTS, Calibration, fitted, log_odds, recognised
 from stages.kit.open_words.embedded import EmbeddedEncoder
 from stages.kit.open_words.finding import Finder
 
@@ -82,10 +83,17 @@ def fit(rooms: list[AskedRoom], source: str) -> Calibration:
     return fitted([round(float(w), 4) for w in weights])
 
 
+def recognised_by(encoder: EmbeddedEncoder, language: LanguageMap) -> float:
+    """Return how much of a place an encoder recognises, whether anything was fitted for it yet or not."""
+    finder = Finder(language, encoder)
+    return recognised(finder.vectors.regions, finder.index.extents, encoder)
+
+
 def of_places(rooms: list[AskedRoom], logs: list[AskedLog]) -> tuple[float, float]:
     """Return from which share recognised on a place is known, and by how much what is fitted counts where it is not."""
     encoder = EmbeddedEncoder()
-    known = [Finder(room.language, encoder).recognised for room in rooms]
+    known = [recognised_by(encoder, room.language) for room in rooms]
+    strange = [recognised_by(encoder, log.language) for log in logs]
     finders = [Finder(log.language, encoder) for log in logs]
     firsts = [
         (log, query, finder.find(query.text)[0])
@@ -93,7 +101,7 @@ def of_places(rooms: list[AskedRoom], logs: list[AskedLog]) -> tuple[float, floa
         for query in (*log.queries[0], *log.queries[1])
     ]
     right = [log.at(np.array(log.language.info.regions[each.region].box.center), query) for log, query, each in firsts]
-    least = np.sqrt(min(known) * max(finder.recognised for finder in finders))
+    least = np.sqrt(min(known) * max(strange))
     return round(float(least), 3), round(max(float(np.mean(right)), LEAST_SHARE), 3)
 
 

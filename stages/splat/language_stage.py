@@ -28,15 +28,12 @@ from stages.splat.language.pieces import pieces
 from stages.splat.language.pyramid import pyramid
 from stages.splat.parameters import LanguageParameters
 from stages.splat.ply import read_gaussians
+from stages.splat.strays import no_strays
 from stages.splat.views import evenly, posed_frames
 
 SIZES = tuple(round(float(size), 4) for size in np.geomspace(0.08, 1.5, 8))
 """At which every Gaussian is asked for, up to the thesis's largest [m]."""
 LAST = 50
-MIDDLE = (2.0, 98.0)
-"""A region's box holds its Gaussians between these percentiles: splats have strays ..."""
-FEW = 50
-"""... but of so few Gaussians all count."""
 COVERED = 0.5
 
 
@@ -93,7 +90,7 @@ def run(
         steps=parameters.steps if losses else 0,
         loss=float(np.mean(losses)) if losses else 0.0,
         regions=tuple(
-            LanguageRegion(box=minimum_box(_middle(points)), looks=int(count))
+            LanguageRegion(box=minimum_box(points[no_strays(points)]), looks=int(count))
             for points, count in zip(members, counts, strict=True)
         ),
     )
@@ -119,12 +116,3 @@ def _numbered(found: np.ndarray) -> np.ndarray:
         row[row >= 0] += first
         first = max(first, int(row.max(initial=-1)) + 1)
     return result
-
-
-def _middle(points: np.ndarray) -> np.ndarray:
-    """Return the points without those outside the percentiles MIDDLE of any axis; all of a few."""
-    if len(points) <= FEW:
-        return points
-    low, high = np.percentile(points, MIDDLE[0], axis=0), np.percentile(points, MIDDLE[1], axis=0)
-    kept = ((points >= low) & (points <= high)).all(axis=1)
-    return points[kept] if kept.any() else points

@@ -51,7 +51,7 @@ def run(
         text=text,
         encoder=encoder.label,
         calibrated=finder.calibration.fitted,
-        recognised=round(finder.recognised, 4),
+        recognised=None if finder.recognised is None else round(finder.recognised, 4),
         strange=finder.is_strange,
         least_probability=least,
         unread=unread,

@@ -12,14 +12,15 @@ from schemas.scene_parts import Camera
 from stages.kit.geometry.transforms import inverse, look_at
 from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import Rasterizer, View
+from stages.splat.strays import no_strays
 
 SIZE = (480, 360)
 """Of a picture [px]."""
 FIELD_OF_VIEW = np.deg2rad(45.0)
 ELEVATION = np.deg2rad(55.0)
 """Steep enough to look into a room over its walls."""
-MIDDLE = (2.0, 98.0)
-"""Strays outside these percentiles of the Gaussians are not in the picture."""
+LEAST_RADIUS = 0.05
+"""Of what is shown [m]: a single Gaussian has none."""
 SHEET = 4
 """Pictures of the sheet that stands for the turn, two in a row."""
 SECONDS = 6.0
@@ -29,18 +30,15 @@ SECONDS = 6.0
 def opened(gaussians: Gaussians, camera_centers: np.ndarray) -> Gaussians:
     """Return the Gaussians that are no strays, nor higher than the highest of the cameras (V, 3) [m], where any are
     left."""
-    means = gaussians.means
-    low, high = (np.percentile(means, share, axis=0) for share in MIDDLE)
-    inside = ((means >= low) & (means <= high)).all(axis=1)
-    below = inside & (means[:, 2] <= camera_centers[:, 2].max())
-    kept = below if below.any() else inside
-    return gaussians.taken(kept)
+    inside = no_strays(gaussians.means)
+    below = inside & (gaussians.means[:, 2] <= camera_centers[:, 2].max())
+    return gaussians.taken(below if below.any() else inside)
 
 
 def turn(gaussians: Gaussians, rasterizer: Rasterizer, count: int) -> Iterator[np.ndarray]:
     """Yield `count` pictures (H, W, 3) uint8 of Gaussians from places around their middle, evenly spread."""
     low, high = gaussians.means.min(axis=0).astype(float), gaussians.means.max(axis=0).astype(float)
-    middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    middle, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, LEAST_RADIUS)
     focal = SIZE[1] / 2 / np.tan(FIELD_OF_VIEW / 2)
     camera = Camera(width=SIZE[0], height=SIZE[1], fx=focal, fy=focal, cx=(SIZE[0] - 1) / 2, cy=(SIZE[1] - 1) / 2)
     distance = radius / np.sin(FIELD_OF_VIEW / 2)

@@ -30,7 +30,11 @@ class SynthesizeParameters(Parameters):
         0.0, ge=0, le=0.5, description="Record a right eye at this distance along the camera's x too [m]; 0: none"
     )
     cameras: int = Field(
-        1, ge=1, le=3, description="Frames are, in turn, of a camera ahead, one turned to the left and one to the right"
+        1,
+        ge=1,
+        le=3,
+        description="Frames are, in turn, of a camera ahead, one turned to the left and one to the right; "
+        "`ingest --camera all` reads them all",
     )
     depth: bool = Field(True, description="The log holds depth; off: a stereo camera's log, for the step disparity")
     opened: int = Field(

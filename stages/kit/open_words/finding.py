@@ -32,7 +32,8 @@ class Found:
 class Finder:
     """A language map with its encoder. Raises BadInput for damaged vectors.
 
-    `recognised`: how much of it the encoder knows; `is_strange`: too little, so that hardly anything is believed.
+    `recognised`: how much of it the encoder knows, None where nothing was fitted for that encoder; `is_strange`: too
+    little, so that hardly anything is believed.
     """
 
     def __init__(self, language: LanguageMap, encoder: Encoder, calibration: Calibration | None = None) -> None:
@@ -40,8 +41,10 @@ class Finder:
         self.vectors = read_vectors(language)
         self.index = region_index(self.vectors.pieces, self.info)
         self.calibration = calibration or calibration_of(self.info.source, self.info.encoder)
-        self.recognised = recognised(self.vectors.regions, self.index.extents, encoder)
-        self.is_strange = self.recognised < self.calibration.least_recognised
+        self.recognised: float | None = None
+        if self.calibration.fitted:
+            self.recognised = recognised(self.vectors.regions, self.index.extents, encoder)
+        self.is_strange = self.recognised is not None and self.recognised < self.calibration.least_recognised
 
     def fits(self, text: str) -> Fits:
         """Return how well a text fits every region."""

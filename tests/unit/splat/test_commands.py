@@ -17,12 +17,13 @@ from schemas.trajectory import Trajectory
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import read_tum, write_tum
 from stages.kit.progress import SilentProgress
+from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.stage import Context
 from stages.splat import build_stage, render_stage
 from stages.splat.parameters import BuildParameters, RenderParameters
 from stages.splat.ply import COLUMNS, read_gaussians, write_gaussians
 from stages.splat.triangulation import with_points
-from stages.splat.turntable import opened
+from stages.splat.turntable import opened, turn
 from stages.splat.views import posed_frames, read_view
 from tests.unit.poses.textured_room import round_walk, write_sequence
 from tests.unit.report.test_report import parse, report
@@ -106,6 +107,12 @@ def test_what_is_higher_than_the_cameras_is_left_out_of_the_turn(made: tuple[Seq
     kept = opened(gaussians, np.array([[0.0, 0.0, height]]))
     assert 0 < len(kept) < len(gaussians) and kept.means[:, 2].max() <= height
     assert len(opened(gaussians, np.array([[0.0, 0.0, -99.0]]))) > len(kept)
+
+
+def test_a_single_gaussian_turns_too(made: tuple[Sequence, Splat]) -> None:
+    one = read_gaussians(made[1].path("splat.ply")).taken(np.array([0]))
+    (picture,) = turn(opened(one, np.zeros((1, 3))), CompiledRasterizer(), 1)
+    assert picture.shape == (360, 480, 3)
 
 
 def test_the_same_seed_gives_the_same_bytes(made: tuple[Sequence, Splat], tmp_path: Path) -> None:
