@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from schemas.errors import BadInput
+from stages.engine import forking
 from stages.engine.interruption import PARENT_VARIABLE
 from stages.engine.pipelines import Pipeline, Step, resolve_variables, step_arguments
 
@@ -44,8 +45,11 @@ def command_prefix() -> list[str]:
 
 def run_command(arguments: list[str]) -> tuple[int, str]:
     """Run one scenewright command; progress and messages pass through, standard output is returned."""
-    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), PARENT_VARIABLE: str(os.getpid())}
-    process = subprocess.Popen([*command_prefix(), *arguments], stdout=subprocess.PIPE, text=True, env=environment)
+    command = [*command_prefix(), *arguments]
+    own = {"PYTHONPATH": str(REPOSITORY), PARENT_VARIABLE: str(os.getpid())}
+    if forking.forks():
+        return forking.run_forked(command, own)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **own})
     try:
         output, _ = process.communicate()
     except KeyboardInterrupt:

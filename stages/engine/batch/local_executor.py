@@ -11,6 +11,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from stages.engine.batch.job import Job
 from stages.engine.batch.results import SceneResult
 from stages.engine.batch.scene_run import run_scene
+from stages.engine.batch.warm import WarmScenes
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -40,9 +41,12 @@ class LocalExecutor:
         jobs: int,
         threads: int | None = None,
         run: Callable[[Job, Callable[[], bool]], SceneResult | None] = run_scene,
+        *,
+        warm: bool = False,
     ) -> None:
         self._jobs = jobs
-        self._run = run
+        self._warm = WarmScenes() if warm else None
+        self._run = self._warm or run
         self._environment = thread_environment(threads or max(1, processors() // jobs))
         self._stop = threading.Event()
         # A scene dies with the thread that started it (launcher.py); threads of a pool live until close().
@@ -76,5 +80,7 @@ class LocalExecutor:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def close(self) -> None:
-        """End the threads."""
+        """End the threads and their workers."""
         self._pool.shutdown(wait=True, cancel_futures=True)
+        if self._warm is not None:
+            self._warm.close()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -20,6 +21,7 @@ from stages.engine.batch.results import SceneResult
 from stages.engine.batch.scene_log import clean
 from stages.engine.batch.scene_run import run_scene, this_host
 from stages.engine.batch.spec import RayOptions
+from stages.engine.batch.warm import WarmScenes
 from stages.engine.chain import REPOSITORY
 
 CANCEL_PATIENCE = 5.0
@@ -37,10 +39,17 @@ def load_ray() -> ModuleType:
     return ray
 
 
-def run_on_worker(job_json: str) -> str | None:
+@cache
+def warm_scenes() -> WarmScenes:
+    """Return what runs scenes in this process of Ray's, which takes one task after another."""
+    return WarmScenes()
+
+
+def run_on_worker(job_json: str, warm: bool = False) -> str | None:
     """Run one scene; this is the body of the Ray task. Job and result travel as JSON."""
     node = load_ray().get_runtime_context().get_node_id()
-    result = run_scene(Job.model_validate_json(job_json), host=f"{this_host()}/{node[:8]}")
+    run = warm_scenes() if warm else run_scene
+    result = run(Job.model_validate_json(job_json), host=f"{this_host()}/{node[:8]}")
     return None if result is None else result.model_dump_json()
 
 
@@ -99,7 +108,7 @@ class RayExecutor:
         """Hand a scene to the cluster; its numeric libraries get as many threads as it has processors."""
         threads = thread_environment(max(1, int(self._options.cpus)))
         job = job.model_copy(update={"environment": {**threads, **job.environment}})
-        self._jobs[self._task.remote(job.model_dump_json())] = job
+        self._jobs[self._task.remote(job.model_dump_json(), self._options.warm)] = job
 
     def completed(self, timeout: float) -> list[SceneResult]:
         """Return results; scenes whose worker was lost go back to the cluster, up to `retries` times each."""

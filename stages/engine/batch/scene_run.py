@@ -34,6 +34,7 @@ from stages.engine.batch.results import SceneResult
 from stages.engine.batch.scene_log import LOG_NAME, LogFollower, clean
 from stages.engine.batch.storage import drop_local, send
 from stages.engine.chain import REPOSITORY
+from stages.engine.forking import Process
 
 LAUNCHER = Path(__file__).with_name("launcher.py")
 PROCESS_NAME = ".batch-process.json"
@@ -111,23 +112,24 @@ def _has_exited(pid: int) -> bool:
     return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
-def _start(job: Job, log: int) -> subprocess.Popen[bytes]:
-    environment = {**job.environment, **os.environ, "PYTHONPATH": str(REPOSITORY)}
-    process = subprocess.Popen(
+def scene_environment(job: Job) -> dict[str, str]:
+    """Return the variables of a scene's processes; what the user has set wins."""
+    return {**job.environment, **os.environ, "PYTHONPATH": str(REPOSITORY)}
+
+
+def start_scene(job: Job, log: int) -> Process:
+    """Start a scene in a process group of its own, which writes to the descriptor `log`."""
+    return subprocess.Popen(
         [sys.executable, "-I", "-S", str(LAUNCHER), str(os.getpid()), *job.command],
         stdin=subprocess.DEVNULL,
         stdout=log,
         stderr=log,
         start_new_session=True,
-        env=environment,
+        env=scene_environment(job),
     )
-    if job.address_space is not None:
-        with suppress(psutil.Error):
-            psutil.Process(process.pid).rlimit(psutil.RLIMIT_AS, (job.address_space, job.address_space))
-    return process
 
 
-def _watch(job: Job, process: subprocess.Popen[bytes], cancelled: Callable[[], bool]) -> _Watched:
+def _watch(job: Job, process: Process, cancelled: Callable[[], bool]) -> _Watched:
     """Wait for the end of a scene, and bring it about at a limit."""
     found = _Watched()
     begun = time.monotonic()
@@ -165,7 +167,7 @@ def _watch(job: Job, process: subprocess.Popen[bytes], cancelled: Callable[[], b
     return found
 
 
-def _stop_at_once(process: subprocess.Popen[bytes], grace: float) -> None:
+def _stop_at_once(process: Process, grace: float) -> None:
     """Whatever has interrupted the watching: no scene stays behind."""
     signal_group(process.pid, signal.SIGTERM)
     deadline = time.monotonic() + grace
@@ -195,10 +197,22 @@ def _describe(job: Job, found: _Watched, follower: LogFollower) -> tuple[Outcome
 
 
 def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str = "") -> SceneResult | None:
-    """Run a scene to its end, within its limits. Returns None when it was stopped because `cancelled()` said so.
+    """Run a scene to its end, within its limits, and send what it made to the storage. Returns None when it was
+    stopped because `cancelled()` said so.
 
     The machine's refusals (a disk that is full or read-only) are results too; nothing is raised for them.
     """
+    result = run_processes(job, cancelled, host)
+    return None if result is None else stored(job, result)
+
+
+def run_processes(
+    job: Job,
+    cancelled: Callable[[], bool] = lambda: False,
+    host: str = "",
+    start: Callable[[Job, int], Process] = start_scene,
+) -> SceneResult | None:
+    """Run a scene as `run_scene` does, without the storage; `start(job, log)` starts it."""
     started, begun = datetime.now(UTC), time.monotonic()
     folder = Path(job.folder)
     identity = {
@@ -218,8 +232,11 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
         try:
             os.write(log, f"# {identity['started']} {identity['host']}\n# {shlex.join(job.command)}\n".encode())
             position = os.fstat(log).st_size
-            process = _start(job, log)
+            process = start(job, log)
             try:
+                if job.address_space is not None:
+                    with suppress(psutil.Error):
+                        psutil.Process(process.pid).rlimit(psutil.RLIMIT_AS, (job.address_space, job.address_space))
                 record.write_text(
                     json.dumps({"group": process.pid, "created": created_at(process.pid) or 0.0, "host": this_host()})
                 )
@@ -256,18 +273,10 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
     failed_step = None if outcome == "done" else follower.step
     if outcome == "not ok":  # the chain may have gone on after it
         failed_step = next((step for step, manifest in made.items() if manifest.outcome != "ok"), failed_step)
-    facts = {"measures": measures(folder, made)}
-    if job.storage is not None:
-        try:
-            send(folder, tuple(made), job.storage, job.storage_timeout)
-            if outcome == "done" and not job.keep:
-                drop_local(folder, job.steps)
-        except ScenewrightError as error:
-            outcome, code, reason = "machine failure", MACHINE_FAILED, clean(error.message)
     return SceneResult.model_validate(
         identity
-        | facts
         | {
+            "measures": measures(folder, made),
             "outcome": outcome,
             "exit_code": code,
             "failed_step": failed_step,
@@ -280,3 +289,18 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
             "outcomes": {step: manifest.outcome for step, manifest in made.items() if manifest.outcome != "ok"},
         }
     )
+
+
+def stored(job: Job, result: SceneResult) -> SceneResult:
+    """Send what a scene made to the storage of its batch, where it has one; return its result with what came of it."""
+    if job.storage is None:
+        return result
+    begun, folder = time.monotonic(), Path(job.folder)
+    changes: dict[str, object] = {}
+    try:
+        send(folder, tuple(result.artifacts), job.storage, job.storage_timeout)
+        if result.outcome == "done" and not job.keep:
+            drop_local(folder, job.steps)
+    except ScenewrightError as error:
+        changes = {"outcome": "machine failure", "exit_code": MACHINE_FAILED, "reason": clean(error.message)}
+    return result.model_copy(update={"seconds": round(result.seconds + time.monotonic() - begun, 3), **changes})

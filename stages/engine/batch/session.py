@@ -69,7 +69,7 @@ def make_executor(batch: Batch, jobs: int | None) -> Executor:
         chosen = options.model_copy(update={"jobs": jobs}) if jobs else options
         return RayExecutor(chosen, batch.spec.limits.memory)
     if isinstance(options, LocalOptions):
-        return LocalExecutor(jobs or options.jobs, options.threads)
+        return LocalExecutor(jobs or options.jobs, options.threads, warm=options.warm)
     return LocalExecutor(jobs or 1, options.cpus)
 
 

@@ -111,6 +111,8 @@ class LocalOptions(_Strict):
     jobs: Annotated[int, Field(ge=1)] = 1
     threads: Annotated[int, Field(ge=1)] | None = None
     """Threads of numeric libraries per scene; by default the processors divided by `jobs`."""
+    warm: bool = False
+    """Whether scenes run in forks of workers that keep in memory what scenes before had to load (warm.py)."""
 
 
 class RayOptions(_Strict):
@@ -128,6 +130,8 @@ class RayOptions(_Strict):
     """Custom resources of the cluster's nodes that a scene takes."""
     retries: Annotated[int, Field(ge=0)] = 2
     """How often a scene is given to another worker after its worker was lost."""
+    warm: bool = False
+    """Whether scenes run in forks of workers that keep in memory what scenes before had to load (warm.py)."""
 
 
 class SlurmOptions(_Strict):

@@ -12,6 +12,7 @@ from stages.engine.batch.job import Job
 from stages.engine.batch.results import SceneResult
 
 PROGRAM = Path(__file__).with_name("scene_program.py")
+PROGRAM_MODULE = "tests.unit.batch.scene_program"
 PIPELINE = """
 name = "tiny"
 summary = "one step"
@@ -58,6 +59,12 @@ def program_command(batch: Batch, run: PlannedRun, folder: Path, *, force: bool)
     """Run scene_program.py instead of scenewright; -S -I make it start fast."""
     values = [str(run.values["log"]), str(run.values["seed"])]
     return (sys.executable, "-I", "-S", str(PROGRAM), str(folder), *values)
+
+
+def module_command(batch: Batch, run: PlannedRun, folder: Path, *, force: bool) -> tuple[str, ...]:
+    """Run scene_program.py as a module, as scenewright is run."""
+    values = [str(run.values["log"]), str(run.values["seed"])]
+    return (sys.executable, "-m", PROGRAM_MODULE, str(folder), *values)
 
 
 def job(name: str, **changes: object) -> Job:

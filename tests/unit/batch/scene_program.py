@@ -3,10 +3,12 @@
     python scene_program.py FOLDER LOG SEED
 
 The log file holds one word and perhaps a number: `write`, `sleep 5`, `exit 3`, `outcome`, `signal 11`, `allocate 200`
-(MiB), `stubborn 30` (does not heed SIGTERM), `family 30` (a child that outlives its parent), `noise`, `fail-once`.
+(MiB), `stubborn 30` (does not heed SIGTERM), `family 30` (a child that outlives its parent), `noise`, `fail-once`,
+`loaded` (writes whether a library was there before it was asked for).
 """
 
 import hashlib
+import importlib
 import json
 import os
 import signal
@@ -68,6 +70,9 @@ def main() -> None:
         sys.stdout.write("standard output\n")
         sys.stderr.buffer.write(b"\xff\x00 binary \x1b[31m\n" + b"x" * 200_000 + b"\n")
         sys.exit(1)
+    elif word == "loaded":
+        word = f"loaded {'xml.dom.minidom' in sys.modules}"
+        importlib.import_module("xml.dom.minidom")
     elif word == "fail-once" and not (folder / "once.txt").exists():
         (folder / "once.txt").write_text("")
         sys.exit(1)

@@ -57,7 +57,7 @@ class PlayedCluster:
     def options(self, **given: Any) -> SimpleNamespace:
         self.asked = given
 
-        def submit(text: str) -> int:
+        def submit(text: str, warm: bool) -> int:
             self.submitted += 1
             return self.submitted
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import psutil
@@ -15,24 +16,39 @@ import pytest
 
 from stages.engine.batch.job import Job
 from stages.engine.batch.processes import created_at, descendants, resident_memory
+from stages.engine.batch.results import SceneResult
 from stages.engine.batch.scene_log import LOG_NAME
 from stages.engine.batch.scene_run import LAUNCHER, PROCESS_NAME, run_scene, this_host
-from tests.unit.batch.batches import PROGRAM, job
+from stages.engine.batch.warm import WarmScenes
+from tests.unit.batch.batches import PROGRAM_MODULE, job
+
+Run = Callable[..., SceneResult | None]
 
 
 def scene(folder: Path, behaviour: str, **changes: object) -> Job:
     log = folder / "log.txt"
     log.write_text(behaviour)
-    command = (sys.executable, "-I", "-S", str(PROGRAM), str(folder / "run"), str(log), "1")
+    command = (sys.executable, "-m", PROGRAM_MODULE, str(folder / "run"), str(log), "1")
     return job("a", folder=str(folder / "run"), command=command, grace=5.0, **changes)
+
+
+@pytest.fixture(scope="module", params=["cold", "warm"])
+def run(request: pytest.FixtureRequest) -> Iterator[Run]:
+    """What runs scenes: a new process for each, or forks of a worker. What comes of a scene is the same."""
+    if request.param == "cold":
+        yield run_scene
+        return
+    scenes = WarmScenes()
+    yield scenes
+    scenes.close()
 
 
 def alive(pid: int) -> bool:
     return created_at(pid) is not None
 
 
-def test_a_scene_that_ends_well(tmp_path: Path) -> None:
-    found = run_scene(scene(tmp_path, "write"))
+def test_a_scene_that_ends_well(run: Run, tmp_path: Path) -> None:
+    found = run(scene(tmp_path, "write"))
     assert found is not None
     assert (found.outcome, found.exit_code, found.reason, found.failed_step) == ("done", 0, "", None)
     assert found.host == this_host() and found.seconds > 0 and found.peak_memory_bytes > 0
@@ -43,7 +59,7 @@ def test_a_scene_that_ends_well(tmp_path: Path) -> None:
     assert set(found.artifacts) == {"sequence"} and found.measures == {"sequence/frames": 7.0}
     assert not (tmp_path / "run" / PROCESS_NAME).exists()
     text = (tmp_path / "run" / LOG_NAME).read_text()
-    assert text.startswith("# ") and str(PROGRAM) in text and "[1/1] sequence" in text
+    assert text.startswith("# ") and PROGRAM_MODULE in text and "[1/1] sequence" in text
 
 
 @pytest.mark.parametrize(
@@ -56,72 +72,74 @@ def test_a_scene_that_ends_well(tmp_path: Path) -> None:
         ("signal 9", "crash", 137, "died of SIGKILL (the kernel does that when memory runs out)"),
     ],
 )
-def test_failures_are_told_apart(tmp_path: Path, behaviour: str, outcome: str, code: int, reason: str) -> None:
-    found = run_scene(scene(tmp_path, behaviour))
+def test_failures_are_told_apart(
+    run: Run, tmp_path: Path, behaviour: str, outcome: str, code: int, reason: str
+) -> None:
+    found = run(scene(tmp_path, behaviour))
     assert found is not None
     assert (found.outcome, found.exit_code, found.reason, found.failed_step) == (outcome, code, reason, "sequence")
     assert found.outcomes == ({"sequence": "empty"} if outcome == "not ok" else {})
 
 
-def test_an_artifact_of_an_earlier_run_is_not_counted_for_a_failed_step(tmp_path: Path) -> None:
-    assert run_scene(scene(tmp_path, "write"))
-    found = run_scene(scene(tmp_path, "exit 3"))
+def test_an_artifact_of_an_earlier_run_is_not_counted_for_a_failed_step(run: Run, tmp_path: Path) -> None:
+    assert run(scene(tmp_path, "write"))
+    found = run(scene(tmp_path, "exit 3"))
     assert found is not None and found.artifacts == {} and found.measures == {}
     assert (tmp_path / "run" / LOG_NAME).read_text().count("[1/1] sequence") == 2, "the log keeps both runs"
 
 
-def test_noise_of_native_libraries_does_no_harm(tmp_path: Path) -> None:
-    found = run_scene(scene(tmp_path, "noise"))
+def test_noise_of_native_libraries_does_no_harm(run: Run, tmp_path: Path) -> None:
+    found = run(scene(tmp_path, "noise"))
     assert found is not None and found.outcome == "crash"
     assert len(found.reason) <= 500 and found.reason.isprintable()
     assert b"standard output" in (tmp_path / "run" / LOG_NAME).read_bytes()
 
 
-def test_a_program_that_does_not_exist(tmp_path: Path) -> None:
-    found = run_scene(job("a", folder=str(tmp_path / "run"), command=("/nowhere/program",)))
+def test_a_program_that_does_not_exist(run: Run, tmp_path: Path) -> None:
+    found = run(job("a", folder=str(tmp_path / "run"), command=("/nowhere/program",)))
     assert found is not None and found.outcome == "missing dependency" and "/nowhere/program" in found.reason
 
 
-def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written(run: Run, tmp_path: Path) -> None:
     (tmp_path / "run").write_text("a file")
-    found = run_scene(scene(tmp_path, "write"))
+    found = run(scene(tmp_path, "write"))
     assert found is not None and (found.outcome, found.exit_code) == ("machine failure", 6)
     assert str(tmp_path / "run") in found.reason
 
 
-def test_the_time_limit_stops_the_scene(tmp_path: Path) -> None:
+def test_the_time_limit_stops_the_scene(run: Run, tmp_path: Path) -> None:
     begun = time.monotonic()
     # Long enough for the first step to begin on a busy machine.
-    found = run_scene(scene(tmp_path, "sleep 60", time_limit=3.0))
+    found = run(scene(tmp_path, "sleep 60", time_limit=3.0))
     assert found is not None and time.monotonic() - begun < 30
     assert (found.outcome, found.exit_code, found.reason) == ("time limit", 6, "ran longer than 3.0 s")
     assert found.failed_step == "sequence"
     assert "# stopped: time limit" in (tmp_path / "run" / LOG_NAME).read_text()
 
 
-def test_what_does_not_heed_the_request_to_stop_is_killed(tmp_path: Path) -> None:
+def test_what_does_not_heed_the_request_to_stop_is_killed(run: Run, tmp_path: Path) -> None:
     begun = time.monotonic()
-    found = run_scene(scene(tmp_path, "stubborn 60", time_limit=0.5).model_copy(update={"grace": 0.5}))
+    found = run(scene(tmp_path, "stubborn 60", time_limit=0.5).model_copy(update={"grace": 0.5}))
     assert found is not None and found.outcome == "time limit"
     assert 1.0 <= time.monotonic() - begun < 10
 
 
-def test_the_memory_limit_stops_the_scene(tmp_path: Path) -> None:
-    found = run_scene(scene(tmp_path, "allocate 300", memory_limit=150 * 2**20))
+def test_the_memory_limit_stops_the_scene(run: Run, tmp_path: Path) -> None:
+    found = run(scene(tmp_path, "allocate 300", memory_limit=150 * 2**20))
     assert found is not None
     assert (found.outcome, found.exit_code) == ("memory limit", 6)
     assert "the limit is 150 MiB" in found.reason and found.peak_memory_bytes > 150 * 2**20
-    enough = run_scene(scene(tmp_path, "write", memory_limit=150 * 2**20))
+    enough = run(scene(tmp_path, "write", memory_limit=150 * 2**20))
     assert enough is not None and enough.outcome == "done"
 
 
-def test_the_address_space_is_limited_by_the_kernel(tmp_path: Path) -> None:
-    found = run_scene(scene(tmp_path, "allocate 2000", address_space=500 * 2**20))
+def test_the_address_space_is_limited_by_the_kernel(run: Run, tmp_path: Path) -> None:
+    found = run(scene(tmp_path, "allocate 2000", address_space=500 * 2**20))
     assert found is not None and found.outcome == "crash" and "MemoryError" in found.reason
 
 
-def test_nothing_outlives_its_scene(tmp_path: Path) -> None:
-    found = run_scene(scene(tmp_path, "family 60"))
+def test_nothing_outlives_its_scene(run: Run, tmp_path: Path) -> None:
+    found = run(scene(tmp_path, "family 60"))
     assert found is not None and found.outcome == "done"
     child = int((tmp_path / "run" / "child.txt").read_text())
     deadline = time.monotonic() + 5
@@ -130,13 +148,13 @@ def test_nothing_outlives_its_scene(tmp_path: Path) -> None:
     assert not alive(child)
 
 
-def test_a_cancelled_scene_has_no_result(tmp_path: Path) -> None:
+def test_a_cancelled_scene_has_no_result(run: Run, tmp_path: Path) -> None:
     stop = threading.Event()
     threading.Timer(0.3, stop.set).start()
-    assert run_scene(scene(tmp_path, "sleep 60"), stop.is_set) is None
+    assert run(scene(tmp_path, "sleep 60"), stop.is_set) is None
 
 
-def test_a_scene_left_over_by_a_killed_batch_is_ended_first(tmp_path: Path) -> None:
+def test_a_scene_left_over_by_a_killed_batch_is_ended_first(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     leftover = subprocess.Popen(
@@ -145,11 +163,11 @@ def test_a_scene_left_over_by_a_killed_batch_is_ended_first(tmp_path: Path) -> N
     facts = {"group": leftover.pid, "created": created_at(leftover.pid), "host": this_host()}
     (folder / PROCESS_NAME).write_text(json.dumps(facts))
     threading.Thread(target=leftover.wait, daemon=True).start()
-    found = run_scene(scene(tmp_path, "write"))
+    found = run(scene(tmp_path, "write"))
     assert found is not None and found.outcome == "done" and not alive(leftover.pid)
 
 
-def test_a_process_that_only_has_the_number_of_a_leftover_is_spared(tmp_path: Path) -> None:
+def test_a_process_that_only_has_the_number_of_a_leftover_is_spared(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     other = subprocess.Popen([sys.executable, "-I", "-S", "-c", "import time; time.sleep(60)"], start_new_session=True)
@@ -160,7 +178,7 @@ def test_a_process_that_only_has_the_number_of_a_leftover_is_spared(tmp_path: Pa
             {"group": "x"},
         ):
             (folder / PROCESS_NAME).write_text(json.dumps(facts))
-            assert run_scene(scene(tmp_path, "write"))
+            assert run(scene(tmp_path, "write"))
             assert other.poll() is None
     finally:
         other.kill()

@@ -1,0 +1,63 @@
+"""A process that runs scenes in forks of itself: `python -m stages.engine.batch.warm_worker`, started by warm.py.
+
+It reads a request a line (job and host) from standard input and answers with a line: the scene's result, or null for
+one that was stopped. Scenes are processes of their own in groups of their own, watched and limited as ever
+(scene_run.py); what differs is that they begin with the libraries that scenes before them had to load. SIGTERM stops
+the running scene; the end of standard input ends the worker. It has one thread, so that forking is safe.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import tempfile
+from types import FrameType
+
+from stages.engine import forking
+from stages.engine.batch.job import Job
+from stages.engine.batch.scene_run import run_processes, start_scene
+from stages.engine.interruption import PARENT_VARIABLE
+
+
+class _Asked:
+    """Whether the running scene is to be stopped. No lock: a signal handler sets it."""
+
+    stop = False
+
+    def __call__(self) -> bool:
+        return self.stop
+
+    def interrupt(self, number: int, frame: FrameType | None) -> None:
+        self.stop = True
+
+
+def main() -> None:
+    """Answer requests until there are no more."""
+    asked = _Asked()
+    signal.signal(signal.SIGTERM, asked.interrupt)
+    answers = os.dup(1)
+    os.dup2(2, 1)  # what libraries print when they are loaded is no answer
+    with tempfile.TemporaryFile("a+b", buffering=0) as learned:
+        forking.begin(learned)
+        _answer_all(answers, asked)
+
+
+def _answer_all(answers: int, asked: _Asked) -> None:
+    def start(job: Job, log: int) -> forking.Process:
+        if forking.module_words(job.command) is None:
+            return start_scene(job, log)
+        parent = {PARENT_VARIABLE: str(os.getpid())}
+        return forking.ForkedProcess(job.command, log, parent, closed=(answers,))
+
+    for line in sys.stdin:
+        request = json.loads(line)
+        asked.stop = False
+        result = run_processes(Job.model_validate(request["job"]), asked, request["host"], start)
+        os.write(answers, (b"null" if result is None else result.model_dump_json().encode()) + b"\n")
+        forking.load_learned()
+
+
+if __name__ == "__main__":
+    main()
