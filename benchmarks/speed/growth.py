@@ -158,7 +158,7 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
                 "blocks": float(mapper.blocks.count),
                 "segment_labels": float(len(mapper.labels.table()) - 1),
                 "segments_counted": float(len(merging.counts.by_segment)),
-                "pairs": float(len(merging.shared.together) + len(merging.shared.apart)),
+                "pairs": float(len(merging.shared.together) + sum(map(len, merging.shared.apart.values())) // 2),
             }
         )
     start_extraction = time.process_time()

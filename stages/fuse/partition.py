@@ -31,12 +31,16 @@ LEAST_WEIGHT = 2
 def pair_weights(labels: Iterable[int], evidence: PairEvidence) -> dict[int, dict[int, int]]:
     """Return {a: {b: weight}}, symmetric: how often frames saw both segments in one instance of a thing, less
     APART_WEIGHT times how often in two."""
-    weights: dict[int, dict[int, int]] = {label: {} for label in sorted(labels)}
-    for factor, counted in ((1, evidence.together), (-APART_WEIGHT, evidence.apart)):
-        for (first, second), count in counted.items():
-            if first in weights and second in weights:
-                weight = weights[first].get(second, 0) + factor * count
-                weights[first][second] = weights[second][first] = weight
+    known = dict.fromkeys(sorted(labels))
+    weights = {
+        label: {
+            other: -APART_WEIGHT * count for other, count in evidence.apart.get(label, {}).items() if other in known
+        }
+        for label in known
+    }
+    for (first, second), count in evidence.together.items():
+        if first in weights and second in weights:
+            weights[first][second] = weights[second][first] = weights[first].get(second, 0) + count
     return weights
 
 
@@ -78,10 +82,6 @@ def attach_unseen_pairs(groups: list[list[int]], evidence: PairEvidence, counts:
     (eq. 2.6) was carried from one to the other by frames that saw parts of both. The larger group takes the smaller.
     """
     home = {label: number for number, group in enumerate(groups) for label in group}
-    met: set[tuple[int, int]] = set()
-    for first, second in [*evidence.together, *evidence.apart]:
-        if first in home and second in home:
-            met.add((min(home[first], home[second]), max(home[first], home[second])))
     votes = [_total(group, counts) for group in groups]
     leading: dict[tuple[int, int], list[int]] = {}
     for number, group in enumerate(groups):
@@ -90,9 +90,12 @@ def attach_unseen_pairs(groups: list[list[int]], evidence: PairEvidence, counts:
             leading.setdefault(best, []).append(number)
     target = list(range(len(groups)))
     for numbers in leading.values():
+        if len(numbers) < 2:
+            continue
         main = max(numbers, key=lambda n: (votes[n], -n))
+        met = {home[other] for label in groups[main] for other in evidence.met(label) if other in home}
         for number in numbers:
-            if number != main and (min(number, main), max(number, main)) not in met:
+            if number != main and number not in met:
                 target[number] = main
     merged: dict[int, list[int]] = {}
     for number, group in enumerate(groups):

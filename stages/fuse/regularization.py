@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
@@ -50,15 +51,16 @@ class PairEvidence:
     """How often two labels were seen as one (`together`), and how often as two in one frame (`apart`).
 
     Of global segment labels: lying in one frame segment (Grinvald 2019), or matched to different ones. Of global
-    instance labels: on the segments of one frame instance, or of different ones. Keys: (smaller label, larger label).
-    To be read, and changed by the methods alone.
+    instance labels: on the segments of one frame instance, or of different ones. To be read, and changed by the methods
+    alone.
     """
 
     def __init__(self) -> None:
         self.together: dict[Pair, int] = {}
-        self.apart: dict[Pair, int] = {}
+        self.apart: dict[int, Counter[int]] = {}
+        """`apart[a][b]` and `apart[b][a]`: nearly every two labels of a frame, so both ways, without pairs as keys."""
         self._pairs: dict[int, set[Pair]] = {}
-        """The pairs that each label is in."""
+        """The pairs of `together` that each label is in."""
         self._open: set[Pair] = set()
         """Pairs that may be due: those that gained since `due` last looked, and those that it found."""
         self._rule: tuple[int, bool] | None = None
@@ -68,9 +70,20 @@ class PairEvidence:
         frame; `matched` all labels of the frame. Pairs that were seen as one are not counted as apart."""
         seen = [pair for group in groups for pair in group]
         for pair in seen:
-            self._increase(self.together, pair, 1)
-        for pair in set(combinations(sorted(matched), 2)) - set(seen):
-            self._increase(self.apart, pair, 1)
+            self._increase(pair, 1)
+        labels = list(dict.fromkeys(matched))
+        for label in labels:
+            row = self.apart.setdefault(label, Counter())
+            row.update(labels)
+            row.pop(label)
+        present = set(labels)
+        for first, second in set(seen):
+            if first in present and second in present:
+                self._decrease(first, second)
+                self._decrease(second, first)
+        for label in labels:
+            if not self.apart[label]:
+                del self.apart[label]
 
     def due(self, minimum_frames: int, *, contested: bool) -> list[tuple[int, int]]:
         """Return the pairs that were seen as one at least `minimum_frames` times, ascending; if `contested`, only those
@@ -81,13 +94,23 @@ class PairEvidence:
         self._open = {pair for pair in self._open if self._is_due(pair, minimum_frames, contested)}
         return sorted(self._open)
 
+    def met(self, label: int) -> Iterator[int]:
+        """Yield the labels that some frame showed with a label, as one or as two; some of them twice."""
+        yield from self.apart.get(label, ())
+        for first, second in self._pairs.get(label, ()):
+            yield second if first == label else first
+
     def forget(self, label: int) -> None:
         """Drop all counts of a label."""
         for pair in self._pairs.pop(label, ()):
             self._pairs[pair[0] if pair[1] == label else pair[1]].discard(pair)
             self._open.discard(pair)
-            self.together.pop(pair, None)
-            self.apart.pop(pair, None)
+            del self.together[pair]
+        for other in self.apart.pop(label, ()):
+            row = self.apart[other]
+            row.pop(label)
+            if not row:
+                del self.apart[other]
 
     def rename(self, removed: int, kept: int) -> None:
         """Move the counts of label `removed` to `kept`."""
@@ -95,21 +118,37 @@ class PairEvidence:
             other = pair[0] if pair[1] == removed else pair[1]
             self._pairs[other].discard(pair)
             self._open.discard(pair)
-            for counts in (self.together, self.apart):
-                count = counts.pop(pair, 0)
-                if count and other != kept:
-                    self._increase(counts, (min(other, kept), max(other, kept)), count)
+            count = self.together.pop(pair)
+            if other != kept:
+                self._increase((min(other, kept), max(other, kept)), count)
+        moved = self.apart.pop(removed, Counter())
+        own = self.apart.setdefault(kept, Counter())
+        for other, count in moved.items():
+            row = self.apart[other]
+            row.pop(removed)
+            if other != kept:
+                row[kept] = row.get(kept, 0) + count
+                own[other] = own.get(other, 0) + count
+        if not own:
+            del self.apart[kept]
 
     def _is_due(self, pair: Pair, minimum_frames: int, contested: bool) -> bool:
         count = self.together.get(pair, 0)
-        return count >= minimum_frames and not (contested and self.apart.get(pair, 0) >= count)
+        if count < minimum_frames:
+            return False
+        return not contested or self.apart.get(pair[0], {}).get(pair[1], 0) < count
 
-    def _increase(self, counts: dict[Pair, int], pair: Pair, amount: int) -> None:
-        counts[pair] = counts.get(pair, 0) + amount
+    def _increase(self, pair: Pair, amount: int) -> None:
+        self.together[pair] = self.together.get(pair, 0) + amount
         for label in pair:
             self._pairs.setdefault(label, set()).add(pair)
-        if counts is self.together:
-            self._open.add(pair)
+        self._open.add(pair)
+
+    def _decrease(self, first: int, second: int) -> None:
+        row = self.apart[first]
+        row[second] -= 1
+        if not row[second]:
+            row.pop(second)
 
 
 def pairs_of_one_class(labels: Iterable[int], class_id: int, counts: TripleCounts) -> list[Pair]:

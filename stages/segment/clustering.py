@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from scipy.spatial import cKDTree
+
+MOST_PAIRS = 200_000
+"""Up to so many pairs of points it is faster to look at all of them than to build a tree."""
 
 
 def clouds_touch(first: np.ndarray, second: np.ndarray, distance: float) -> bool:
@@ -17,10 +21,24 @@ def clouds_touch(first: np.ndarray, second: np.ndarray, distance: float) -> bool
     second = second[((second >= low) & (second <= high)).all(axis=1)]
     if not len(first) or not len(second):
         return False
+    beyond = np.nextafter(distance, np.inf)
+    if len(first) * len(second) <= MOST_PAIRS:
+        return _any_within(first.astype(np.float64), second.astype(np.float64), beyond * beyond)
     if len(first) < len(second):
         first, second = second, first
-    nearest, _ = cKDTree(first).query(second, distance_upper_bound=np.nextafter(distance, np.inf))
+    nearest, _ = cKDTree(first).query(second, distance_upper_bound=beyond)
     return bool(np.isfinite(nearest).any())
+
+
+@njit(cache=True)
+def _any_within(first: np.ndarray, second: np.ndarray, limit: float) -> bool:
+    """Whether any two points of (N, 3) and (M, 3) are closer than the root of `limit`."""
+    for i in range(len(first)):
+        x, y, z = first[i]
+        for j in range(len(second)):
+            if (second[j, 0] - x) ** 2 + (second[j, 1] - y) ** 2 + (second[j, 2] - z) ** 2 < limit:
+                return True
+    return False
 
 
 def bounds_in_reach(clouds: list[np.ndarray], distance: float) -> np.ndarray:

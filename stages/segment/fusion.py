@@ -15,7 +15,7 @@ import numpy as np
 
 from stages.segment.clustering import largest_cluster
 from stages.segment.geometric import relabel
-from stages.segment.overlaps import overlap_table
+from stages.segment.overlaps import LabelPixels, overlap_table, pixels_of_labels
 from stages.segment.panoptic import PanopticFrame
 
 BACKGROUND = 0
@@ -106,12 +106,14 @@ def split_contained(
     mask_pixels = np.bincount(panoptic.ravel(), minlength=table.shape[1])
     segment_pixels = table.sum(axis=1)
     result = geometric.copy()
+    flat, masks, pixels = result.reshape(-1), panoptic.ravel(), pixels_of_labels(geometric)
     next_label = table.shape[0]
     for j in range(1, table.shape[0]):
         for i in np.flatnonzero(table[j, 1:]) + 1:
             shared = table[j, i]
             if shared > contained_share * mask_pixels[i] and shared < largest_part * segment_pixels[j]:
-                result[(geometric == j) & (panoptic == i)] = next_label
+                inside = pixels.of(j)
+                flat[inside[masks[inside] == i]] = next_label
                 next_label += 1
     return result
 
@@ -130,22 +132,22 @@ def majority_labels(geometric: np.ndarray, panoptic: np.ndarray, *, majority_sha
 
 
 def far_from_instance(
-    labels: np.ndarray, segments: list[int], points: np.ndarray, *, distance: float, step: int
+    pixels: LabelPixels, segments: list[int], points: np.ndarray, *, distance: float, step: int
 ) -> list[int]:
     """Return those of the `segments` of one instance that are not in its largest Euclidean cluster.
 
-    `labels` (H, W); `points` (H, W, 3) [m]; two segments are neighbours when any of their points (every `step`-th
-    is looked at) come within `distance` [m]; the largest cluster has the most points (Han 2024, section 2.3.1).
+    `pixels` of the labels; `points` (H, W, 3) [m]; two segments are neighbours when any of their points (every
+    `step`-th is looked at) come within `distance` [m]; the largest cluster has the most points (Han 2024, section
+    2.3.1).
     """
     if len(segments) < 2:
         return []
-    flat = labels.ravel()
-    clouds, sizes = [], []
-    for label in segments:
-        pixels = np.flatnonzero(flat == label)
-        sizes.append(pixels.size)
-        clouds.append(points.reshape(-1, 3)[pixels[::step]])
-    kept = largest_cluster(clouds, sizes, distance=distance)
+    flat = points.reshape(-1, 3)
+    kept = largest_cluster(
+        [flat[pixels.of(label)[::step]] for label in segments],
+        [len(pixels.of(label)) for label in segments],
+        distance=distance,
+    )
     return [label for index, label in enumerate(segments) if index not in kept]
 
 

@@ -19,7 +19,7 @@ from stages.segment.fusion import (
     split_contained,
 )
 from stages.segment.geometric import pixels_at
-from stages.segment.overlaps import overlap_table
+from stages.segment.overlaps import overlap_table, pixels_of_labels
 from stages.segment.panoptic import PanopticFrame
 
 RIM = 2
@@ -58,11 +58,12 @@ def fuse(
     )
     labels = split_shared(labels, panoptic.ids, minimum_pixels=least_claimed, minimum_share=settings.majority_share)
     owner = majority_labels(labels, panoptic.ids, majority_share=settings.majority_share)
+    pixels = pixels_of_labels(labels)
     for parts in parts_of_things(owner, panoptic):
-        distance = settings.cluster_distance
-        if parts:
-            distance = max(distance, reach_of(points[np.isin(labels, parts)]))
-        owner[far_from_instance(labels, parts, points, distance=distance, step=settings.cluster_step)] = BACKGROUND
+        if len(parts) > 1:
+            own = np.concatenate([pixels.of(part) for part in parts])
+            distance = max(settings.cluster_distance, reach_of(points.reshape(-1, 3)[own]))
+            owner[far_from_instance(pixels, parts, points, distance=distance, step=settings.cluster_step)] = BACKGROUND
     return describe(labels, owner, panoptic)
 
 
@@ -96,6 +97,7 @@ def split_shared(
     table = overlap_table(geometric, panoptic)
     mask_pixels = table.sum(axis=0)
     result = geometric.copy()
+    flat, masks, pixels = result.reshape(-1), panoptic.ravel(), pixels_of_labels(geometric)
     next_label = table.shape[0]
     for j in range(1, table.shape[0]):
         shared = table[j].copy()
@@ -104,20 +106,23 @@ def split_shared(
         for i in np.flatnonzero(shared >= minimum_pixels):
             if i == int(np.argmax(shared)):
                 continue
-            part = (geometric == j) & (panoptic == i)
-            if enough[i] or has_core(part, minimum_pixels):
-                result[part] = next_label
+            inside = pixels.of(j)
+            part = inside[masks[inside] == i]
+            if enough[i] or has_core(part, geometric.shape[1], minimum_pixels):
+                flat[part] = next_label
                 next_label += 1
     return result
 
 
-def has_core(region: np.ndarray, minimum_pixels: int) -> bool:
-    """Whether at least `minimum_pixels` of a region (H, W) bool are farther from its outline than masks err."""
-    rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
-    width = 2 * max(1, round(RIM * region.shape[1] / 640)) + 1
-    if len(rows) < width or len(columns) < width:
+def has_core(region: np.ndarray, image_width: int, minimum_pixels: int) -> bool:
+    """Whether at least `minimum_pixels` of a region are farther from its outline than masks err; the region is pixels
+    (N,), ascending, of the flattened image."""
+    rows, columns = np.divmod(region, image_width)
+    cut = np.zeros((rows[-1] - rows[0] + 1, np.ptp(columns) + 1), dtype=np.uint8)
+    cut[rows - rows[0], columns - columns.min()] = 1
+    width = 2 * max(1, round(RIM * image_width / 640)) + 1
+    if np.count_nonzero(cut.any(axis=1)) < width or np.count_nonzero(cut.any(axis=0)) < width:
         return False
-    cut = region[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.uint8)
     # Beyond the image and the cut there is nothing of the region.
     core = cv2.erode(cut, np.ones((width, width), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return int(np.count_nonzero(core)) >= minimum_pixels

@@ -17,7 +17,7 @@ from stages.segment.fusion import (
     split_contained,
 )
 from stages.segment.geometric import pixels_at
-from stages.segment.overlaps import overlap_table
+from stages.segment.overlaps import overlap_table, pixels_of_labels
 from stages.segment.panoptic import PanopticFrame
 
 
@@ -37,7 +37,8 @@ def fuse(
         labels, panoptic.ids, contained_share=settings.contained_share, largest_part=settings.largest_part
     )
     owner = majority_labels(labels, panoptic.ids, majority_share=settings.majority_share)
+    pixels = pixels_of_labels(labels)
     for parts in parts_of_things(owner, panoptic):
-        far = far_from_instance(labels, parts, points, distance=settings.cluster_distance, step=settings.cluster_step)
+        far = far_from_instance(pixels, parts, points, distance=settings.cluster_distance, step=settings.cluster_step)
         owner[far] = BACKGROUND
     return describe(labels, owner, panoptic)

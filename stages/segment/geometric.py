@@ -15,7 +15,7 @@ from numba import njit, prange
 
 from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import back_project
-from stages.segment.normals import surface_normals
+from stages.segment.normals import planes_of, surface_normals
 
 REFERENCE_AREA = 640 * 480
 """Pixel counts among the parameters hold for images of this many pixels."""
@@ -69,36 +69,62 @@ def smooth_depth(depth: np.ndarray, *, window: int = 7, deviation: float = 0.009
     return np.where(valid & (smooth > 1e-4), 1 / np.maximum(smooth, np.float32(1e-4)), 0).astype(np.float32)
 
 
+Row = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+@njit(cache=True, error_model="numpy")
+def _lower_by_neighbour(
+    here: Row, normals: Row, there: Row, others: Row, mask_threshold: float, mutual: bool, lowest: np.ndarray
+) -> None:
+    """Lower the least convexity (N,) of the pixels of a row by that to one neighbour of each; points and normals as
+    three (N,) each. Without branches: several pixels are looked at at a time."""
+    here_x, here_y, here_z = here
+    there_x, there_y, there_z = there
+    normal_x, normal_y, normal_z = normals
+    other_x, other_y, other_z = others
+    zero = np.float32(0.0)
+    for k in range(len(lowest)):
+        nx, ny, nz = normal_x[k], normal_y[k], normal_z[k]
+        mx, my, mz = other_x[k], other_y[k], other_z[k]
+        cosine = mx * nx + my * ny + mz * nz
+        dx, dy, dz = there_x[k] - here_x[k], there_y[k] - here_y[k], there_z[k] - here_z[k]
+        over = dx * nx + dy * ny + dz * nz
+        theirs = dx * mx + dy * my + dz * mz
+        over = over - theirs if mutual else over
+        # A neighbour on or below the tangent plane is convex (1); one above it counts by its normal.
+        counts = (here_z[k] > zero) & (there_z[k] > zero) & (-over <= mask_threshold) & (cosine < lowest[k])
+        lowest[k] = cosine if counts else lowest[k]
+
+
 @njit(cache=True, parallel=True)
 def _minimum_convexity(
-    points: np.ndarray, normals: np.ndarray, window: int, mask_threshold: float, mutual: bool
+    xs: np.ndarray,
+    ys: np.ndarray,
+    zs: np.ndarray,
+    normal_xs: np.ndarray,
+    normal_ys: np.ndarray,
+    normal_zs: np.ndarray,
+    window: int,
+    mask_threshold: float,
+    mutual: bool,
 ) -> np.ndarray:
-    height, width = points.shape[0], points.shape[1]
+    """Least convexity (H, W) of points and normals whose coordinates are images (H, W) of their own."""
+    height, width = zs.shape
     result = np.ones((height, width), dtype=np.float32)
     half = window // 2
     for v in prange(height):
-        for u in range(width):
-            if points[v, u, 2] <= 0.0:
-                continue
-            px, py, pz = points[v, u, 0], points[v, u, 1], points[v, u, 2]
-            nx, ny, nz = normals[v, u, 0], normals[v, u, 1], normals[v, u, 2]
-            smallest = np.float32(1.0)
-            for row in range(max(0, v - half), min(height, v + half + 1)):
-                for column in range(max(0, u - half), min(width, u + half + 1)):
-                    mx, my, mz = normals[row, column, 0], normals[row, column, 1], normals[row, column, 2]
-                    cosine = mx * nx + my * ny + mz * nz
-                    if cosine >= smallest or points[row, column, 2] <= 0.0:
-                        continue
-                    dx = points[row, column, 0] - px
-                    dy = points[row, column, 1] - py
-                    dz = points[row, column, 2] - pz
-                    over = dx * nx + dy * ny + dz * nz
-                    if mutual:
-                        over -= dx * mx + dy * my + dz * mz
-                    # A neighbour on or below the tangent plane is convex (1); one above it counts by its normal.
-                    if -over <= mask_threshold:
-                        smallest = cosine
-            result[v, u] = smallest
+        for row in range(max(0, v - half), min(height, v + half + 1)):
+            for du in range(-half, half + 1):
+                a, b = max(0, -du), min(width, width - du)
+                _lower_by_neighbour(
+                    (xs[v, a:b], ys[v, a:b], zs[v, a:b]),
+                    (normal_xs[v, a:b], normal_ys[v, a:b], normal_zs[v, a:b]),
+                    (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du]),
+                    (normal_xs[row, a + du : b + du], normal_ys[row, a + du : b + du], normal_zs[row, a + du : b + du]),
+                    mask_threshold,
+                    mutual,
+                    result[v, a:b],
+                )
     return result
 
 
@@ -113,7 +139,7 @@ def minimum_convexity(
     reaches over a ridge tilts the normals before it, and the flat beside it then seems to rise, which the one-sided
     test takes for a crease; it also takes depth noise for one.
     """
-    return _minimum_convexity(points, normals, window, mask_threshold, mutual)
+    return _minimum_convexity(*planes_of(points), *planes_of(normals), window, mask_threshold, mutual)
 
 
 def depth_discontinuity(depth: np.ndarray, *, ratio: float = 0.01, window: int = 3) -> np.ndarray:

@@ -10,97 +10,155 @@ from numba import njit, prange
 from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import back_project
 
+# A row is worked on in loops without branches over arrays of their own, which add several pixels at a time; every sum
+# takes its terms in the order of the window, so that how many are added at a time changes no bit.
 
-@njit(cache=True, inline="always")
-def _smallest_eigenvector(
-    xx: float, xy: float, xz: float, yy: float, yz: float, zz: float
-) -> tuple[float, float, float, float]:
-    """Unit eigenvector of the smallest eigenvalue of a symmetric 3x3 matrix, and the smallest over the largest
-    eigenvalue; (0, 0, 0, 1) when it has no preferred direction. Closed form (Smith 1961)."""
-    mean = (xx + yy + zz) / 3.0
-    off_diagonal = xy * xy + xz * xz + yz * yz
-    spread = (xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2.0 * off_diagonal
-    if spread <= 0.0:
-        return 0.0, 0.0, 0.0, 1.0
-    scale = math.sqrt(spread / 6.0)
-    a, b, c = (xx - mean) / scale, (yy - mean) / scale, (zz - mean) / scale
-    d, e, f = xy / scale, xz / scale, yz / scale
-    half_determinant = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e))
-    angle = math.acos(min(1.0, max(-1.0, half_determinant))) / 3.0
-    smallest = mean + 2.0 * scale * math.cos(angle + 2.0 * math.pi / 3.0)
-    largest = mean + 2.0 * scale * math.cos(angle)
-    # Rows of (C - smallest I) span the plane normal to the eigenvector: take the longest of their cross products.
-    a, b, c = xx - smallest, yy - smallest, zz - smallest
-    x0, y0, z0 = xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy
-    x1, y1, z1 = xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz
-    x2, y2, z2 = b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz
-    n0, n1, n2 = x0 * x0 + y0 * y0 + z0 * z0, x1 * x1 + y1 * y1 + z1 * z1, x2 * x2 + y2 * y2 + z2 * z2
-    if n1 > n0 and n1 >= n2:
-        x0, y0, z0, n0 = x1, y1, z1, n1
-    elif n2 > n0:
-        x0, y0, z0, n0 = x2, y2, z2, n2
-    if n0 <= 0.0 or largest <= 0.0:
-        return 0.0, 0.0, 0.0, 1.0
-    length = math.sqrt(n0)
-    return x0 / length, y0 / length, z0 / length, max(0.0, smallest) / largest
+
+@njit(cache=True, error_model="numpy")
+def _steps_to(
+    there: tuple[np.ndarray, np.ndarray, np.ndarray],
+    here: tuple[np.ndarray, np.ndarray, np.ndarray],
+    reach: np.ndarray,
+    count: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    z: np.ndarray,
+) -> None:
+    """Write the steps (N,) from the pixels of a row to a neighbour of each into x, y, z, 0 where it is out of `reach`
+    (squared) or no point; `count` those that are within."""
+    there_x, there_y, there_z = there
+    here_x, here_y, here_z = here
+    for k in range(len(reach)):
+        dx = np.float64(there_x[k] - here_x[k])
+        dy = np.float64(there_y[k] - here_y[k])
+        dz = np.float64(there_z[k] - here_z[k])
+        left_out = (dx * dx + dy * dy + dz * dz > reach[k]) | (there_z[k] <= np.float32(0.0))
+        taken = np.float64(0.0) if left_out else np.float64(1.0)
+        count[k] += taken
+        x[k] = taken * dx
+        y[k] = taken * dy
+        z[k] = taken * dz
+
+
+@njit(cache=True, error_model="numpy")
+def _add(x: np.ndarray, y: np.ndarray, z: np.ndarray, sx: np.ndarray, sy: np.ndarray, sz: np.ndarray) -> None:
+    for k in range(len(x)):
+        sx[k] += x[k]
+        sy[k] += y[k]
+        sz[k] += z[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_products(x: np.ndarray, y: np.ndarray, z: np.ndarray, xx: np.ndarray, xy: np.ndarray, xz: np.ndarray) -> None:
+    for k in range(len(x)):
+        xx[k] += x[k] * x[k]
+        xy[k] += x[k] * y[k]
+        xz[k] += x[k] * z[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_other_products(y: np.ndarray, z: np.ndarray, yy: np.ndarray, yz: np.ndarray, zz: np.ndarray) -> None:
+    for k in range(len(y)):
+        yy[k] += y[k] * y[k]
+        yz[k] += y[k] * z[k]
+        zz[k] += z[k] * z[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _covariances(count: np.ndarray, sums: np.ndarray, scale: np.ndarray, determinant: np.ndarray) -> None:
+    """Turn the six products in `sums` (9, N) into covariances, and leave their mean in `sums[0]`; `scale` (N,) is 0
+    where nothing varies, `determinant` (N,) half of that of the scaled matrix (Smith 1961)."""
+    for k in range(len(count)):
+        n = count[k]
+        mx, my, mz = sums[0, k] / n, sums[1, k] / n, sums[2, k] / n
+        xx, xy, xz = sums[3, k] / n - mx * mx, sums[4, k] / n - mx * my, sums[5, k] / n - mx * mz
+        yy, yz, zz = sums[6, k] / n - my * my, sums[7, k] / n - my * mz, sums[8, k] / n - mz * mz
+        mean = (xx + yy + zz) / 3.0
+        off_diagonal = xy * xy + xz * xz + yz * yz
+        spread = (xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2.0 * off_diagonal
+        s = np.sqrt(spread / 6.0)
+        a, b, c = (xx - mean) / s, (yy - mean) / s, (zz - mean) / s
+        d, e, f = xy / s, xz / s, yz / s
+        determinant[k] = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e))
+        scale[k] = s if spread > 0.0 else 0.0
+        sums[0, k] = mean
+        sums[3, k], sums[4, k], sums[5, k], sums[6, k], sums[7, k], sums[8, k] = xx, xy, xz, yy, yz, zz
+
+
+@njit(cache=True, error_model="numpy")
+def _smallest_eigenvalues(scale: np.ndarray, determinant: np.ndarray, sums: np.ndarray) -> None:
+    """Put the smallest eigenvalue of every covariance into `sums[1]`, in closed form (Smith 1961); `scale` becomes 0
+    where the largest is not positive."""
+    for k in range(len(scale)):
+        if scale[k] == 0.0:
+            continue
+        angle = math.acos(min(1.0, max(-1.0, determinant[k]))) / 3.0
+        sums[1, k] = sums[0, k] + 2.0 * scale[k] * math.cos(angle + 2.0 * math.pi / 3.0)
+        if sums[0, k] <= 0.0 and sums[0, k] + 2.0 * scale[k] * math.cos(angle) <= 0.0:  # where the mean is, it is
+            scale[k] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _directions(
+    px: np.ndarray, py: np.ndarray, pz: np.ndarray, scale: np.ndarray, sums: np.ndarray, normals: np.ndarray
+) -> None:
+    """Write the eigenvectors of the smallest eigenvalues into `normals` (N, 3), facing the camera, 0 where `scale` is.
+
+    Rows of (C - smallest I) span the plane normal to the eigenvector: the longest of their cross products is taken.
+    """
+    for k in range(len(scale)):
+        xx, xy, xz, yy, yz, zz = sums[3, k], sums[4, k], sums[5, k], sums[6, k], sums[7, k], sums[8, k]
+        smallest = sums[1, k]
+        a, b, c = xx - smallest, yy - smallest, zz - smallest
+        x0, y0, z0 = xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy
+        x1, y1, z1 = xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz
+        x2, y2, z2 = b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz
+        n0, n1, n2 = x0 * x0 + y0 * y0 + z0 * z0, x1 * x1 + y1 * y1 + z1 * z1, x2 * x2 + y2 * y2 + z2 * z2
+        second = (n1 > n0) & (n1 >= n2)
+        third = (n2 > n0) & ~second
+        x = x1 if second else (x2 if third else x0)
+        y = y1 if second else (y2 if third else y0)
+        z = z1 if second else (z2 if third else z0)
+        n = n1 if second else (n2 if third else n0)
+        length = np.sqrt(n)
+        x, y, z = x / length, y / length, z / length
+        away = x * px[k] + y * py[k] + z * pz[k] > 0.0
+        known = (scale[k] > 0.0) & (n > 0.0)
+        normals[k, 0] = np.float32((-x if away else x) if known else 0.0)
+        normals[k, 1] = np.float32((-y if away else y) if known else 0.0)
+        normals[k, 2] = np.float32((-z if away else z) if known else 0.0)
 
 
 @njit(cache=True, parallel=True)
-def _window_normals(points: np.ndarray, window: int, step: int, distance_factor: float) -> np.ndarray:
-    height, width = points.shape[0], points.shape[1]
+def _window_normals(
+    xs: np.ndarray, ys: np.ndarray, zs: np.ndarray, window: int, step: int, distance_factor: float
+) -> np.ndarray:
+    """Normals (H, W, 3) of points whose coordinates are images (H, W) of their own."""
+    height, width = zs.shape
     normals = np.zeros((height, width, 3), dtype=np.float32)
     half = (window // 2) // step * step
     for v in prange(height):
+        reach = (distance_factor * zs[v].astype(np.float64)) ** 2
+        count, steps, sums = np.zeros(width), np.empty((3, width)), np.zeros((9, width))
+        for dv in range(-half, half + 1, step):
+            row = v + dv
+            if row < 0 or row >= height:
+                continue
+            for du in range(-half, half + 1, step):
+                a, b = max(0, -du), min(width, width - du)
+                x, y, z = steps[0, a:b], steps[1, a:b], steps[2, a:b]
+                there = (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du])
+                _steps_to(there, (xs[v, a:b], ys[v, a:b], zs[v, a:b]), reach[a:b], count[a:b], x, y, z)
+                _add(x, y, z, sums[0, a:b], sums[1, a:b], sums[2, a:b])
+                _add_products(x, y, z, sums[3, a:b], sums[4, a:b], sums[5, a:b])
+                _add_other_products(y, z, sums[6, a:b], sums[7, a:b], sums[8, a:b])
+        scale, determinant = np.empty(width), np.empty(width)
+        _covariances(count, sums, scale, determinant)
         for u in range(width):
-            z = points[v, u, 2]
-            if z <= 0.0:
-                continue
-            px, py, pz = points[v, u, 0], points[v, u, 1], z
-            reach = (distance_factor * z) ** 2
-            count = 0
-            sx = sy = sz = 0.0
-            xx = xy = xz = yy = yz = zz = 0.0
-            for dv in range(-half, half + 1, step):
-                row = v + dv
-                if row < 0 or row >= height:
-                    continue
-                for du in range(-half, half + 1, step):
-                    column = u + du
-                    if column < 0 or column >= width:
-                        continue
-                    if points[row, column, 2] <= 0.0:
-                        continue
-                    x = np.float64(points[row, column, 0] - px)
-                    y = np.float64(points[row, column, 1] - py)
-                    w = np.float64(points[row, column, 2] - pz)
-                    if x * x + y * y + w * w > reach:
-                        continue
-                    count += 1
-                    sx += x
-                    sy += y
-                    sz += w
-                    xx += x * x
-                    xy += x * y
-                    xz += x * w
-                    yy += y * y
-                    yz += y * w
-                    zz += w * w
-            if count < 4:
-                continue
-            mx, my, mz = sx / count, sy / count, sz / count
-            nx, ny, nz, _ = _smallest_eigenvector(
-                xx / count - mx * mx,
-                xy / count - mx * my,
-                xz / count - mx * mz,
-                yy / count - my * my,
-                yz / count - my * mz,
-                zz / count - mz * mz,
-            )
-            if nx * px + ny * py + nz * pz > 0.0:
-                nx, ny, nz = -nx, -ny, -nz
-            normals[v, u, 0] = nx
-            normals[v, u, 1] = ny
-            normals[v, u, 2] = nz
+            if zs[v, u] <= 0.0 or count[u] < 4:
+                scale[u] = 0.0
+        _smallest_eigenvalues(scale, determinant, sums)
+        _directions(xs[v], ys[v], zs[v], scale, sums, normals[v])
     return normals
 
 
@@ -115,7 +173,13 @@ def surface_normals(
     the constants of Han 2024). `step` looks at every step-th row and column of the window alone: 2 is four times
     as fast and moves the normals of noisy depth by about a degree.
     """
-    return _window_normals(np.ascontiguousarray(points, dtype=np.float32), window, step, distance_factor)
+    return _window_normals(*planes_of(points), window, step, distance_factor)
+
+
+def planes_of(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the coordinates of vectors (H, W, 3) as images (H, W) float32 of their own."""
+    x, y, z = np.ascontiguousarray(vectors.transpose(2, 0, 1), dtype=np.float32)
+    return x, y, z
 
 
 def normals_of_depth(depth: np.ndarray, camera: Camera, *, window: int = 13, step: int = 2) -> np.ndarray:

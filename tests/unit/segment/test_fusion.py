@@ -22,6 +22,7 @@ from stages.segment.fusion import (
     split_contained,
 )
 from stages.segment.fusion_ours import has_core, reach_of
+from stages.segment.overlaps import pixels_of_labels
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 HEIGHT, WIDTH = 480, 640
@@ -43,6 +44,10 @@ def points(depth: np.ndarray | float = 1.0) -> np.ndarray:
     v, u = np.mgrid[0:HEIGHT, 0:WIDTH]
     z = np.broadcast_to(np.asarray(depth, dtype=np.float32), (HEIGHT, WIDTH))
     return np.stack([(u - 320) / 500 * z, (v - 240) / 500 * z, z], axis=-1).astype(np.float32)
+
+
+def pixels_of(labels: np.ndarray) -> tuple[np.ndarray, int]:
+    return np.flatnonzero(labels == 1), WIDTH
 
 
 def by_category(fused, category: int) -> np.ndarray:
@@ -146,10 +151,10 @@ def test_clouds_touch_as_brute_force_says(first: np.ndarray, second: np.ndarray,
 
 def test_far_segments_are_judged_by_pixels_not_by_samples() -> None:
     labels = image((1, 0, 0, 40, 100), (2, 200, 0, 240, 101), (3, 40, 0, 41, 100))
-    removed = far_from_instance(labels, [1, 2, 3], points(), distance=0.05, step=5)
+    removed = far_from_instance(pixels_of_labels(labels), [1, 2, 3], points(), distance=0.05, step=5)
     assert removed == [2], "1 and 3 together have more points than 2"
     labels = image((1, 0, 0, 40, 100), (2, 200, 0, 240, 105), (3, 40, 0, 41, 100))
-    assert far_from_instance(labels, [1, 2, 3], points(), distance=0.05, step=5) == [1, 3]
+    assert far_from_instance(pixels_of_labels(labels), [1, 2, 3], points(), distance=0.05, step=5) == [1, 3]
 
 
 def test_small_segments() -> None:
@@ -228,10 +233,12 @@ def test_pixel_counts_follow_the_area_of_the_image() -> None:
 
 
 def test_a_rim_has_no_core_and_a_patch_has() -> None:
-    assert not has_core(image((1, 100, 100, 104, 400)) == 1, 60)
-    assert has_core(image((1, 100, 100, 110, 140)) == 1, 60)
-    assert has_core(image((1, 100, 100, 110, 115)) == 1, 66) and not has_core(image((1, 100, 100, 110, 115)) == 1, 67)
-    assert has_core(image((1, 0, 0, 10, 40)) == 1, 60), "the edge of the image is an outline as any other"
+    assert not has_core(*pixels_of(image((1, 100, 100, 104, 400))), 60)
+    assert has_core(*pixels_of(image((1, 100, 100, 110, 140))), 60)
+    assert has_core(*pixels_of(image((1, 100, 100, 110, 115))), 66) and not has_core(
+        *pixels_of(image((1, 100, 100, 110, 115))), 67
+    )
+    assert has_core(*pixels_of(image((1, 0, 0, 10, 40))), 60), "the edge of the image is an outline as any other"
 
 
 def test_the_foot_of_a_monitor_leaves_the_desk_and_a_rim_does_not() -> None:
