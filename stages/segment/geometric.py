@@ -96,35 +96,35 @@ def _lower_by_neighbour(
         lowest[k] = cosine if counts else lowest[k]
 
 
-@njit(cache=True, parallel=True)
-def _minimum_convexity(
-    xs: np.ndarray,
-    ys: np.ndarray,
-    zs: np.ndarray,
-    normal_xs: np.ndarray,
-    normal_ys: np.ndarray,
-    normal_zs: np.ndarray,
-    window: int,
-    mask_threshold: float,
-    mutual: bool,
-) -> np.ndarray:
-    """Least convexity (H, W) of points and normals whose coordinates are images (H, W) of their own."""
+@njit(cache=True)
+def _row_of_convexity(
+    points: Row, normals: Row, v: int, window: int, mask_threshold: float, mutual: bool, lowest: np.ndarray
+) -> None:
+    """Lower the least convexity (W,) of row v by all neighbours; coordinates are images (H, W)."""
+    xs, ys, zs = points
+    normal_xs, normal_ys, normal_zs = normals
     height, width = zs.shape
-    result = np.ones((height, width), dtype=np.float32)
     half = window // 2
-    for v in prange(height):
-        for row in range(max(0, v - half), min(height, v + half + 1)):
-            for du in range(-half, half + 1):
-                a, b = max(0, -du), min(width, width - du)
-                _lower_by_neighbour(
-                    (xs[v, a:b], ys[v, a:b], zs[v, a:b]),
-                    (normal_xs[v, a:b], normal_ys[v, a:b], normal_zs[v, a:b]),
-                    (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du]),
-                    (normal_xs[row, a + du : b + du], normal_ys[row, a + du : b + du], normal_zs[row, a + du : b + du]),
-                    mask_threshold,
-                    mutual,
-                    result[v, a:b],
-                )
+    for row in range(max(0, v - half), min(height, v + half + 1)):
+        for du in range(-half, half + 1):
+            a, b = max(0, -du), min(width, width - du)
+            _lower_by_neighbour(
+                (xs[v, a:b], ys[v, a:b], zs[v, a:b]),
+                (normal_xs[v, a:b], normal_ys[v, a:b], normal_zs[v, a:b]),
+                (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du]),
+                (normal_xs[row, a + du : b + du], normal_ys[row, a + du : b + du], normal_zs[row, a + du : b + du]),
+                mask_threshold,
+                mutual,
+                lowest[a:b],
+            )
+
+
+@njit(cache=True, parallel=True)
+def _minimum_convexity(points: Row, normals: Row, window: int, mask_threshold: float, mutual: bool) -> np.ndarray:
+    """Least convexity (H, W) of points and normals whose coordinates are images (H, W) of their own."""
+    result = np.ones(points[2].shape, dtype=np.float32)
+    for v in prange(result.shape[0]):
+        _row_of_convexity(points, normals, v, window, mask_threshold, mutual, result[v])
     return result
 
 
@@ -139,7 +139,7 @@ def minimum_convexity(
     reaches over a ridge tilts the normals before it, and the flat beside it then seems to rise, which the one-sided
     test takes for a crease; it also takes depth noise for one.
     """
-    return _minimum_convexity(*planes_of(points), *planes_of(normals), window, mask_threshold, mutual)
+    return _minimum_convexity(planes_of(points), planes_of(normals), window, mask_threshold, mutual)
 
 
 def depth_discontinuity(depth: np.ndarray, *, ratio: float = 0.01, window: int = 3) -> np.ndarray:

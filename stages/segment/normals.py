@@ -129,36 +129,51 @@ def _directions(
         normals[k, 2] = np.float32((-z if away else z) if known else 0.0)
 
 
+@njit(cache=True)
+def _row_of_normals(
+    xs: np.ndarray,
+    ys: np.ndarray,
+    zs: np.ndarray,
+    v: int,
+    window: int,
+    step: int,
+    distance_factor: float,
+    normals: np.ndarray,
+) -> None:
+    """Write the normals (W, 3) of row v of points whose coordinates are images (H, W) of their own."""
+    height, width = zs.shape
+    half = (window // 2) // step * step
+    reach = (distance_factor * zs[v].astype(np.float64)) ** 2
+    count, steps, sums = np.zeros(width), np.empty((3, width)), np.zeros((9, width))
+    for dv in range(-half, half + 1, step):
+        row = v + dv
+        if row < 0 or row >= height:
+            continue
+        for du in range(-half, half + 1, step):
+            a, b = max(0, -du), min(width, width - du)
+            x, y, z = steps[0, a:b], steps[1, a:b], steps[2, a:b]
+            there = (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du])
+            _steps_to(there, (xs[v, a:b], ys[v, a:b], zs[v, a:b]), reach[a:b], count[a:b], x, y, z)
+            _add(x, y, z, sums[0, a:b], sums[1, a:b], sums[2, a:b])
+            _add_products(x, y, z, sums[3, a:b], sums[4, a:b], sums[5, a:b])
+            _add_other_products(y, z, sums[6, a:b], sums[7, a:b], sums[8, a:b])
+    scale, determinant = np.empty(width), np.empty(width)
+    _covariances(count, sums, scale, determinant)
+    for u in range(width):
+        if zs[v, u] <= 0.0 or count[u] < 4:
+            scale[u] = 0.0
+    _smallest_eigenvalues(scale, determinant, sums)
+    _directions(xs[v], ys[v], zs[v], scale, sums, normals)
+
+
 @njit(cache=True, parallel=True)
 def _window_normals(
     xs: np.ndarray, ys: np.ndarray, zs: np.ndarray, window: int, step: int, distance_factor: float
 ) -> np.ndarray:
     """Normals (H, W, 3) of points whose coordinates are images (H, W) of their own."""
-    height, width = zs.shape
-    normals = np.zeros((height, width, 3), dtype=np.float32)
-    half = (window // 2) // step * step
-    for v in prange(height):
-        reach = (distance_factor * zs[v].astype(np.float64)) ** 2
-        count, steps, sums = np.zeros(width), np.empty((3, width)), np.zeros((9, width))
-        for dv in range(-half, half + 1, step):
-            row = v + dv
-            if row < 0 or row >= height:
-                continue
-            for du in range(-half, half + 1, step):
-                a, b = max(0, -du), min(width, width - du)
-                x, y, z = steps[0, a:b], steps[1, a:b], steps[2, a:b]
-                there = (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du])
-                _steps_to(there, (xs[v, a:b], ys[v, a:b], zs[v, a:b]), reach[a:b], count[a:b], x, y, z)
-                _add(x, y, z, sums[0, a:b], sums[1, a:b], sums[2, a:b])
-                _add_products(x, y, z, sums[3, a:b], sums[4, a:b], sums[5, a:b])
-                _add_other_products(y, z, sums[6, a:b], sums[7, a:b], sums[8, a:b])
-        scale, determinant = np.empty(width), np.empty(width)
-        _covariances(count, sums, scale, determinant)
-        for u in range(width):
-            if zs[v, u] <= 0.0 or count[u] < 4:
-                scale[u] = 0.0
-        _smallest_eigenvalues(scale, determinant, sums)
-        _directions(xs[v], ys[v], zs[v], scale, sums, normals[v])
+    normals = np.zeros((zs.shape[0], zs.shape[1], 3), dtype=np.float32)
+    for v in prange(zs.shape[0]):
+        _row_of_normals(xs, ys, zs, v, window, step, distance_factor, normals[v])
     return normals
 
 
