@@ -82,8 +82,6 @@ class Provenance(Model):
     started: str = ""
     seconds: float = 0.0
     peak_memory_bytes: Count = 0
-    processor_seconds: float = 0.0
-    """Of its process and those it waited for, in all threads, with the loading of libraries [s]; 0: not recorded."""
 
 
 class Manifest(Model):

@@ -34,7 +34,6 @@ from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
 from benchmarks.speed.batch import measure_scheduler
 from schemas.errors import UsageError
-from schemas.manifest import MANIFEST_NAME, Manifest
 from stages.engine.batch.expansion import Batch, read_batch
 from stages.engine.batch.local_executor import LocalExecutor
 from stages.engine.batch.ray_executor import RayExecutor, load_ray
@@ -43,6 +42,9 @@ from stages.engine.batch.scene_run import PROCESS_NAME
 from stages.engine.batch.session import run_batch
 from stages.engine.batch.spec import RayOptions
 from stages.engine.batch.storage import stored_digest
+from stages.engine.reading import read_manifest
+from stages.engine.runner import PROCESSOR
+from stages.engine.store import TIMINGS_NAME
 from stages.kit.measurement.tables import Table, as_markdown
 
 NODES = 3
@@ -208,13 +210,14 @@ def _costs(name: str, results: list[SceneResult]) -> dict[str, float]:
 
 
 def _by_step(name: str, folder: Path, results: dict[str, SceneResult]) -> dict[str, float]:
-    """Mean processor time and bytes of every step, from the manifests, and of what runs the steps."""
+    """Mean processor time and bytes of every step, and of what runs the steps."""
     seconds: dict[str, list[float]] = {}
     sizes: dict[str, list[float]] = {}
     for scene, result in results.items():
         for step in result.artifacts:
-            manifest = Manifest.model_validate_json((folder / "out" / scene / step / MANIFEST_NAME).read_text())
-            seconds.setdefault(step, []).append(manifest.provenance.processor_seconds)
+            artifact = folder / "out" / scene / step
+            manifest = read_manifest(artifact)
+            seconds.setdefault(step, []).append(json.loads((artifact / TIMINGS_NAME).read_text())[PROCESSOR])
             sizes.setdefault(step, []).append(sum(file.bytes for file in manifest.files) / 1e6)
     steps = {step: statistics.mean(values) for step, values in seconds.items()}
     beside = statistics.mean(result.processor_seconds for result in results.values()) - sum(steps.values())

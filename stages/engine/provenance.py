@@ -35,13 +35,14 @@ def peak_memory_bytes() -> int:
 
 
 def processor_seconds() -> float:
-    """Return the processor time of this process and of those that it has waited for, in all their threads [s]."""
+    """Return the processor time so far of this process and of those that it has waited for, in all threads, with the
+    loading of libraries [s]."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(usage.ru_utime + usage.ru_stime for usage in used)
 
 
 def provenance_now(command: tuple[str, ...], device: str, started: datetime) -> Provenance:
-    """Record the command line, versions, platform, time since `started`, peak memory and processor time."""
+    """Record the command line, versions, platform, time since `started` and peak memory."""
     lock = REPOSITORY / "requirements.lock"
     return Provenance(
         command=command,
@@ -55,5 +56,4 @@ def provenance_now(command: tuple[str, ...], device: str, started: datetime) -> 
         started=started.isoformat(timespec="seconds"),
         seconds=round((datetime.now(UTC) - started).total_seconds(), 3),
         peak_memory_bytes=peak_memory_bytes(),
-        processor_seconds=round(processor_seconds(), 3),
     )

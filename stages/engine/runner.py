@@ -21,7 +21,7 @@ from stages.engine.digests import content_digest, record_files
 from stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
 from stages.engine.model_cache import resolve_weights, with_usual_models
-from stages.engine.provenance import provenance_now
+from stages.engine.provenance import processor_seconds, provenance_now
 from stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
 from stages.kit.digests import external_digest, external_files
 from stages.kit.estimates import Estimate
@@ -60,6 +60,9 @@ NO_CODE_CACHE = "cannot cache function"
 """How numba begins what it says when every folder for it is read-only."""
 NO_CODE_CACHE_TEXT = "compiled code can be kept nowhere, neither beside the program nor in a home folder"
 NO_CODE_CACHE_HINT = "set NUMBA_CACHE_DIR to a folder that can be written"
+
+PROCESSOR = "processor"
+"""Entry of timings.json beside the parts of the step, which are wall clock: processor time of all of its process."""
 
 Stamp = tuple[tuple[str, int, int, int], ...]
 """Path, inode, time of change [ns] and size of files: what differs once one is replaced or written to."""
@@ -308,8 +311,9 @@ def run_stage(
             with interruption.insisting(), _inputs_stay(opened), memory_limit.limited(max_memory, out):
                 made = _work(stage, opened, parameters, context)
             _check_payload(stage, made, partial)
+            timings = {**progress.seconds, PROCESSOR: processor_seconds()}
             (partial / store.TIMINGS_NAME).write_text(
-                json.dumps({name: round(value, 3) for name, value in sorted(progress.seconds.items())}, indent=1)
+                json.dumps({name: round(value, 3) for name, value in sorted(timings.items())}, indent=1)
             )
             records = record_files(partial, stage.writes.undigested)
             manifest = Manifest(
