@@ -1,6 +1,7 @@
 """Rooms that are asked: language in a splat (`ours`), the thesis's way to an answer, entities of our map.
 
-Cases: `rooms`, generated; the real logs of data/annotations/real, asked for what somebody boxed there.
+Cases: `rooms`, generated; `rearranged`, the same with other things on their furniture, elsewhere; the real
+logs of data/annotations/real, asked for what somebody boxed there.
 
 The same pictures and poses; `ours` and `thesis` ask the same field. `thesis` takes the size that fits best in the
 view in which a right thing is seen best (the user's choice there), then the Gaussian that fits best at that size, and
@@ -44,7 +45,8 @@ ROOMS = ("kitchen", "office", "bedroom", "room")
 REPORTING = tuple(f"{ROOMS[k % 4]}-{1520 + k}" for k in range(20))
 TUNING = ("kitchen-40", "office-41", "bedroom-42", "room-43")
 """The probabilities were fitted on them too."""
-GENERATED = "rooms"
+GENERATED, REARRANGED = "rooms", "rearranged"
+MADE = (GENERATED, REARRANGED)
 LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))
 LEAST = 0.5
 """Probability from which on something is an answer: one for all rooms."""
@@ -108,8 +110,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
     trial = trials[0]
     given = bench.parameters
     room: AskedPlace
-    if trial.case == GENERATED:
-        room = AskedRoom(bench.out / "rooms", trial.seed, given.steps, given.frames)
+    if trial.case in MADE:
+        room = AskedRoom(bench.out / trial.case, trial.seed, given.steps, given.frames, int(trial.case == REARRANGED))
     else:
         told = EXPECTED[trial.case]
         room = AskedLog(bench.out, trial.case, given.steps, given.data / told["log"], told["every"])
@@ -269,13 +271,13 @@ def calibration_error(records: Sequence[Asked]) -> float | None:
 
 def inputs(bench: Bench, trial: Trial) -> list[Path]:
     """What answers are read off: calibration, encoder, and of a real log what somebody boxed."""
-    told = [] if trial.case == GENERATED else [ANNOTATIONS / f"{trial.case}.json"]
+    told = [] if trial.case in MADE else [ANNOTATIONS / f"{trial.case}.json"]
     return [CALIBRATION, ENCODER, *told]
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The first rooms, or the one log of that name, where it is there."""
-    if case != GENERATED:
+    if case not in MADE:
         return [case] if (bench.parameters.data / EXPECTED[case]["log"]).is_dir() else []
     return TUNING if bench.tuning else REPORTING[: bench.parameters.rooms]
 
@@ -294,8 +296,8 @@ EXPERIMENT = Experiment(
         "langsplat": "LangSplat",
         "lerf": "LERF",
     },
-    cases=(GENERATED, *LOGS),
-    runs=lambda arm, case: arm != "entities" or case == GENERATED,
+    cases=(*MADE, *LOGS),
+    runs=lambda arm, case: arm != "entities" or case in MADE,
     measure=measure,
     record=Asked,
     measures={

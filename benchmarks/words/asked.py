@@ -166,14 +166,14 @@ class AskedRoom(AskedPlace):
     most_views = 12
     splat_options = ("--width", 160, "--steps", 100, "--steps-per-second", 1, "--hold-out-every", 6)
 
-    def __init__(self, root: Path, name: str, steps: int, frames: int) -> None:
+    def __init__(self, root: Path, name: str, steps: int, frames: int, rearranged: int = 0) -> None:
         super().__init__(root, name, steps)
-        self.frames = frames
+        self.frames, self.rearranged = frames, rearranged
 
     @cached_property
     def room(self) -> RoomFolder:
         """The room's log and truth."""
-        return make_room(self.root, self.name, self.frames, size=SIZE)
+        return make_room(self.root, self.name, self.frames, size=SIZE, rearranged=self.rearranged)
 
     @property
     def folder(self) -> Path:
