@@ -38,6 +38,7 @@ from stages.kit.open_words.relevancy import margins, query_rows, relevancy
 from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Parameters
+from stages.splat.asked_figures import calibration_error, recall_at_rejection
 from stages.splat.language.pyramid import pyramid
 from stages.splat.ply import read_gaussians
 
@@ -55,9 +56,6 @@ RENDERED_WIDTH, LERF_WIDTH = 160, 64
 """Of the pictures that `thesis` and `langsplat`, and `lerf`, are asked in [px]."""
 LERF_SIDES = (0.05, 0.5)
 """Of its squares, over the height."""
-BINS = 10
-REJECTED = 0.9
-"""Share of absent words that are rejected at the threshold where recall is looked at."""
 
 
 class WordsParameters(Parameters):
@@ -247,26 +245,20 @@ def share(top: str, bottom: str) -> Measure:
     return Measure(of)
 
 
-def recall_at_rejection(records: Sequence[Asked]) -> float | None:
-    """Return the share of things found at the one threshold that rejects REJECTED of all absent words."""
+def recall_of(records: Sequence[Asked]) -> float | None:
+    """Return the share of things found at the one threshold that rejects nine of ten of all absent words."""
     if any(len(record.chances) != record.present + record.absent for record in records):
         return None
     chances = [np.split(np.array(record.chances), [record.present]) for record in records]
-    least = np.quantile(np.concatenate([absent for _, absent in chances]), REJECTED)
-    hits = [np.array(record.hits[: record.present]) for record in records]
-    found = np.concatenate(hits) & (np.concatenate([present for present, _ in chances]) > least)
-    return float(found.mean())
+    present, absent = (np.concatenate(part) for part in zip(*chances, strict=True))
+    hits = np.concatenate([np.array(record.hits[: record.present], bool) for record in records])
+    return recall_at_rejection(present, hits, absent)
 
 
-def calibration_error(records: Sequence[Asked]) -> float | None:
-    """Return the expected calibration error over BINS bins of the first places' probabilities."""
+def calibration_of(records: Sequence[Asked]) -> float | None:
+    """Return the expected calibration error of the first places' probabilities."""
     chances = np.array([chance for record in records for chance in record.chances])
-    hits = np.array([hit for record in records for hit in record.hits], float)
-    if not len(chances):
-        return None
-    bins = np.minimum((BINS * chances).astype(int), BINS - 1)
-    gaps = [abs(chances[bins == b].mean() - hits[bins == b].mean()) * (bins == b).mean() for b in np.unique(bins)]
-    return float(sum(gaps))
+    return calibration_error(chances, np.array([hit for record in records for hit in record.hits], float))
 
 
 def inputs(bench: Bench, trial: Trial) -> list[Path]:
@@ -306,8 +298,8 @@ EXPERIMENT = Experiment(
         "recall_2d": share("in_picture", "shown"),
         "precision": share("right_answers", "answers"),
         "absent_rejected": share("rejected", "absent"),
-        "recall_at_rejection": Measure(recall_at_rejection),
-        "calibration_error": Measure(calibration_error),
+        "recall_at_rejection": Measure(recall_of),
+        "calibration_error": Measure(calibration_of),
         "query_ms": Measure(lambda records: float(np.median([record.query_ms for record in records])), "ms", False),
         "gaussians": Measure(lambda records: float(np.mean([record.gaussians for record in records])), "", False),
     },
