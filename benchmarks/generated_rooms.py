@@ -89,14 +89,19 @@ def make_room(
     clutter: str = CLUTTER,
     opened: int = 0,
     cameras: int = 1,
+    path: str = "tour",
+    rounds: int = 1,
+    rearranged: int = 0,
 ) -> RoomFolder:
     """Make a room of this name under `root` unless it is up to date; size (width, height) [px]; up to so many doors and
-    drawers are `opened` or shut half-way; frames are of so many `cameras` in turn. Raises StepFailed."""
+    drawers are `opened` or shut half-way; frames are of so many `cameras` in turn, along so many rounds of a `path`;
+    which other draw of what lies about (`rearranged`). Raises StepFailed."""
     library, room = make_library(root), room_at(root, name, frames)
     recipe, seed = name.rsplit("-", 1)
     options = ("--recipe", recipe, "--seed", seed, "--clutter", clutter, "--frames", frames, "--opened", opened)
-    camera = ("--width", size[0], "--height", size[1], "--cameras", cameras)
-    made("synthesize", room.ground_truth, "--library", library, *options, *camera)
+    drawn = ("--rearranged", rearranged)
+    camera = ("--width", size[0], "--height", size[1], "--cameras", cameras, "--path", path, "--rounds", rounds)
+    made("synthesize", room.ground_truth, "--library", library, *options, *drawn, *camera)
     made(
         "ingest", room.sequence, "--log", room.ground_truth / "log.mcap", *(("--camera", "all") if cameras > 1 else ())
     )

@@ -7,7 +7,8 @@ pictures when the clock shows the budget. `<scene>/drifting` and `<scene>/mended
 does, without and with `--adjust-every --refine-poses`, at POSES_BUDGET: where they drift, held-out pictures stand where
 the drifting path has them; mended, where depth and colour place them among the learned. Generated logs have a picture a
 second; they are played ROOM_RATE times as fast. `cameras/one` and `cameras/three`: the same drive with a camera ahead,
-and with two more turned to the sides; held out, and the same for both, are pictures of all three.
+and with two more turned to the sides; held out, and the same for both, are pictures of all three. `paths/<path>`: those
+three cameras drive a line, a loop, a figure of eight, and that twice, the second time lower.
 """
 
 from __future__ import annotations
@@ -55,15 +56,18 @@ REPORTING = tuple(f"{ROOMS[k % 4]}-{1400 + k}" for k in range(20))
 """In the reporting range of the recipes."""
 ROOM_RATE = 4.0
 TUNING = ("kitchen-40", "office-41", "bedroom-40")
-GENERATED, CAMERAS = "rooms", "cameras"
+GENERATED, CAMERAS, PATHS = MADE = "rooms", "cameras", "paths"
 NUMBERS = ("one", "three")
 SEVERAL = 3
-"""Cameras of the drive that the cases CAMERAS are of."""
+"""Cameras of the drives that the cases CAMERAS and PATHS are of."""
+DRIVES = {"line": ("line", 1), "loop": ("loop", 1), "eight": ("eight", 1), "heights": ("eight", 2)}
+"""Path and rounds of the cases PATHS."""
+OTHERS = (*(f"{CAMERAS}/{number}" for number in NUMBERS), *(f"{PATHS}/{drive}" for drive in DRIVES))
 BUDGETS = {"10s": 10.0, "30s": 30.0, "1min": 60.0, "5min": 300.0, "20min": 1200.0}
 QUICK_BUDGETS, WHOLE_BUDGETS = ("10s", "30s"), ("1min", "5min", "20min")
 POSES = ("drifting", "mended")
 POSES_BUDGET = {True: "30s", False: "1min"}
-"""With `--quick` and without; that of several cameras too."""
+"""With `--quick` and without; that of several cameras and of drives too."""
 HOLD_OUT_EVERY = 8
 GOOD = 20.0
 """PSNR at which a splat counts as made (Srinivas 2024, section 10.1) [dB]."""
@@ -96,22 +100,27 @@ class Splatted:
     seconds_to_20: float
     """From the first picture on; the budget where it was not reached."""
     reached_20: bool
+    path_length: float | None = None
+    """Of the camera ahead, held-out pictures included [m]."""
 
 
-def sequence_of(bench: Bench, seed: str, cameras: int) -> SequenceArtifact:
+def sequence_of(bench: Bench, seed: str, part: str) -> SequenceArtifact:
     """Ingest a real log, or make a room."""
     if seed in REAL:
         log = bench.parameters.data / REAL[seed]
         return opened(SequenceArtifact, made("ingest", bench.out / "logs" / seed, "--log", log))
-    folder = bench.out / ("logs" if cameras == 1 else f"logs-of-{cameras}")
-    room = make_room(folder, seed, cameras * bench.parameters.frames, size=(320, 240), cameras=cameras)
+    cameras = SEVERAL if part in (*NUMBERS, *DRIVES) else 1
+    path, rounds = DRIVES.get(part, ("tour", 1))
+    several = "logs" if cameras == 1 else f"logs-of-{cameras}"
+    folder, frames = bench.out / (f"{several}-{part}" if part in DRIVES else several), cameras * bench.parameters.frames
+    room = make_room(folder, seed, frames, size=(320, 240), cameras=cameras, path=path, rounds=rounds)
     return opened(SequenceArtifact, room.sequence)
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The rooms, or the one log of that name, where it is there."""
     scene = case.split("/")[0]
-    if scene in (GENERATED, CAMERAS):
+    if scene in MADE:
         return TUNING if bench.tuning else REPORTING[: 1 if bench.quick else bench.parameters.rooms]
     return [scene] if (bench.parameters.data / REAL[scene]).is_dir() else []
 
@@ -119,7 +128,7 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
 def default_cases(bench: Bench) -> list[str]:
     """Short budgets with `--quick`."""
     budgets = QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS
-    return [*cases_of((*budgets, *POSES)), *(f"{CAMERAS}/{number}" for number in NUMBERS)]
+    return [*cases_of((*budgets, *POSES)), *OTHERS]
 
 
 def cases_of(parts: Sequence[str]) -> list[str]:
@@ -134,7 +143,7 @@ def adjusts(scene: str, part: str) -> bool:
 
 def split_views(bench: Bench, seed: str, part: str) -> tuple[list[PosedView], list[PosedView]]:
     """Return the views to learn from and those held out."""
-    sequence = sequence_of(bench, seed, SEVERAL if part in NUMBERS else 1)
+    sequence = sequence_of(bench, seed, part)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         posed = posed_frames(reader, sequence, None)
         if part in POSES:
@@ -157,7 +166,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Spla
     numba.set_num_threads(1)
     warm_up()
     part = {trial: trial.case.split("/")[1] for trial in trials}
-    rate = ROOM_RATE if trials[0].case.split("/")[0] in (GENERATED, CAMERAS) else 1.0
+    rate = ROOM_RATE if trials[0].case.split("/")[0] in MADE else 1.0
     first = part[trials[0]]
     stops = {trial: BUDGETS.get(each, BUDGETS[POSES_BUDGET[bench.quick]]) for trial, each in part.items()}
     learned, kept = split_views(bench, trials[0].seed, first)
@@ -182,7 +191,19 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Spla
         psnr, ssim, depth_error = learner.looks(kept)
         good = reached <= stops[trial]
         seconds = reached if good else stops[trial]
-        yield trial, Splatted(psnr, ssim, depth_error, learner.gaussians, learner.steps, seconds, good)
+        yield (
+            trial,
+            Splatted(
+                psnr, ssim, depth_error, learner.gaussians, learner.steps, seconds, good, path_length(learned, kept)
+            ),
+        )
+
+
+def path_length(*views: Sequence[PosedView]) -> float:
+    """Return how far the camera ahead went [m]."""
+    ahead = sorted((v for some in views for v in some if v.camera_name == CAMERA_FRAME), key=lambda view: view.time)
+    eyes = np.array([inverse(view.camera_from_world)[:3, 3] for view in ahead]).reshape(-1, 3)
+    return float(np.linalg.norm(np.diff(eyes, axis=0), axis=1).sum())
 
 
 class Learner(Protocol):
@@ -329,7 +350,7 @@ EXPERIMENT = Experiment(
     "same time. Budgets that stand in no row.",
     arms={"ours": "ours", "thesis": "thesis's method", "lerf": "LERF"},
     runs=lambda arm, case: arm != "lerf" or case.split("/")[1] in BUDGETS,
-    cases=(*cases_of((*BUDGETS, *POSES)), *(f"{CAMERAS}/{number}" for number in NUMBERS)),
+    cases=(*cases_of((*BUDGETS, *POSES)), *OTHERS),
     default_cases=default_cases,
     seeds_of=seeds_of,
     tuning=TUNING,
@@ -345,6 +366,7 @@ EXPERIMENT = Experiment(
         "reached_20": mean("reached_20"),
         "gaussians": mean("gaussians", interval=False),
         "steps": mean("steps", interval=False),
+        "path_length": mean("path_length", "m", interval=False),
     },
     pairs=(("ours", "thesis"), ("ours", "lerf")),
     compared=("psnr", "ssim", "seconds_to_20"),

@@ -1,6 +1,7 @@
 """Rooms that are asked: language in a splat (`ours`), the thesis's way to an answer, entities of our map.
 
-Cases: `rooms`, generated; the real logs of data/annotations/real, asked for what somebody boxed there.
+Cases: `rooms`, generated; `rearranged`, the same with other things on their furniture, elsewhere; the real
+logs of data/annotations/real, asked for what somebody boxed there.
 
 The same pictures and poses; `ours` and `thesis` ask the same field. `thesis` takes the size that fits best in the
 view in which a right thing is seen best (the user's choice there), then the Gaussian that fits best at that size, and
@@ -37,6 +38,7 @@ from stages.kit.open_words.relevancy import margins, query_rows, relevancy
 from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Parameters
+from stages.splat.asked_figures import calibration_error, recall_at_rejection
 from stages.splat.language.pyramid import pyramid
 from stages.splat.ply import read_gaussians
 
@@ -44,7 +46,8 @@ ROOMS = ("kitchen", "office", "bedroom", "room")
 REPORTING = tuple(f"{ROOMS[k % 4]}-{1520 + k}" for k in range(20))
 TUNING = ("kitchen-40", "office-41", "bedroom-42", "room-43")
 """The probabilities were fitted on them too."""
-GENERATED = "rooms"
+GENERATED, REARRANGED = "rooms", "rearranged"
+MADE = (GENERATED, REARRANGED)
 LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))
 LEAST = 0.5
 """Probability from which on something is an answer: one for all rooms."""
@@ -53,9 +56,6 @@ RENDERED_WIDTH, LERF_WIDTH = 160, 64
 """Of the pictures that `thesis` and `langsplat`, and `lerf`, are asked in [px]."""
 LERF_SIDES = (0.05, 0.5)
 """Of its squares, over the height."""
-BINS = 10
-REJECTED = 0.9
-"""Share of absent words that are rejected at the threshold where recall is looked at."""
 
 
 class WordsParameters(Parameters):
@@ -108,8 +108,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
     trial = trials[0]
     given = bench.parameters
     room: AskedPlace
-    if trial.case == GENERATED:
-        room = AskedRoom(bench.out / "rooms", trial.seed, given.steps, given.frames)
+    if trial.case in MADE:
+        room = AskedRoom(bench.out / trial.case, trial.seed, given.steps, given.frames, int(trial.case == REARRANGED))
     else:
         told = EXPECTED[trial.case]
         room = AskedLog(bench.out, trial.case, given.steps, given.data / told["log"], told["every"])
@@ -245,37 +245,31 @@ def share(top: str, bottom: str) -> Measure:
     return Measure(of)
 
 
-def recall_at_rejection(records: Sequence[Asked]) -> float | None:
-    """Return the share of things found at the one threshold that rejects REJECTED of all absent words."""
+def recall_of(records: Sequence[Asked]) -> float | None:
+    """Return the share of things found at the one threshold that rejects nine of ten of all absent words."""
     if any(len(record.chances) != record.present + record.absent for record in records):
         return None
     chances = [np.split(np.array(record.chances), [record.present]) for record in records]
-    least = np.quantile(np.concatenate([absent for _, absent in chances]), REJECTED)
-    hits = [np.array(record.hits[: record.present]) for record in records]
-    found = np.concatenate(hits) & (np.concatenate([present for present, _ in chances]) > least)
-    return float(found.mean())
+    present, absent = (np.concatenate(part) for part in zip(*chances, strict=True))
+    hits = np.concatenate([np.array(record.hits[: record.present], bool) for record in records])
+    return recall_at_rejection(present, hits, absent)
 
 
-def calibration_error(records: Sequence[Asked]) -> float | None:
-    """Return the expected calibration error over BINS bins of the first places' probabilities."""
+def calibration_of(records: Sequence[Asked]) -> float | None:
+    """Return the expected calibration error of the first places' probabilities."""
     chances = np.array([chance for record in records for chance in record.chances])
-    hits = np.array([hit for record in records for hit in record.hits], float)
-    if not len(chances):
-        return None
-    bins = np.minimum((BINS * chances).astype(int), BINS - 1)
-    gaps = [abs(chances[bins == b].mean() - hits[bins == b].mean()) * (bins == b).mean() for b in np.unique(bins)]
-    return float(sum(gaps))
+    return calibration_error(chances, np.array([hit for record in records for hit in record.hits], float))
 
 
 def inputs(bench: Bench, trial: Trial) -> list[Path]:
     """What answers are read off: calibration, encoder, and of a real log what somebody boxed."""
-    told = [] if trial.case == GENERATED else [ANNOTATIONS / f"{trial.case}.json"]
+    told = [] if trial.case in MADE else [ANNOTATIONS / f"{trial.case}.json"]
     return [CALIBRATION, ENCODER, *told]
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The first rooms, or the one log of that name, where it is there."""
-    if case != GENERATED:
+    if case not in MADE:
         return [case] if (bench.parameters.data / EXPECTED[case]["log"]).is_dir() else []
     return TUNING if bench.tuning else REPORTING[: bench.parameters.rooms]
 
@@ -294,8 +288,8 @@ EXPERIMENT = Experiment(
         "langsplat": "LangSplat",
         "lerf": "LERF",
     },
-    cases=(GENERATED, *LOGS),
-    runs=lambda arm, case: arm != "entities" or case == GENERATED,
+    cases=(*MADE, *LOGS),
+    runs=lambda arm, case: arm != "entities" or case in MADE,
     measure=measure,
     record=Asked,
     measures={
@@ -304,8 +298,8 @@ EXPERIMENT = Experiment(
         "recall_2d": share("in_picture", "shown"),
         "precision": share("right_answers", "answers"),
         "absent_rejected": share("rejected", "absent"),
-        "recall_at_rejection": Measure(recall_at_rejection),
-        "calibration_error": Measure(calibration_error),
+        "recall_at_rejection": Measure(recall_of),
+        "calibration_error": Measure(calibration_of),
         "query_ms": Measure(lambda records: float(np.median([record.query_ms for record in records])), "ms", False),
         "gaussians": Measure(lambda records: float(np.mean([record.gaussians for record in records])), "", False),
     },

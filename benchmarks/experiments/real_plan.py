@@ -21,7 +21,8 @@ from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
 from schemas.sequence import Sequence as SequenceArtifact
-from stages.kit.geometry.boxes import bottom, transform_points_to_box, upright_box
+from stages.kit.formats.trajectories import read_tum
+from stages.kit.geometry.boxes import transform_points_to_box, upright_box
 from stages.kit.stage import Parameters
 from stages.truth.support_annotation import AnnotatedNode, read_support_annotation
 
@@ -102,19 +103,6 @@ def rests_on(node: GraphNode, counter: AnnotatedNode) -> bool:
     return bool(np.all(np.abs(turned) <= np.array(box.size[:2]) / 2) and across[2] > 0.25 * box.size[2])
 
 
-def stand_of(cameras: np.ndarray, graph: ContactGraphFile) -> tuple[float, float, float]:
-    """Return x, y [m] and yaw [deg] under the camera (N, 3) that is farthest from what stands on the floor and about;
-    yaw is to the middle of these things."""
-    boxes = [n.box for n in graph.nodes if n.box is not None and n.node_type != "layout" and bottom(n.box) < LOWEST_TOP]
-    away = np.full(len(cameras), np.inf)
-    for box in boxes:
-        local = np.abs(transform_points_to_box(box, cameras)[:, :2]) - np.array(box.size[:2]) / 2
-        away = np.minimum(away, np.linalg.norm(np.maximum(local, 0.0), axis=1))
-    place = cameras[int(np.argmax(away)), :2]
-    ahead = np.mean([box.center[:2] for box in boxes], axis=0) - place
-    return float(place[0]), float(place[1]), float(np.degrees(np.arctan2(ahead[1], ahead[0])))
-
-
 def is_behind(walls: Sequence[AnnotatedNode], bases: np.ndarray, camera: np.ndarray) -> bool:
     """Whether any of the places (N, 2) of the base is beyond the middle plane of an annotated wall, along its length,
     seen from the `camera` (2,)."""
@@ -136,17 +124,17 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Put]
     graph = opened(InteractiveScene, scene).graph
     told = {node.name: node for node in read_support_annotation(ANNOTATION).nodes}
     walls = [node for node in told.values() if node.class_name == "wall"]
-    path = opened(SequenceArtifact, scene.parent / "sequence").path("trajectory.tum")
-    cameras = np.loadtxt(path, ndmin=2)[:, 1:4]
-    stand = stand_of(cameras, graph)
+    sequence = scene.parent / "sequence"
+    cameras = read_tum(opened(SequenceArtifact, sequence).path("trajectory.tum"))[1][:, :3, 3]
     for trial in trials:
         item, counter = find_annotated(graph, told[trial.case]), find_counter(graph)
         if item is None or counter is None:
             missing = trial.case if item is None else COUNTER
             yield trial, Put(False, False, "not_found", 0, f"{missing} is not in the map")
             continue
-        goal = ["--goal", f"on({item},{counter})", "--seed", trial.seed, *(f"--stand={value:.3f}" for value in stand)]
-        plan = opened(Plan, made("plan", bench.folder(trial) / "plan", "--scene", scene, *goal))
+        goal = ["--goal", f"on({item},{counter})", "--seed", trial.seed]
+        given = ("--scene", scene, "--sequence", sequence)
+        plan = opened(Plan, made("plan", bench.folder(trial) / "plan", *given, *goal))
         reached = plan.info.status == "executed"
         on_counter = reached and rests_on(plan.graph.node(item), told[COUNTER])
         why = "" if reached or not plan.info.failures else plan.info.failures[-1].message

@@ -4,13 +4,17 @@
 
 Gaussians stand in front of the camera, all within the picture, and cover it as a trained room does: an alpha of about
 0.9, a few pixels wide each. Colour has harmonics of degree 3; the derivatives by colour, depth and alpha are random.
-Times are medians; `growth` is by Gaussians at 320x240 and by pixels at 20,000 Gaussians.
+Times are medians; `growth` is by Gaussians at 320x240 and by pixels at 20,000 Gaussians. `training` is the peak memory
+of a process that trains so many Gaussians on one picture, over that of one that trains hardly any.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import resource
 import time
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -22,9 +26,13 @@ from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import Picture, Rasterizer, View
 from stages.kit.rendering.splatting.reference import ReferenceRasterizer
+from stages.splat.build_stage import method_of
+from stages.splat.training import Trainer
+from stages.splat.views import PosedView
 
 SIZES = ((160, 120), (320, 240), (640, 480))
 COUNTS = (5_000, 20_000, 80_000)
+TRAINED = (1_000, 250_000, 1_000_000)
 MIDDLE = ((320, 240), 20_000)
 AIM_SECONDS = 0.2
 WIDTH_OF_ALL = 1.3
@@ -82,6 +90,28 @@ def timed(rasterizer: Rasterizer, count: int, size: tuple[int, int], repeats: in
     }
 
 
+def training_peak(count: int) -> float:
+    """Return the peak memory [MB] of this process after training so many Gaussians a little, colours of degree 3."""
+    width, height = MIDDLE[0]
+    color, depth = np.full((height, width, 3), 0.5, np.float32), np.full((height, width), 3.0, np.float32)
+    flat = replace(gaussians_of(count), harmonics=np.zeros((count, 1, 3), np.float32))
+    method = replace(method_of("ours"), seed=lambda *_: flat, degree_every=1)
+    trainer = Trainer(method, CompiledRasterizer(), np.random.default_rng(0))
+    trainer.add_view(PosedView(0, 0.0, "camera", camera_of(MIDDLE[0]), color, depth, np.eye(4)))
+    for _ in range(5):
+        trainer.step()
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+
+
+def memory() -> dict[str, float]:
+    """Return `training/<Gaussians>/memory` [MB] over a process with hardly any, each in a process of its own."""
+    peaks = []
+    for count in TRAINED:
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            peaks.append(pool.apply(training_peak, (count,)))
+    return {f"training/{count}/memory": peak - peaks[0] for count, peak in zip(TRAINED[1:], peaks[1:], strict=True)}
+
+
 def measure(repeats: int) -> dict[str, float]:
     """Return `<arm>/<Gaussians>x<width>/<measure>`."""
     compiled, metrics = CompiledRasterizer(), {}
@@ -115,8 +145,9 @@ def main() -> None:
     """Measure, print the table, write metrics.json and table.md."""
     numba.config.THREADING_LAYER = "omp"  # type: ignore[attr-defined] # the default probes TBB first and warns
     arguments = asked(Measurement)
-    metrics = measure(3 if arguments.quick else 15)
-    write_measured(arguments.out, metrics, table(metrics))
+    metrics, trained = measure(3 if arguments.quick else 15), memory()
+    lines = [f"- {name.split('/')[1]} Gaussians in training: {value:.0f} MB" for name, value in trained.items()]
+    write_measured(arguments.out, metrics | trained, table(metrics) + "\n" + "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.boxes import points_in_box, upright_box
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply, inverse
+from stages.splat.evaluate_stage import MARGIN
 from stages.splat.language.looks import Sight
 from stages.splat.views import PosedView, evenly, posed_frames, read_view
 from stages.truth.annotated_points import instances_of
@@ -42,8 +43,6 @@ from stages.truth.support_annotation import read_support_annotation
 SIZE = (320, 240)
 QUERIES = 15
 LEAST_PIXELS = 300
-MARGIN = 0.02
-"""A place is at a thing when it lies within its box grown by this on every side [m]."""
 ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
 
 
@@ -166,14 +165,14 @@ class AskedRoom(AskedPlace):
     most_views = 12
     splat_options = ("--width", 160, "--steps", 100, "--steps-per-second", 1, "--hold-out-every", 6)
 
-    def __init__(self, root: Path, name: str, steps: int, frames: int) -> None:
+    def __init__(self, root: Path, name: str, steps: int, frames: int, rearranged: int = 0) -> None:
         super().__init__(root, name, steps)
-        self.frames = frames
+        self.frames, self.rearranged = frames, rearranged
 
     @cached_property
     def room(self) -> RoomFolder:
         """The room's log and truth."""
-        return make_room(self.root, self.name, self.frames, size=SIZE)
+        return make_room(self.root, self.name, self.frames, size=SIZE, rearranged=self.rearranged)
 
     @property
     def folder(self) -> Path:

@@ -10,6 +10,7 @@ from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.language_map import LanguageMap
 from schemas.plan import Plan
+from schemas.sequence import Sequence
 from stages.kit.estimates import grows_with
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
@@ -36,7 +37,7 @@ class PlanParameters(Parameters):
     stand: tuple[float, ...] = Field(
         (),
         description="Where the robot starts: x y [m] and yaw [deg]; one that does not drive stays there. Empty: where "
-        "most room is",
+        "most room is, with --sequence of the places where its camera was",
     )
     planner: Literal["builtin", "fast-downward"] = Field(
         "builtin", description="Task planner; fast-downward is a program of its own (extra planning-gpl)"
@@ -104,6 +105,7 @@ STAGE = Stage(
         "ground_truth": Optionally(GroundTruth),
         "domain": Optionally(External("operators to plan with: PDDL, or what `predicates teach --scene` wrote")),
         "language": Optionally(LanguageMap),
+        "sequence": Optionally(Sequence),
     },
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),

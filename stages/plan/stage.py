@@ -16,6 +16,8 @@ from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.language_map import LanguageMap
 from schemas.plan import Failure, Plan, PlanFile, PlannedAction, TriedPlan
+from schemas.sequence import Sequence
+from stages.kit.formats.trajectories import read_tum
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed, end_in_collision
 from stages.kit.simulation.robot_description import RobotDescription, load_robot
@@ -78,13 +80,15 @@ def run(
     ground_truth: GroundTruth | None,
     domain: Path | None,
     language: LanguageMap | None = None,
+    sequence: Sequence | None = None,
     *,
     parameters: PlanParameters,
     context: Context,
 ) -> Plan:
     """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none.
 
-    `domain`: predicates and operators to plan with instead of the chain's (`read_given_domain`)."""
+    `domain`: predicates and operators to plan with instead of the chain's (`read_given_domain`). `sequence`: the log
+    that the scene was made of; the robot starts where its camera was."""
     if parameters.goal and parameters.task:
         raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     reading = Reading(None if domain is None else read_given_domain(domain))
@@ -106,7 +110,11 @@ def run(
             if has_words(parameters.goal):
                 goal = named_goal(parameters.goal, objects, graph, language)
                 parameters = parameters.model_copy(update={"goal": goal})
-            state, planning = _find(Scene(model, graph, objects, initial, reading), budgets, parameters, context)
+            cameras = None
+            if sequence is not None and "pose" in sequence.info.streams:
+                cameras = read_tum(sequence.path("trajectory.tum"))[1][:, :3, 3]
+            asked = Scene(model, graph, objects, initial, reading)
+            state, planning = _find(asked, budgets, parameters, context, cameras)
         problem = planning.problem or task_problem(objects, initial, frozenset())
         written = DOMAIN if reading.given is None else reading.given.domain
         context.output.joinpath("domain.pddl").write_text(domain_text(written), encoding="utf-8")
@@ -151,7 +159,9 @@ def _search_settings(parameters: PlanParameters) -> SearchSettings:
     )
 
 
-def _find(scene: Scene, budgets: Budgets, parameters: PlanParameters, context: Context) -> tuple[RobotState, Found]:
+def _find(
+    scene: Scene, budgets: Budgets, parameters: PlanParameters, context: Context, cameras: np.ndarray | None
+) -> tuple[RobotState, Found]:
     """Return where the robot starts, and the plan of the first goal that has one (or the first goal, without)."""
     planning, model = Found(), scene.model
     carry = model.description.carry
@@ -162,7 +172,7 @@ def _find(scene: Scene, budgets: Budgets, parameters: PlanParameters, context: C
     if goals:
         planning.problem, planning.literals = goals[0]
     try:
-        state = RobotState(_start(model, carry, parameters.stand, context.random(START)), carry)
+        state = RobotState(_start(model, carry, parameters.stand, context.random(START), cameras), carry)
     except MotionFailed as failed:
         planning.failures.append(failed.failure)
         return RobotState(np.zeros(3), carry), planning
@@ -184,7 +194,13 @@ def _find(scene: Scene, budgets: Budgets, parameters: PlanParameters, context: C
     return state, planning
 
 
-def _start(model: WorldModel, carry: np.ndarray, stand: tuple[float, ...], random: np.random.Generator) -> np.ndarray:
+def _start(
+    model: WorldModel,
+    carry: np.ndarray,
+    stand: tuple[float, ...],
+    random: np.random.Generator,
+    cameras: np.ndarray | None,
+) -> np.ndarray:
     """Return where the robot starts (3,). Raises UsageError for no place, MotionFailed for none that is free."""
     if stand and len(stand) != 3:
         raise UsageError(f"--stand has {len(stand)} values", hint="x y [m] and yaw [deg]")
@@ -193,7 +209,7 @@ def _start(model: WorldModel, carry: np.ndarray, stand: tuple[float, ...], rando
             f"the robot {model.description.name} does not drive", hint="say where it is with --stand X Y YAW"
         )
     if not stand:
-        return start_base(model, carry, random)
+        return start_base(model, carry, random, cameras=cameras)
     base = np.array([*stand[:2], np.radians(stand[2])])
     collision = model.checker.check(np.concatenate([base, carry]))
     if collision is not None:

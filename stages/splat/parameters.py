@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from schemas.contact_graph import ContactGraph
+from schemas.evaluation import Evaluation
 from schemas.language_map import Answers, LanguageMap
 from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence
@@ -15,8 +16,9 @@ from schemas.splat import Splat, SplatViews
 from schemas.trajectory import Trajectory
 from stages.kit.open_words.encoder import checked_text
 from stages.kit.open_words.options import EXTRAS, WEIGHTS, EncoderParameters, encoder_files
-from stages.kit.stage import Optionally, Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
+QUERIES = External("queries.toml: texts that are true of something there, with its boxes, and texts that are not")
 LIBRARIES = ("numpy", "numba", "scipy", "opencv-python-headless", "pillow")
 
 
@@ -80,6 +82,12 @@ class QueryParameters(EncoderParameters):
         0.5, ge=0, le=1, description="Answers are at least so likely; else: the room has none"
     )
     most: int = Field(10, ge=1, le=20, description="At most so many answers")
+
+
+class EvaluateParameters(EncoderParameters):
+    """Options of `splat evaluate`."""
+
+    least_probability: float = Field(0.5, ge=0, le=1, description="Answers are at least so likely")
 
 
 def check_query(parameters: QueryParameters, inputs: Mapping[str, Any]) -> None:
@@ -156,4 +164,17 @@ QUERY = Stage(
     check=check_query,
     example='scenewright splat query --language outputs/words --text "red mug" --out outputs/answer',
 )
-STAGES = (BUILD, RENDER, LANGUAGE, LABEL, QUERY)
+EVALUATE = Stage(
+    name="splat evaluate",
+    version=1,
+    summary="Ask a place for what somebody knows is there, and is not, and count what is found and rejected",
+    parameters=EvaluateParameters,
+    reads={"language": LanguageMap, "queries": QUERIES, "weights": WEIGHTS},
+    writes=Evaluation,
+    libraries=("numpy", "torch", "matplotlib"),
+    module="evaluate_stage",
+    extras=EXTRAS,
+    data_files=word_files,
+    example="scenewright splat evaluate --language outputs/words --queries queries.toml --out outputs/asked",
+)
+STAGES = (BUILD, RENDER, LANGUAGE, LABEL, QUERY, EVALUATE)

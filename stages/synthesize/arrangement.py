@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 import trimesh
@@ -54,11 +55,14 @@ def arrange(
     clutter: str,
     seed: int,
     objection: Callable[[Arrangement], str | None] = lambda arrangement: None,
+    *,
+    rearranged: int = 0,
 ) -> Arrangement:
     """Furnish a room. The same recipe, library, clutter and seed give the same room.
 
-    `objection` may refuse a finished room by returning why; another is begun then. Raises BadInput when a class is
-    missing from the library, or when no start satisfies the recipe's least counts and the objection.
+    `objection` may refuse a finished room by returning why; another is begun then. `rearranged`: which other draw of
+    the things that lie on its furniture, 0 the first. Raises BadInput when a class is missing from the library, or when
+    no start satisfies the recipe's least counts and the objection.
     """
     for place in recipe.place:
         if place.count[0] > 0 and not catalogue.by_class.get(place.class_name):
@@ -70,9 +74,12 @@ def arrange(
     for start in range(RESTARTS):
         random = np.random.default_rng([seed, 11, start])
         try:
-            arrangement = _Arranger(recipe, catalogue, clutter, random).run()
+            arranger = _Arranger(recipe, catalogue, clutter, random)
+            arrangement = arranger.run()
             refused = objection(arrangement)
             if refused is None:
+                if rearranged:
+                    return arranger.rearranged(np.random.default_rng([seed, 12, rearranged]))
                 return arrangement
             reasons.append(refused)
         except _Impossible as reason:
@@ -91,7 +98,10 @@ class _Arranger:
         self.clutter = CLUTTER_FACTOR[clutter]
         self.room = build_room(recipe.shell, random)
         self.objects: list[PlacedObject] = []
+        self.rules: list[Place] = []
+        """By which each was placed."""
         self.first_object = len(self.room.layouts) + 1
+        self.numbers: Iterator[int] = count(self.first_object)
         self.solid = CollisionWorld()
         self.kept_free = CollisionWorld()
         """Floor that must stay free, and what doors sweep; named by the owner."""
@@ -109,6 +119,25 @@ class _Arranger:
             if placed < least:
                 raise _Impossible(f"{place.class_name}: {placed} of at least {least} placed ({place.where})")
         return Arrangement(self.room, tuple(self.objects), self.first_object)
+
+    def rearranged(self, random: np.random.Generator) -> Arrangement:
+        """Return the room with another thing, elsewhere, for each that lies on something and has no joint of its own.
+        One for which no place is found is left away, and its instance is nobody's."""
+        self.random = random
+        carried: dict[int, Place] = {}
+        names: set[str] = set()
+        for thing, place in zip(self.objects, self.rules, strict=True):
+            below = {thing.parent, *(entry.source for entry in thing.further)}
+            if (place.where == "on" and not thing.furnishing.model.joints) or below & names:
+                carried[thing.instance] = place
+                names.add(thing.name)
+        self.objects = [thing for thing in self.objects if thing.name not in names]
+        for name in names:
+            del self.solid.shapes[name]
+        for instance, place in carried.items():
+            self.numbers = iter([instance])
+            self._place_one(place)
+        return Arrangement(self.room, tuple(sorted(self.objects, key=lambda thing: thing.instance)), self.first_object)
 
     def _place_one(self, place: Place) -> bool:
         models = [m for m in self.catalogue.by_class.get(place.class_name, []) if _suits(m, place)]
@@ -329,7 +358,8 @@ class _Arranger:
         return min((float(np.linalg.norm(p - pose.world_from_model[:2, 3])) for p in places), default=0.0)
 
     def _commit(self, furnishing: Furnishing, pose: Pose, shape: PlacedShape, place: Place) -> None:
-        instance = self.first_object + len(self.objects)
+        instance = next(self.numbers)
+        self.rules.append(place)
         name = f"{place.class_name}_{instance}"
         spaces = self._free_spaces(furnishing, pose, place)
         if place.room_beside > 0:

@@ -37,6 +37,15 @@ class SynthesizeParameters(Parameters):
         "`ingest --camera all` reads them all",
     )
     depth: bool = Field(True, description="The log holds depth; off: a stereo camera's log, for the step disparity")
+    path: Literal["tour", "line", "loop", "eight"] = Field(
+        "tour",
+        description="A person's tour past everything, or a robot's drive that looks ahead: along a line, a loop, a "
+        "figure of eight",
+    )
+    rounds: int = Field(1, ge=1, le=2, description="Rounds of a drive; the second with a lower camera, a line back")
+    rearranged: int = Field(
+        0, ge=0, le=1000, description="The same furniture with other things on it, elsewhere: which draw; 0: as it was"
+    )
     opened: int = Field(
         0,
         ge=0,
@@ -50,7 +59,9 @@ class SynthesizeParameters(Parameters):
 
 
 def check(parameters: SynthesizeParameters, inputs: Mapping[str, Any]) -> None:
-    """Raise UsageError for a log that would say nothing of distance."""
+    """Raise UsageError for a log that would say nothing of distance, and for rounds of a tour."""
+    if parameters.rounds > 1 and parameters.path == "tour":
+        raise UsageError("a tour has no rounds", hint="give --path line, loop or eight")
     if not parameters.depth and parameters.stereo_baseline == 0:
         raise UsageError("--no-depth leaves a log without distances", hint="give --stereo-baseline 0.12, for example")
 

@@ -22,6 +22,7 @@ from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.stage import Context
 from stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layout_materials, object_material
 from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
+from stages.synthesize.drive import plan_drive
 from stages.synthesize.free_space import find_free_space
 from stages.synthesize.furniture import Catalogue
 from stages.synthesize.opening import TwoStates, open_some
@@ -56,7 +57,9 @@ def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Conte
     camera = make_camera(parameters)
     with context.progress.step("furnish"):
         catalogue = Catalogue(library)
-        arranged = arrange(recipe, catalogue, parameters.clutter, context.seed, blocked_floor)
+        arranged = arrange(
+            recipe, catalogue, parameters.clutter, context.seed, blocked_floor, rearranged=parameters.rearranged
+        )
         states = TwoStates(arranged, arranged, arranged)
         if parameters.opened:
             states = open_some(arranged, catalogue, parameters.opened, context.random(OPENED_STREAM))
@@ -68,8 +71,12 @@ def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Conte
         renderer = SceneRenderer(world_meshes(states.opened)) if parameters.opened else renderers[0]
     with context.progress.step("walk"):
         space = find_free_space(renderer, arrangement.room.size)
-        views = choose_views(renderer, states.opened, space, camera, context.random(VIEW_STREAM))
-        walk = plan_walk(views, space, renderer, parameters.walking_speed, context.random(TREMOR_STREAM))
+        tremor, speed = context.random(TREMOR_STREAM), parameters.walking_speed
+        if parameters.path == "tour":
+            views = choose_views(renderer, states.opened, space, camera, context.random(VIEW_STREAM))
+            walk = plan_walk(views, space, renderer, speed, tremor)
+        else:
+            walk = plan_drive(parameters.path, parameters.rounds, space, renderer, speed, tremor)
     seen = SeenSurface(DepthCamera().minimum_range, DepthCamera().maximum_range)
     with context.progress.step("render"):
         recording = _record(arrangement, renderers, walk, camera, seen, parameters, context)

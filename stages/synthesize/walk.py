@@ -122,7 +122,7 @@ def _two_opt(tour: list[int], cost: np.ndarray) -> list[int]:
     return tour
 
 
-def _resample(points: np.ndarray, marks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def resample(points: np.ndarray, marks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return points every STEP along a polyline (K, D), and the new rows of the old rows `marks`."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
     count = max(2, int(np.ceil(length[-1] / STEP)) + 1)
@@ -131,7 +131,7 @@ def _resample(points: np.ndarray, marks: np.ndarray) -> tuple[np.ndarray, np.nda
     return result, np.round(length[marks] / max(length[-1], 1e-9) * (count - 1)).astype(int)
 
 
-def _smooth_path(path: np.ndarray, space: FreeSpace) -> np.ndarray:
+def smooth_path(path: np.ndarray, space: FreeSpace) -> np.ndarray:
     """Round off a floor path (N, 2) as far as the clearance allows: every point takes the widest filter that keeps
     it clear."""
     wanted = CLEARANCE + 0.01
@@ -170,8 +170,8 @@ def plan_walk(
         points.append(leg)
         total += len(leg)
         marks.append(total - 1)
-    path, rows = _resample(np.concatenate(points), np.array(marks))
-    path = _smooth_path(path, space)
+    path, rows = resample(np.concatenate(points), np.array(marks))
+    path = smooth_path(path, space)
     row_height = np.interp(np.arange(len(path)), *_unique(rows, np.array([view.eye[2] for view in views])))
     height = gaussian_filter1d(row_height, 0.25 / STEP, mode="nearest")
     eye = np.column_stack([path, height])

@@ -28,6 +28,12 @@ RUNS = (
     Run(
         "stereo", "synthesize", "--library @library --frames 4 --width 240 --height 180 --seed 3 --stereo-baseline 0.1"
     ),
+    Run(
+        "driven",
+        "synthesize",
+        "--library @library --frames 6 --width 160 --height 120 --seed 3 --cameras 3 --path eight --rounds 2 "
+        "--rearranged 1",
+    ),
     Run("sequence", "ingest", "--log @truth/log.mcap"),
     Run("stereo_sequence", "ingest", "--log @stereo/log.mcap"),
     Run("disparity", "disparity", "--sequence @stereo_sequence"),

@@ -10,6 +10,7 @@ import torch
 
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.errors import BadInput, UsageError
+from schemas.evaluation import Evaluation
 from schemas.language_map import LanguageMap
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence
@@ -23,13 +24,14 @@ from stages.kit.open_words.vectors import read_vectors
 from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import View
-from stages.splat import language_stage, query_stage
+from stages.splat import evaluate_stage, language_stage, query_stage
+from stages.splat.asked_figures import calibration_error, recall_at_rejection
 from stages.splat.language.field import LanguageField
 from stages.splat.language.learning import learn, lesson_of
 from stages.splat.language.looks import Sight, looks
 from stages.splat.language.pieces import pieces
 from stages.splat.language.pyramid import LEVELS, pyramid
-from stages.splat.parameters import LanguageParameters, QueryParameters
+from stages.splat.parameters import EvaluateParameters, LanguageParameters, QueryParameters
 from stages.splat.ply import write_gaussians
 from tests.unit.open_words.stand_ins import COLORS, ColorEncoder
 from tests.unit.poses.textured_room import round_walk, write_sequence
@@ -125,7 +127,7 @@ def test_looks_are_of_what_is_seen(shown: tuple[Gaussians, list[Sight]]) -> None
 
 @pytest.fixture
 def colors(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (language_stage, query_stage):
+    for module in (evaluate_stage, language_stage, query_stage):
         monkeypatch.setattr(module, "open_encoder", lambda *_: ColorEncoder())
 
 
@@ -171,6 +173,56 @@ def test_a_splat_answers(room: tuple[Sequence, Splat], language: LanguageMap, co
     assert none.outcome == "absent" and not none.info.answers and none.info.next_best is not None
     again = language_of(room, tmp_path / "again")
     assert again.path("vectors.npz").read_bytes() == language.path("vectors.npz").read_bytes()
+
+
+def evaluated(language: LanguageMap, folder: Path, toml: str, **options: float) -> Evaluation:
+    folder.mkdir()
+    (folder / "queries.toml").write_text(toml)
+    parameters = EvaluateParameters.model_validate(options)
+    return evaluate_stage.run(
+        language, folder / "queries.toml", None, parameters=parameters, context=context(folder / "out")
+    )
+
+
+def test_what_somebody_knows_is_held_against_the_answers(language: LanguageMap, colors: None, tmp_path: Path) -> None:
+    places = {name: Finder(language, ColorEncoder()).find(name)[0] for name in ("red", "blue")}
+    x, y, z = language.info.regions[places["red"].region].box.center
+    there = '[[there]]\ntext = "{}"\nboxes = [{{center = [{}, {}, {}], size = [0.1, 0.1, 0.1]}}]\n'
+    told = there.format("red", x, y, z) + there.format("blue", x + 100, y, z)
+    metrics = evaluated(language, tmp_path / "all", told, least_probability=0.0).info.metrics
+    assert (metrics["words/there"], metrics["words/absent"]) == (2, 0)
+    assert metrics["words/recall"] == metrics["words/precision"] == 0.5
+    assert metrics["words/absent_rejected"] is None and metrics["words/recall_at_rejection"] is None
+    expected = calibration_error(np.array([places[n].probability for n in places]), np.array([True, False]))
+    assert metrics["words/calibration_error"] == pytest.approx(expected, abs=1e-5)
+    strict = evaluated(language, tmp_path / "strict", 'absent = ["green"]\n' + told, least_probability=1.0)
+    assert strict.info.metrics["words/absent_rejected"] == 1 and strict.info.metrics["words/precision"] is None
+    assert "rejected" in strict.path("tables/answers.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("toml", "message"),
+    [
+        ("", "nothing is asked"),
+        ('absent = ["  "]', "absent.*needs words"),
+        ('[[there]]\ntext = "red"\nboxes = []', "there.0.boxes"),
+        ('[[there]]\ntext = "red"\nboxes = [{center = [0, 0], size = [1, 1, 1]}]', "there.0.boxes.0.center"),
+        ("absent = 3", "absent"),
+        ("absent = [", "queries.toml"),
+        ("presnt = []", "presnt"),
+    ],
+)
+def test_queries_that_say_nothing_are_refused(toml: str, message: str, language: LanguageMap, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=message):
+        evaluated(language, tmp_path / "asked", toml)
+
+
+def test_recall_is_looked_at_where_nine_of_ten_absent_texts_are_rejected() -> None:
+    absent, right = np.linspace(0.0, 1.0, 11), np.array([True, True, False, True])
+    assert recall_at_rejection(np.array([0.95, 0.89, 0.99, 0.91]), right, absent) == 0.5
+    assert recall_at_rejection(np.zeros(0), np.zeros(0, bool), absent) is None
+    assert calibration_error(np.array([0.75, 0.75, 0.25, 0.25]), np.array([1, 1, 0, 0])) == pytest.approx(0.25)
+    assert calibration_error(np.zeros(0), np.zeros(0)) is None
 
 
 def test_in_a_strange_place_hardly_anything_is_believed(language: LanguageMap) -> None:

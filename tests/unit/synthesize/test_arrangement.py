@@ -233,3 +233,20 @@ def test_unknown_recipe_and_missing_class(library: CadLibrary, tmp_path) -> None
     LibraryFile(seed=0, models=kept).write(tmp_path / "library.json")
     with pytest.raises(BadInput, match="fridge"):
         arrange(load_recipe("room"), Catalogue(CadLibrary(tmp_path)), "medium", 0)
+
+
+def test_rearranged_room_keeps_its_furniture_and_moves_what_lies_on_it(catalogue: Catalogue) -> None:
+    recipe = recipe_for_few_shapes("office")
+    first, again, other = (arrange(recipe, catalogue, "medium", 1, rearranged=draw) for draw in (0, 1, 2))
+
+    def poses(room: Arrangement) -> dict[int, tuple[str, bytes]]:
+        return {o.instance: (o.furnishing.model.id, o.world_from_model.tobytes()) for o in room.objects}
+
+    before, after = poses(first), poses(again)
+    assert after == poses(arrange(recipe, catalogue, "medium", 1, rearranged=1))
+    carried = {o.instance for o in first.objects if o.relation in ("supports", "contains") and o.parent != "floor_1"}
+    assert all(after[k] == before[k] for k in before.keys() - carried)
+    changed = {k for k in after if after[k] != before[k]}
+    assert changed and changed <= carried
+    assert poses(other) != after
+    assert all(penetration(a, b) < 1e-3 for a, b in itertools.combinations(again.objects, 2))

@@ -1,0 +1,40 @@
+"""Where the robot starts: free, roomy, and, where the log is given, where its camera was."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.kit.motion.failures import MotionFailed
+from stages.plan.start_pose import start_base
+from stages.plan.world_model import WorldModel
+
+
+def start(model: WorldModel, cameras: np.ndarray | None = None) -> np.ndarray:
+    return start_base(model, model.description.carry, np.random.default_rng(0), cameras=cameras)
+
+
+def is_free(model: WorldModel, base: np.ndarray) -> bool:
+    return model.checker.check(np.concatenate([base, model.description.carry])) is None
+
+
+def test_the_start_is_free(model: WorldModel) -> None:
+    assert is_free(model, start(model))
+
+
+def test_the_start_is_where_the_camera_was(model: WorldModel) -> None:
+    roomiest = start(model)[:2]
+    cupboard = next(model.pose(name)[:2, 3] for name, entry in model.records.items() if entry.class_name == "fridge")
+    cameras = np.array([[*cupboard, 1.4], [*(roomiest + [0.3, 0.1]), 1.5]])
+    base = start(model, cameras)
+    assert base[:2] == pytest.approx(cameras[1, :2]) and is_free(model, base)
+
+
+def test_no_place_under_the_camera_is_free(model: WorldModel) -> None:
+    cupboard = next(model.pose(name)[:2, 3] for name, entry in model.records.items() if entry.class_name == "fridge")
+    with pytest.raises(MotionFailed, match="none of 1 places"):
+        start(model, np.array([[*cupboard, 1.4]]))
+
+
+def test_without_a_path_of_the_camera_it_is_the_roomiest(model: WorldModel) -> None:
+    assert start(model, np.zeros((0, 3))) == pytest.approx(start(model))
