@@ -14,6 +14,9 @@ Pair = tuple[int, int]
 """(smaller label, larger label)"""
 
 
+NONE: Counter[int] = Counter()
+
+
 class MergedLabels:
     """Which label each label was merged into. The older label (the smaller number) stays."""
 
@@ -121,7 +124,7 @@ class PairEvidence:
             count = self.together.pop(pair)
             if other != kept:
                 self._increase((min(other, kept), max(other, kept)), count)
-        moved = self.apart.pop(removed, Counter())
+        moved = self.apart.pop(removed, NONE)
         own = self.apart.setdefault(kept, Counter())
         for other, count in moved.items():
             row = self.apart[other]
@@ -136,7 +139,7 @@ class PairEvidence:
         count = self.together.get(pair, 0)
         if count < minimum_frames:
             return False
-        return not contested or self.apart.get(pair[0], {}).get(pair[1], 0) < count
+        return not contested or self.apart.get(pair[0], NONE).get(pair[1], 0) < count
 
     def _increase(self, pair: Pair, amount: int) -> None:
         self.together[pair] = self.together.get(pair, 0) + amount

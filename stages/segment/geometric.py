@@ -122,7 +122,7 @@ def _row_of_convexity(
 @njit(cache=True, parallel=True)
 def _minimum_convexity(points: Row, normals: Row, window: int, mask_threshold: float, mutual: bool) -> np.ndarray:
     """Least convexity (H, W) of points and normals whose coordinates are images (H, W) of their own."""
-    result = np.ones(points[2].shape, dtype=np.float32)
+    result: np.ndarray = np.ones(points[2].shape, dtype=np.float32)
     for v in prange(result.shape[0]):
         _row_of_convexity(points, normals, v, window, mask_threshold, mutual, result[v])
     return result
