@@ -22,6 +22,7 @@ from stages.kit.formats.trajectories import poses_at, read_tum
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.surface_samples import surface_samples
 from stages.kit.geometry.transforms import apply
+from stages.kit.prefetching import prefetched
 from stages.kit.stage import Context, Progress
 
 MOST_VOXELS = 20_000_000
@@ -101,11 +102,12 @@ class Used:
 
     def __iter__(self) -> Iterator[PosedDepth]:
         self.count = 0
-        for frame in self.reader.frames(streams=("depth",), every=self.every):
+        cameras = self.reader.cameras
+        for frame in prefetched(self.reader.frames(streams=("depth",), every=self.every)):
             pose = frame.world_from_camera if self.poses is None else self.poses[frame.index]
             if frame.depth is not None and pose is not None and (frame.depth > 0).any():
                 self.count += 1
-                yield PosedDepth(frame.index, self.reader.cameras[frame.camera_name], frame.depth, pose)
+                yield PosedDepth(frame.index, cameras[frame.camera_name], frame.depth, pose)
 
 
 def watch(used: Used, grid: Watched, parameters: ArticulateParameters, progress: Progress) -> None:

@@ -103,7 +103,7 @@ class Watched:
         return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, parallel=True, nogil=True)
 def _vote(  # noqa: PLR0913
     votes: np.ndarray,
     belief: np.ndarray,
@@ -124,7 +124,7 @@ def _vote(  # noqa: PLR0913
 ) -> None:
     height, width = depth.shape
     fx, fy, cx, cy = intrinsics
-    for i in range(votes.shape[0]):
+    for i in numba.prange(votes.shape[0]):  # every voxel for itself
         for j in range(votes.shape[1]):
             for k in range(votes.shape[2]):
                 z = shift[2] + steps[2, 0] * i + steps[2, 1] * j + steps[2, 2] * k

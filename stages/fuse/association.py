@@ -55,7 +55,7 @@ def index_segments(ids: np.ndarray, sorted_ids: np.ndarray) -> tuple[np.ndarray,
     return result, unlisted
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sample_voxels(
     depth: np.ndarray,
     index_image: np.ndarray,

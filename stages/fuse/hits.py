@@ -19,7 +19,7 @@ STEEP = 2.0
 MOST_HITS = 255
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _count_hits(
     depth: np.ndarray,
     intrinsics: np.ndarray,

@@ -24,7 +24,7 @@ def intrinsics_of(camera: Camera) -> np.ndarray:
     return np.array([camera.fx, camera.fy, camera.cx, camera.cy], dtype=np.float64)
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True, nogil=True, error_model="numpy")
 def _integrate(
     touched: np.ndarray,
     coordinates: np.ndarray,

@@ -23,6 +23,9 @@ class Listings:
             frame.frame: (int(start), int(end)) for frame, start, end in zip(segments.frames, starts, ends, strict=True)
         }
 
+    def __contains__(self, frame: int) -> bool:
+        return frame in self._rows
+
     def get(self, frame: int) -> tuple[FrameSegment, ...] | None:
         """Return the segments of a frame, None for one that is not listed."""
         if frame not in self._rows:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from schemas.articulations import Articulations
 from schemas.panoptic_map import SNAPSHOTS, PanopticMap
@@ -24,9 +27,10 @@ from stages.fuse.parameters import FuseParameters
 from stages.fuse.payload import write_meshes, write_payload
 from stages.fuse.separate import Separate
 from stages.fuse.thesis import Thesis
-from stages.kit.formats.frames import FrameReader, require_depth
+from stages.kit.formats.frames import Frame, FrameReader, require_depth
 from stages.kit.formats.masks import PanopticReader
 from stages.kit.formats.trajectories import poses_at, read_tum
+from stages.kit.prefetching import prefetched
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 
@@ -127,24 +131,33 @@ def _integrate_frames(
         poses = None
         if trajectory is not None:
             poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
+        cameras = reader.cameras
+
+        def read() -> Iterator[tuple[Frame, np.ndarray | None, np.ndarray | None]]:
+            """Frames with their poses and, where there are depth, pose and listing, ids."""
+            for frame in reader.frames(streams=("color", "depth"), every=parameters.every):
+                pose = frame.world_from_camera if poses is None else poses[frame.index]
+                used = frame.depth is not None and (frame.depth > 0).any()
+                if not used:
+                    frame = replace(frame, depth=None)
+                wanted = used and pose is not None and frame.index in listed
+                yield frame, pose, masks.read(frame.index) if wanted else None
+
         mapper = new_mapper(parameters, vocabulary)
         total = -(-len(reader) // parameters.every)
-        frames = reader.frames(streams=("color", "depth"), every=parameters.every)
         kept = 0
-        for frame in context.progress.track(frames, total=total, description="fuse"):
+        for frame, pose, ids in context.progress.track(prefetched(read()), total=total, description="fuse"):
             # Of the last frame the finished map is the snapshot, so one is taken when another frame comes.
             if parameters.snapshot_every and mapper.frames_integrated >= kept + parameters.snapshot_every:
                 kept = mapper.frames_integrated
                 write_snapshot(mapper, vocabulary, source, context)
-            pose = frame.world_from_camera if poses is None else poses[frame.index]
-            if frame.depth is None or not (frame.depth > 0).any():
+            if frame.depth is None:
                 skipped["no_depth"] += 1
             elif pose is None:
                 skipped["no_pose"] += 1
             else:
                 listing = listed.get(frame.index)
-                ids = None if listing is None else masks.read(frame.index)
-                camera = reader.cameras[frame.camera_name]
+                camera = cameras[frame.camera_name]
                 depth = frame.depth if outdated is None else outdated.without(frame.depth, camera, pose, frame.index)
                 mapper.add_frame(camera, depth, frame.color, pose, ids, listing or ())
     return mapper, skipped, source

@@ -72,7 +72,7 @@ def _fill_table(keys: np.ndarray, slots: np.ndarray, coordinates: np.ndarray, co
         _insert(keys, slots, pack(coordinates[slot, 0], coordinates[slot, 1], coordinates[slot, 2]), slot)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _touch(
     depth: np.ndarray,
     intrinsics: np.ndarray,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -125,23 +126,27 @@ def _write_frames(
     parameters: IngestParameters,
     context: Context,
 ) -> _Written:
-    """Write frames.mcap."""
+    """Write frames.mcap: each frame by a thread, while the next is loaded."""
     world_from_log = np.array(gravity.world_from_log)
     unchanged = np.array_equal(world_from_log, np.eye(4))
     written = _Written()
     last_stamp = -1
-    with FrameWriter(
-        context.output / "frames.mcap",
-        source.camera,
-        labels=source.has_labels,
-        world_up="unknown" if gravity.method == "none" else "z",
-        registered=all(known.registered for known in source.cameras),
-        label_table=source.label_table,
-        cameras={known.name: known.camera for known in source.cameras},
-        baselines={known.name: known.baseline for known in source.cameras if known.baseline is not None},
-    ) as writer:
+    writing: Future[None] | None = None
+    with (
+        FrameWriter(
+            context.output / "frames.mcap",
+            source.camera,
+            labels=source.has_labels,
+            world_up="unknown" if gravity.method == "none" else "z",
+            registered=all(known.registered for known in source.cameras),
+            label_table=source.label_table,
+            cameras={known.name: known.camera for known in source.cameras},
+            baselines={known.name: known.baseline for known in source.cameras if known.baseline is not None},
+        ) as writer,
+        ThreadPoolExecutor(1, thread_name_prefix="write") as thread,
+    ):
         for entry in context.progress.track(entries, total=len(entries), description="frames"):
-            if parameters.max_frames is not None and writer.frame_count >= parameters.max_frames:
+            if parameters.max_frames is not None and len(written.times) >= parameters.max_frames:
                 drops[NOT_SELECTED] += 1
                 continue
             try:
@@ -158,10 +163,21 @@ def _write_frames(
             # which is what float seconds since 1970 resolve.
             last_stamp = stamp if stamp > last_stamp else last_stamp + 1000
             time = last_stamp * 1e-9
-            writer.write(
-                time, loaded.color, loaded.depth, pose, loaded.labels, right=loaded.right, camera_name=entry.camera_name
+            if writing is not None:
+                writing.result()
+            writing = thread.submit(
+                writer.write,
+                time,
+                loaded.color,
+                loaded.depth,
+                pose,
+                loaded.labels,
+                right=loaded.right,
+                camera_name=entry.camera_name,
             )
             _note(written, time, entry.camera_name, loaded, pose)
+        if writing is not None:
+            writing.result()
     return written
 
 
