@@ -1,0 +1,163 @@
+"""From a log to an interactive scene: seconds by step, frames a second, memory; this code and one of before in turn.
+
+    python -m benchmarks.speed.reconstruct --out FOLDER [--before FOLDER] [--log LOG] [--weights ONNX] [--frames N]
+
+Runs `scenewright run reconstruct` on every frame of a recorded log for three backends, with the CAD library made before
+(runs share it), by this code and by the checkout of earlier code in `--before`, one after the other for each backend.
+Nothing else should run beside it. Artifacts of both codes are compared by their content digests.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from benchmarks.options import Measurement, asked
+from benchmarks.results import write_measured
+from schemas.errors import UsageError
+from stages.engine.batch.processes import resident_memory
+from stages.engine.chain import REPOSITORY
+from stages.kit.measurement.tables import Table, as_markdown
+
+BACKENDS = ("auto", "detector", "geometric")
+QUICK_FRAMES = 20
+SECONDS_BETWEEN_LOOKS = 0.2
+
+
+class ReconstructMeasurement(Measurement):
+    """Options of the measurement."""
+
+    log: Path = Field(Path("../shared/data/7scenes_redkitchen"), description="A posed RGB-D log")
+    weights: Path = Field(Path("../shared/data/detectors/yolox_nano.onnx"), description="Detector's weights")
+    before: Path | None = Field(None, description="Checkout of earlier code with its own .venv, to measure in turn")
+    frames: int | None = Field(None, ge=1, description="Use at most so many frames")
+
+
+@dataclass
+class Run:
+    """What a run took."""
+
+    seconds: float
+    peak_memory: int
+    """Most resident memory of all its processes together [bytes]."""
+    steps: dict[str, dict[str, Any]]
+    """Step -> what it said (`--json`) and `seconds` of its process."""
+
+
+def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
+    """Run the pipeline by the code of a checkout. Raises RuntimeError when it fails."""
+    python = code / ".venv" / "bin" / "python"
+    words = [str(python), "-m", "cli", "run", "reconstruct", "--out", str(folder), "--json"]
+    shutil.rmtree(folder, ignore_errors=True)  # not --force, which would make the library again
+    words += [word for name, value in settings.items() for word in ("--set", f"{name}={value}")]
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    began = time.perf_counter()
+    process = subprocess.Popen(
+        words,
+        cwd=code,
+        env={**environment, "PYTHONPATH": str(code)},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    peak, starts = [0], []
+
+    def watch() -> None:
+        while process.poll() is None:
+            peak[0] = max(peak[0], resident_memory(process.pid))
+            time.sleep(SECONDS_BETWEEN_LOOKS)
+
+    watching = threading.Thread(target=watch, daemon=True)
+    watching.start()
+    assert process.stderr is not None and process.stdout is not None
+    said = []
+    for line in process.stderr:
+        said.append(line)
+        if line.startswith("[") and "/" in line.split("]")[0]:
+            starts.append((line.split()[1], time.perf_counter()))
+    output = process.stdout.read()
+    process.wait()
+    ended = time.perf_counter()
+    watching.join()
+    if not output.strip():
+        raise RuntimeError(f"{code}: exit {process.returncode}: {''.join(said[-3:])}")
+    steps = {Path(facts["path"]).name: facts for facts in json.loads(output)["steps"]}
+    ends = [start for _, start in starts[1:]] + [ended]
+    for (name, start), end in zip(starts, ends, strict=True):
+        steps[name]["seconds"] = end - start
+    return Run(ended - began, peak[0], steps)
+
+
+def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
+    """Return the figures of all backends and codes: `<code>/<backend>/<measure>`."""
+    frames = arguments.frames or (QUICK_FRAMES if arguments.quick else None)
+    codes = {"ours": REPOSITORY}
+    if arguments.before is not None:
+        if not (arguments.before / ".venv" / "bin" / "python").exists():
+            raise UsageError(f"{arguments.before}: no checkout with a .venv", hint="git worktree add, link .venv")
+        codes = {"before": arguments.before.resolve(), **codes}
+    out = (arguments.out or Path("outputs/speed-reconstruct")).resolve()
+    found: dict[str, float] = {}
+    for backend in ("geometric",) if arguments.quick else BACKENDS:
+        settings = {"log": str(arguments.log.resolve()), "backend": backend, "every": "1"}
+        if backend == "detector":
+            settings["weights"] = str(arguments.weights.resolve())
+        if frames is not None:
+            settings["max_frames"] = str(frames)
+        runs = {}
+        for name, code in codes.items():
+            _make_library(code, out / name)
+            print(f"{backend}, {name} ...", file=sys.stderr, flush=True)
+            runs[name] = run = run_once(code, out / name / backend, settings)
+            used = run.steps["sequence"]["summary"]["frames"]
+            found |= {
+                f"{name}/{backend}/frames": used,
+                f"{name}/{backend}/seconds": run.seconds,
+                f"{name}/{backend}/frames_per_second": used / run.seconds,
+                f"{name}/{backend}/memory_mb": run.peak_memory / 1e6,
+                **{f"{name}/{backend}/{step}": facts["seconds"] for step, facts in run.steps.items()},
+            }
+        if "before" in runs:
+            digests = [{step: facts["content_digest"] for step, facts in run.steps.items()} for run in runs.values()]
+            same = [step for step in digests[1] if digests[0].get(step) == digests[1][step]]
+            print(f"{backend}: other bytes: {sorted(set(digests[1]) - set(same)) or 'none'}", file=sys.stderr)
+            found[f"ours/{backend}/same_artifacts"] = len(same)
+            found[f"ours/{backend}/artifacts"] = len(digests[1])
+        (out / "metrics-so-far.json").write_text(json.dumps(found, indent=1))
+    return found
+
+
+def _make_library(code: Path, folder: Path) -> None:
+    """Make the CAD library once, where the runs of a code share it."""
+    python = code / ".venv" / "bin" / "python"
+    words = [str(python), "-m", "cli", "library", "build", "--seed", "1", "--shared", str(folder / ".shared")]
+    subprocess.run(
+        [*words, "--out", str(folder / "library"), "--quiet"],
+        cwd=code,
+        env={**os.environ, "PYTHONPATH": str(code)},
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+
+
+def main() -> None:
+    """Measure, print the table, write metrics.json and table.md."""
+    arguments = asked(ReconstructMeasurement)
+    metrics = measure(arguments)
+    rows = tuple(metrics.items())
+    table = Table("reconstruct", "From a log to an interactive scene", ("", "value"), rows)
+    write_measured(arguments.out, metrics, as_markdown(table))
+
+
+if __name__ == "__main__":
+    main()
