@@ -1,12 +1,14 @@
 """Artifacts that many runs need alike, made once: `--shared FOLDER` (the CAD library of the pipelines).
 
 `FOLDER` holds whole artifacts by step and key, so that what is taken is what the step would make, and is kept only
-for steps without inputs. It lies beside the run folders; deleting it costs nothing but time. What is taken is copied
-and its bytes are checked, so that a run folder stays whole by itself.
+for steps without inputs. It lies beside the run folders; deleting it costs nothing but time. What is taken is linked
+(copied, where it lies on another file system) and its bytes are checked: nobody writes into a file of an artifact, so
+that a run folder stays whole by itself.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -34,7 +36,7 @@ def take(folder: Path, stage: Stage, key: str, partial: Path) -> Manifest | None
         if manifest.key != key or manifest.kind != stage.writes.kind:
             return None
         check_sizes(entry, manifest)
-        shutil.copytree(entry, partial, dirs_exist_ok=True)
+        shutil.copytree(entry, partial, dirs_exist_ok=True, copy_function=_link)
         check_hashes(partial, manifest)
     except (ScenewrightError, OSError):
         for path in partial.iterdir():
@@ -49,13 +51,20 @@ def keep(folder: Path, stage: Stage, key: str, made: Path) -> None:
     entry = shared_entry(folder, stage, key)
     try:
         with store.locked(entry), store.partial_folder(entry) as partial:
-            shutil.copytree(made, partial, dirs_exist_ok=True)
+            shutil.copytree(made, partial, dirs_exist_ok=True, copy_function=_link)
             store.take_place(partial, entry)
         kept = sorted(folder.glob(f"{_prefix(stage)}*"), key=lambda path: path.stat().st_mtime_ns)
         for old in kept[:-KEPT]:
             shutil.rmtree(old, ignore_errors=True)
     except (MachineFailure, OSError):
         return
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
 
 
 def _prefix(stage: Stage) -> str:
