@@ -77,16 +77,23 @@ def described(results: Results, figures: Mapping[str, Figure], command: Sequence
     return {
         "experiment": experiment.name,
         "title": experiment.title,
-        "date": datetime.now(UTC).date().isoformat(),
-        "commit": _commit(),
-        "machine": f"{os.cpu_count()} processors, {platform.machine()}, {platform.system()}",
-        "command": shlex.join(command),
+        **circumstances(command),
         "simulated": experiment.simulated,
         "knows": experiment.knows,
         "does_not_show": experiment.does_not_show,
         "notes": seeds_told(results),
         **({"seeds": dict(results.seeds_met)} if results.seeds_met else {}),
         "figures": {name: vars(figure) for name, figure in figures.items()},
+    }
+
+
+def circumstances(command: Sequence[str]) -> dict[str, str]:
+    """Return when, by which code, where and by which command something is measured."""
+    return {
+        "date": datetime.now(UTC).date().isoformat(),
+        "commit": _commit(),
+        "machine": f"{os.cpu_count()} processors, {platform.machine()}, {platform.system()}",
+        "command": shlex.join(command),
     }
 
 

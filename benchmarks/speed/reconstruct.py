@@ -4,13 +4,15 @@
 
 Runs `scenewright run reconstruct` on every frame of a recorded log for three backends, with the CAD library made before
 (runs share it), by this code and by the checkout of earlier code in `--before`, one after the other for each backend.
-Nothing else should run beside it. Artifacts of both codes are compared by their content digests.
+Nothing else should run beside it. Artifacts of both codes are compared by their content digests. FOLDER/figures.json is
+docs/results/speed_reconstruct.json.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -23,7 +25,8 @@ from typing import Any
 from pydantic import Field
 
 from benchmarks.options import Measurement, asked
-from benchmarks.results import write_measured
+from benchmarks.results import circumstances, write_measured
+from benchmarks.tabulation import Figure
 from schemas.errors import UsageError
 from stages.engine.batch.processes import resident_memory
 from stages.engine.chain import REPOSITORY
@@ -48,6 +51,8 @@ class Run:
     """What a run took."""
 
     seconds: float
+    processor_seconds: float
+    """Of all its processes."""
     peak_memory: int
     """Most resident memory of all its processes together [bytes]."""
     steps: dict[str, dict[str, Any]]
@@ -61,7 +66,7 @@ def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
     shutil.rmtree(folder, ignore_errors=True)  # not --force, which would make the library again
     words += [word for name, value in settings.items() for word in ("--set", f"{name}={value}")]
     environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
-    began = time.perf_counter()
+    began, used = time.perf_counter(), _processor_seconds()
     process = subprocess.Popen(
         words,
         cwd=code,
@@ -95,7 +100,12 @@ def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
     ends = [start for _, start in starts[1:]] + [ended]
     for (name, start), end in zip(starts, ends, strict=True):
         steps[name]["seconds"] = end - start
-    return Run(ended - began, peak[0], steps)
+    return Run(ended - began, _processor_seconds() - used, peak[0], steps)
+
+
+def _processor_seconds() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
@@ -122,17 +132,17 @@ def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
             used = run.steps["sequence"]["summary"]["frames"]
             found |= {
                 f"{name}/{backend}/frames": used,
-                f"{name}/{backend}/seconds": run.seconds,
-                f"{name}/{backend}/frames_per_second": used / run.seconds,
-                f"{name}/{backend}/memory_mb": run.peak_memory / 1e6,
+                f"{name}/{backend}/whole": run.seconds,
+                f"{name}/{backend}/frames per s": used / run.seconds,
+                f"{name}/{backend}/processor time": run.processor_seconds,
+                f"{name}/{backend}/peak memory": run.peak_memory / 1e6,
                 **{f"{name}/{backend}/{step}": facts["seconds"] for step, facts in run.steps.items()},
             }
         if "before" in runs:
             digests = [{step: facts["content_digest"] for step, facts in run.steps.items()} for run in runs.values()]
             same = [step for step in digests[1] if digests[0].get(step) == digests[1][step]]
             print(f"{backend}: other bytes: {sorted(set(digests[1]) - set(same)) or 'none'}", file=sys.stderr)
-            found[f"ours/{backend}/same_artifacts"] = len(same)
-            found[f"ours/{backend}/artifacts"] = len(digests[1])
+            found[f"ours/{backend}/same artifacts"] = len(same)
         (out / "metrics-so-far.json").write_text(json.dumps(found, indent=1))
     return found
 
@@ -157,6 +167,27 @@ def main() -> None:
     rows = tuple(metrics.items())
     table = Table("reconstruct", "From a log to an interactive scene", ("", "value"), rows)
     write_measured(arguments.out, metrics, as_markdown(table))
+    if arguments.out is not None:
+        text = json.dumps(published(metrics), indent=1, ensure_ascii=False)
+        (arguments.out / "figures.json").write_text(text + "\n", encoding="utf-8")
+
+
+def published(metrics: dict[str, float]) -> dict[str, Any]:
+    """Return the figures with what has to stand beside them (docs/results/index.md)."""
+    units = {"frames": "", "frames per s": "", "same artifacts": "", "peak memory": "MB"}
+    figures = {
+        name: vars(Figure(round(value, 2), None, None, 1, units.get(name.rpartition("/")[2], "s")))
+        for name, value in metrics.items()
+    }
+    return {
+        "experiment": "speed_reconstruct",
+        "title": "From a log to an interactive scene",
+        **circumstances("python -m benchmarks.speed.reconstruct --out FOLDER --before CHECKOUT".split()),
+        "simulated": "nothing: the kitchen is recorded",
+        "knows": "the log's poses",
+        "does_not_show": "Other machines, other logs. One run of each; seconds by step are of a step's whole process.",
+        "figures": figures,
+    }
 
 
 if __name__ == "__main__":
