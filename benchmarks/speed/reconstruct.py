@@ -182,7 +182,7 @@ def published(metrics: dict[str, float]) -> dict[str, Any]:
     return {
         "experiment": "speed_reconstruct",
         "title": "From a log to an interactive scene",
-        **circumstances("python -m benchmarks.speed.reconstruct --out FOLDER --before CHECKOUT".split()),
+        **circumstances(["python", "-m", "benchmarks.speed.reconstruct", "--out", "FOLDER", "--before", "CHECKOUT"]),
         "simulated": "nothing: the kitchen is recorded",
         "knows": "the log's poses",
         "does_not_show": "Other machines, other logs. One run of each; seconds by step are of a step's whole process.",
