@@ -23,7 +23,7 @@ from tests.contract.test_command_line import scenewright
 from tests.reliability.kill_chain import SIGNALS, run_trial
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SMALL = {"frames": "24", "width": "240", "height": "180", "voxel_size": "0.04", "seed": "3", "shapes": "2"}
+SMALL = {"frames": "24", "width": "240", "height": "180", "voxel_size": "0.04", "seed": "6", "shapes": "2"}
 PIPELINE = read_pipeline(pipeline_path("demo"))
 ACCEPTED = ("--accept", "unsettled", "--accept", "execution_failed")
 """What a room of 24 tiny frames may come to; a run ends with its gravest outcome."""
