@@ -34,6 +34,8 @@ from stages.kit.measurement.tables import Table, as_markdown
 
 BACKENDS = ("auto", "detector", "geometric")
 QUICK_FRAMES = 20
+FIRST_FRAMES = 8
+"""Of a run before each that is measured, in which numba compiles what has changed."""
 SECONDS_BETWEEN_LOOKS = 0.2
 
 
@@ -99,7 +101,8 @@ def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
     steps = {Path(facts["path"]).name: facts for facts in json.loads(output)["steps"]}
     ends = [start for _, start in starts[1:]] + [ended]
     for (name, start), end in zip(starts, ends, strict=True):
-        steps[name]["seconds"] = end - start
+        if name in steps:
+            steps[name]["seconds"] = end - start
     return Run(ended - began, _processor_seconds() - used, peak[0], steps)
 
 
@@ -128,6 +131,7 @@ def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
         for name, code in codes.items():
             _make_library(code, out / name)
             print(f"{backend}, {name} ...", file=sys.stderr, flush=True)
+            run_once(code, out / name / "compiling", {**settings, "max_frames": str(FIRST_FRAMES)})
             runs[name] = run = run_once(code, out / name / backend, settings)
             used = run.steps["sequence"]["summary"]["frames"]
             found |= {

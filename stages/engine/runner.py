@@ -79,9 +79,14 @@ class _OpenInput:
     """Taken before anything was read."""
 
     def check(self) -> None:
-        """Raise BadInput unless its bytes are those its manifest lists (the digest of a raw file was just taken)."""
+        """Raise BadInput unless its bytes are those its manifest lists (the digest of a raw file was just taken).
+
+        One that was made again since, with the same content, is what it was, though its timings are others.
+        """
         if isinstance(self.value, Artifact) and self.value.manifest is not None:
-            check_hashes(self.path, self.value.manifest)
+            found = _previous_manifest(self.path)
+            again = found is not None and found.content_digest == self.digest
+            check_hashes(self.path, found if found is not None and again else self.value.manifest)
 
     def was_written(self) -> bool:
         """Whether it holds something else than when it was opened."""
