@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.kit.motion.failures import MotionFailed
-from stages.plan.start_pose import start_base
+from stages.plan.start_pose import SHELL, start_base
 from stages.plan.world_model import WorldModel
 
 
@@ -28,6 +28,14 @@ def test_the_start_is_where_the_camera_was(model: WorldModel) -> None:
     cameras = np.array([[*cupboard, 1.4], [*(roomiest + [0.3, 0.1]), 1.5]])
     base = start(model, cameras)
     assert base[:2] == pytest.approx(cameras[1, :2]) and is_free(model, base)
+
+
+def test_the_robot_looks_at_the_middle_of_what_stands_about(model: WorldModel) -> None:
+    base = start(model, np.array([[*start(model)[:2], 1.5]]))
+    boxes = [model.world.bounds(name) for name, e in model.records.items() if e.class_name not in SHELL]
+    middle = np.mean([(low[:2] + high[:2]) / 2 for low, high in boxes if low[2] < 1.0], axis=0)
+    ahead = middle - base[:2]
+    assert np.array([np.cos(base[2]), np.sin(base[2])]) == pytest.approx(ahead / np.linalg.norm(ahead), abs=1e-6)
 
 
 def test_no_place_under_the_camera_is_free(model: WorldModel) -> None:
