@@ -45,6 +45,7 @@ WRITES = "flushes, locks or appends to what this process writes"
 KERNEL = "the kernel's own"
 PARSED = "parses bytes that the door, or a message of bounded size, gave"
 WITHIN = "an entry of an archive, whose size is checked"
+PARENT = "what the process that started this one asks"
 MADE = "what this process, or a child of it, has just written"
 BOUNDED = "a container read piece by piece, regular files only, with bounds of its own"
 PICTURE = "a picture whose size is looked at before it is decoded"
@@ -71,8 +72,11 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/engine/batch/scene_log.py": {"open": MADE},
     "stages/engine/batch/scene_run.py": {"os.open": WRITES},
     "stages/engine/batch/storage.py": {"model_validate_json": SERVICE},
+    "stages/engine/batch/warm.py": {"json.loads": MADE},
+    "stages/engine/batch/warm_worker.py": {"json.loads": PARENT},
     "stages/engine/chain.py": {"json.loads": MADE},
     "stages/engine/collection.py": {"os.open": WRITES},
+    "stages/engine/forking.py": {"open": MADE, "os.open": DEVICE, "os.fdopen": MADE},
     "stages/engine/keys.py": {"json.loads": MADE},
     "stages/engine/known_models.py": {"open": OURS, "tomllib.load": OURS},
     "stages/engine/memory_limit.py": {"read_text": KERNEL},
@@ -115,6 +119,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/segment/backends/network/weights.py": {"json.loads": PARSED},
     "stages/segment/backends/service/reply_cache.py": {"read_bytes": CACHE},
     "stages/kit/open_words/embedded.py": {"json.loads": PARSED},
+    "stages/splat/asked_file.py": {"model_validate_json": PARSED},
     "stages/splat/checkpoints.py": {"json.loads": PARSED},
     "stages/splat/triangulation.py": {"open": MADE},
     "stages/suture/segmentation/checkpoint.py": {"json.loads": PARSED},

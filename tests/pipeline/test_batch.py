@@ -79,7 +79,7 @@ def test_every_kind_of_end_is_told_apart_and_stops_nobody_else(tmp_path: Path) -
         "slow": "sleep 60",
         "large": "allocate 400",
     }
-    limits = '[limits]\ntime = "3 s"\nmemory = "200 MiB"\ngrace = "2 s"'
+    limits = '[limits]\ntime = "10 s"\nmemory = "200 MiB"\ngrace = "2 s"'  # a busy machine allocates slowly
     end = run(batch_of(tmp_path, behaviours, limits), tmp_path / "out", jobs=2)
     assert outcomes(end) == {
         "good": "done",
