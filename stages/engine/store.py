@@ -29,9 +29,9 @@ LARGEST_JOURNAL = 2**20
 AT_FDCWD = -100
 RENAME_EXCHANGE = 2
 TIMINGS_NAME = "timings.json"
+"""The runner writes it into every artifact."""
 MOST_BY_ONE = 50
 """Files of an artifact that are flushed to the disk one by one."""
-"""The runner writes it into every artifact."""
 
 
 def _beside(target: Path, suffix: str) -> Path:
