@@ -3,6 +3,7 @@
 import sys
 import time
 
-print("colorsys" in sys.modules)
+loaded = "colorsys" in sys.modules
 time.sleep(float(sys.argv[1]))
+print(loaded)
 sys.exit(3)

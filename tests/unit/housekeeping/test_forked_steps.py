@@ -8,11 +8,11 @@ import sys
 PROGRAM = """
 import sys
 from stages.engine import forking
-forking.AT_WORK = 0.2
+forking.AT_WORK = 1.0
 child = [sys.executable, "-m", "tests.unit.housekeeping.forked_child"]
 with forking.begun(["colorsys", "no.such.module"]):
     assert forking.forks()
-    print([forking.run_forked([*child, seconds], {}) for seconds in ("0", "1", "0")])
+    print([forking.run_forked([*child, seconds], {}) for seconds in ("0", "2", "0")])
 print(forking.forks())
 """
 
