@@ -218,13 +218,17 @@ def levenberg_marquardt(
     x = np.asarray(start, dtype=float).copy()
     value = residuals(x[None])[0]
     cost, calls, damping = float(value @ value), 1, 1e-3
+    ahead = STEP * np.eye(len(x))
     while calls < evaluations:
-        jacobian = np.ascontiguousarray(((residuals(x + STEP * np.eye(len(x))) - value) / STEP).T)
+        jacobian = np.ascontiguousarray(((residuals(x + ahead) - value) / STEP).T)
         calls += len(x)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ value
         improved = False
         while calls < evaluations and damping < 1e12:
-            lifted = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-6)) + 1e-9 * np.eye(len(x))
+            lifted = normal.copy()
+            diagonal = lifted.reshape(-1)[:: len(x) + 1]
+            diagonal += damping * np.maximum(diagonal, 1e-6)
+            diagonal += 1e-9
             step = -np.linalg.solve(lifted, gradient)
             trial = residuals((x + step)[None])[0]
             calls += 1
