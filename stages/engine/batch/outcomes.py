@@ -39,7 +39,7 @@ MACHINE_FAILED = 6
 
 MEANINGS: dict[Outcome, str] = {
     "done": "every step ended well",
-    "not ok": "a step wrote an artifact whose outcome is not ok, and the pipeline does not accept it",
+    "not ok": "a step wrote an artifact whose outcome is neither ok nor one of `accept` in the batch file",
     "bad input": "an input cannot be used as it is",
     "usage": "a value is out of range or an option unknown",
     "missing dependency": "a library, weight file or device is not there",
