@@ -166,7 +166,9 @@ def sdf(scene: InteractiveScene, out: Path) -> Told:
 
 
 @pytest.mark.parametrize("other", [mjcf, usd, sdf])
-def test_masses_limits_and_rest_are_those_of_bullet(other, scene, bullet: Told, tmp_path: Path) -> None:
+def test_masses_limits_and_rest_are_those_of_bullet(
+    other: Callable[[InteractiveScene, Path], Told], scene: InteractiveScene, bullet: Told, tmp_path: Path
+) -> None:
     if other is not sdf:
         pytest.importorskip("mujoco")
     if other is usd:
