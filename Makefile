@@ -70,9 +70,10 @@ rules: setup ## Generate data/pipelines/*.mk and schemas/json from their declara
 
 # ---- pipelines ----------------------------------------------------------------------------------------------------
 
+# Steps that do not need each other run beside each other: JOBS=1 runs one at a time, in less memory.
 .PHONY: $(PIPELINES)
 $(PIPELINES): setup
-	@$(MAKE) --no-print-directory -f data/pipelines/$@.mk PYTHON=$(PYTHON) OUTPUTS=$(OUTPUTS) $(if $(RUN),RUN=$(RUN))
+	@$(MAKE) --no-print-directory -j$(or $(JOBS),2) -f data/pipelines/$@.mk PYTHON=$(PYTHON) OUTPUTS=$(OUTPUTS) $(if $(RUN),RUN=$(RUN))
 	@echo "report: $(OUTPUTS)/$(or $(RUN),$@)/report/report.html"
 	@folder=$(OUTPUTS)/$(or $(RUN),$@)/plan; if [ -d $$folder ]; then cat $$folder/plan.txt; $(PYTHON) -m cli inspect $$folder --expect ok > /dev/null; fi
 

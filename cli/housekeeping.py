@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,7 +83,7 @@ def run(
 ) -> int:
     """Run a pipeline: the same commands that the Makefile chains. Exits with the gravest code of its steps."""
     from stages.engine.batch.outcomes import worst_exit_code
-    from stages.engine.chain import run_pipeline
+    from stages.engine.chain import forked_steps, run_pipeline
     from stages.engine.estimation import estimate_pipeline, warn_or_refuse
     from stages.engine.given_inputs import check_given_inputs
     from stages.engine.memory_limit import parse_limit
@@ -104,9 +105,11 @@ def run(
     if dry_run:
         for line in expected.lines():
             _say(line)
-    reports = run_pipeline(
-        chain, out, values, extra=extra, only=tuple(only or ()), announce=(lambda text: None) if quiet else _say
-    )
+    # what forks share would count for a limit
+    with forked_steps(chain) if max_memory is None else nullcontext():
+        reports = run_pipeline(
+            chain, out, values, extra=extra, only=tuple(only or ()), announce=(lambda text: None) if quiet else _say
+        )
     for report in reports:
         status = report.facts.get("status", f"exit {report.exit_code}")
         _say(f"{report.name:24} {status:11} {report.facts.get('outcome', '')}")

@@ -28,7 +28,7 @@ from benchmarks.options import Measurement, asked
 from benchmarks.results import circumstances, write_measured
 from benchmarks.tabulation import Figure
 from schemas.errors import UsageError
-from stages.engine.batch.processes import resident_memory
+from stages.engine.batch.processes import proportional_memory, resident_memory
 from stages.engine.chain import REPOSITORY
 from stages.kit.measurement.tables import Table, as_markdown
 
@@ -37,6 +37,7 @@ QUICK_FRAMES = 20
 FIRST_FRAMES = 8
 """Of a run before each that is measured, in which numba compiles what has changed."""
 SECONDS_BETWEEN_LOOKS = 0.2
+PEAKS = ("peak memory", "peak memory, shared pages for each")
 
 
 class ReconstructMeasurement(Measurement):
@@ -56,7 +57,9 @@ class Run:
     processor_seconds: float
     """Of all its processes."""
     peak_memory: int
-    """Most resident memory of all its processes together [bytes]."""
+    """Most memory of all its processes together, shared pages counted once [bytes]."""
+    peak_resident: int
+    """... and counted for each that shares them."""
     steps: dict[str, dict[str, Any]]
     """Step -> what it said (`--json`) and `seconds` of its process."""
 
@@ -77,11 +80,12 @@ def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
-    peak, starts = [0], []
+    peak, starts = [0, 0], []
 
     def watch() -> None:
         while process.poll() is None:
-            peak[0] = max(peak[0], resident_memory(process.pid))
+            peak[0] = max(peak[0], proportional_memory(process.pid))
+            peak[1] = max(peak[1], resident_memory(process.pid))
             time.sleep(SECONDS_BETWEEN_LOOKS)
 
     watching = threading.Thread(target=watch, daemon=True)
@@ -103,7 +107,7 @@ def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
     for (name, start), end in zip(starts, ends, strict=True):
         if name in steps:
             steps[name]["seconds"] = end - start
-    return Run(ended - began, _processor_seconds() - used, peak[0], steps)
+    return Run(ended - began, _processor_seconds() - used, peak[0], peak[1], steps)
 
 
 def _processor_seconds() -> float:
@@ -139,7 +143,8 @@ def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
                 f"{name}/{backend}/whole": run.seconds,
                 f"{name}/{backend}/frames per s": used / run.seconds,
                 f"{name}/{backend}/processor time": run.processor_seconds,
-                f"{name}/{backend}/peak memory": run.peak_memory / 1e6,
+                f"{name}/{backend}/{PEAKS[0]}": run.peak_memory / 1e6,
+                f"{name}/{backend}/{PEAKS[1]}": run.peak_resident / 1e6,
                 **{f"{name}/{backend}/{step}": facts["seconds"] for step, facts in run.steps.items()},
             }
         if "before" in runs:
@@ -178,7 +183,7 @@ def main() -> None:
 
 def published(metrics: dict[str, float]) -> dict[str, Any]:
     """Return the figures with what has to stand beside them (docs/results/index.md)."""
-    units = {"frames": "", "frames per s": "", "same artifacts": "", "peak memory": "MB"}
+    units = {"frames": "", "frames per s": "", "same artifacts": ""} | dict.fromkeys(PEAKS, "MB")
     figures = {
         name: vars(Figure(round(value, 2), None, None, 1, units.get(name.rpartition("/")[2], "s")))
         for name, value in metrics.items()

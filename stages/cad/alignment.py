@@ -171,8 +171,19 @@ def _residuals(parameters: np.ndarray, fixed: _Fixed) -> np.ndarray:
     return np.concatenate((fixed.box_weight * box, fixed.offset_weight * offset, fixed.angle_weight * angle))
 
 
+@njit(cache=True)
+def _residual_rows(rows: np.ndarray, fixed: _Fixed) -> np.ndarray:
+    first = _residuals(rows[0], fixed)
+    found = np.empty((len(rows), len(first)))
+    found[0] = first
+    for k in range(1, len(rows)):
+        found[k] = _residuals(rows[k], fixed)
+    return found
+
+
 def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.ndarray], np.ndarray]:
-    """Return e(alpha, theta, px, py) with J = e^T e (2.12); p_z follows from the support: p = -d^s + alpha s_y / 2."""
+    """Return e(alpha, theta, px, py), of rows (N, 4), with J = e^T e (2.12); p_z follows from the support:
+    p = -d^s + alpha s_y / 2."""
     frame, shape = match.frame, match.shape
     rotation = CUBE_ROTATIONS[match.orientation]
     rows = np.array([pair[0] for pair in match.pairs], dtype=int)
@@ -192,7 +203,7 @@ def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.n
         math.sqrt(weights.angle),
         np.sqrt([weights.containment, weights.height]),
     )
-    return lambda parameters: _residuals(parameters, fixed)
+    return lambda rows: _residual_rows(rows, fixed)
 
 
 def levenberg_marquardt(
@@ -200,25 +211,22 @@ def levenberg_marquardt(
 ) -> tuple[np.ndarray, float]:
     """Return (parameters (K,), squared norm) that minimise |residuals|^2 from `start` (K,).
 
-    Forward differences; works with fewer residuals than parameters, as damping keeps the normal matrix regular. Stops
-    after `evaluations` calls or when a step changes the cost by less than `tolerance` of it.
+    `residuals` takes rows (N, K), (N, M) come back. Forward differences; works with fewer residuals than parameters, as
+    damping keeps the normal matrix regular. Stops after `evaluations` rows or when a step changes the cost by less than
+    `tolerance` of it.
     """
     x = np.asarray(start, dtype=float).copy()
-    value = residuals(x)
+    value = residuals(x[None])[0]
     cost, calls, damping = float(value @ value), 1, 1e-3
     while calls < evaluations:
-        jacobian = np.empty((len(value), len(x)))
-        for k in range(len(x)):
-            ahead = x.copy()
-            ahead[k] += STEP
-            jacobian[:, k] = (residuals(ahead) - value) / STEP
+        jacobian = np.ascontiguousarray(((residuals(x + STEP * np.eye(len(x))) - value) / STEP).T)
         calls += len(x)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ value
         improved = False
         while calls < evaluations and damping < 1e12:
             lifted = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-6)) + 1e-9 * np.eye(len(x))
             step = -np.linalg.solve(lifted, gradient)
-            trial = residuals(x + step)
+            trial = residuals((x + step)[None])[0]
             calls += 1
             trial_cost = float(trial @ trial)
             if trial_cost < cost:

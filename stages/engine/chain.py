@@ -1,4 +1,8 @@
-"""Running a pipeline: every step is its own process, with the same command line that make uses."""
+"""Running a pipeline: every step is its own process, with the same command line that make uses.
+
+Inside `forked_steps` the process is a fork: `run` loads numpy, trimesh
+and Open3D once and not for each step.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Collection, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +19,7 @@ from typing import Any
 from schemas.errors import BadInput
 from stages.engine import forking
 from stages.engine.interruption import PARENT_VARIABLE
-from stages.engine.pipelines import Pipeline, Step, resolve_variables, step_arguments
+from stages.engine.pipelines import Pipeline, Step, resolve_variables, step_arguments, step_modules
 
 OUTCOME_EXIT_CODE = 4
 """An artifact was written, but its outcome is not ok."""
@@ -57,6 +62,11 @@ def run_command(arguments: list[str]) -> tuple[int, str]:
         process.wait()
         raise
     return process.returncode, output
+
+
+def forked_steps(pipeline: Pipeline) -> AbstractContextManager[None]:
+    """Let this process run its steps in forks of itself inside, where that is safe, with their code loaded once."""
+    return forking.begun(step_modules(pipeline)) if sys.platform == "linux" else nullcontext()
 
 
 def run_pipeline(

@@ -1,8 +1,9 @@
 """Commands in forked children of a process that holds the libraries: what `python -m MODULE WORD...` would do.
 
-A new process loads numpy, numba and torch again, seconds of work; a fork shares them with its parent until it writes to
-them. The parent has to have one thread and no CUDA. What a child loaded on top it tells by name, so that the parent can
-load it before the next fork. Only a warm worker of a batch forks (batch/warm_worker.py).
+A new process loads numpy, numba and trimesh again, seconds of work; a fork shares them with its parent until it writes
+to them. The parent has to have one thread and no CUDA. `run` forks its steps (chain.py), and a warm worker of a batch
+its scenes (batch/warm_worker.py), whose children tell by name what they loaded on top, so that it can load that before
+the next fork.
 """
 
 from __future__ import annotations
@@ -12,28 +13,47 @@ import gc
 import importlib
 import os
 import runpy
+import select
 import signal
 import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Sequence
-from contextlib import suppress
-from typing import BinaryIO, NoReturn
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import IO, BinaryIO, NoReturn
 
+from stages.engine import interruption
+
+AT_WORK = 2.0
+"""A child that runs for so long makes something [s]."""
+
+_forks = False
+_ahead: tuple[str, ...] = ()
 _learned: BinaryIO | None = None
-"""Where children of this process write the names of what they loaded; None in a process that does not fork."""
+"""Where children of this process write the names of what they loaded; None where nobody asks."""
 
 
 def forks() -> bool:
-    """Tell whether this process runs commands in forks of itself, as a warm worker and what it forked do."""
-    return _learned is not None
+    """Tell whether this process runs commands in forks of itself, as what it forked does too."""
+    return _forks
 
 
 def begin(learned: BinaryIO) -> None:
     """Let this process run commands in forks of itself; they append to the unbuffered file `learned`."""
-    global _learned
-    _learned = learned
+    global _forks, _learned
+    _forks, _learned = True, learned
+
+
+@contextmanager
+def begun(ahead: Iterable[str]) -> Iterator[None]:
+    """Let this process run commands in forks of itself inside, and load modules while the first long one works."""
+    global _forks, _ahead
+    forked, _forks, _ahead = _forks, True, tuple(ahead)
+    try:
+        yield
+    finally:
+        _forks, _ahead = forked, ()
 
 
 def load_learned() -> None:
@@ -42,10 +62,25 @@ def load_learned() -> None:
     _learned.seek(0)
     names = dict.fromkeys(_learned.read().decode().split())
     _learned.truncate(0)
+    _load(names)
+
+
+def _load_ahead(output: IO[str]) -> None:
+    """Load what was asked for ahead, once a child is at work: one that finds all up to date ends before."""
+    global _ahead
+    if not _ahead or select.select([output], [], [], AT_WORK)[0]:
+        return
+    names, _ahead = _ahead, ()
+    with interruption.waiting():
+        _load(names)
+
+
+def _load(names: Iterable[str]) -> None:
+    before = len(sys.modules)
     for name in names:
         with suppress(Exception):  # a child that needs it will say what is wrong
             importlib.import_module(name)
-    if names:
+    if len(sys.modules) > before:
         gc.collect()
         gc.freeze()  # collections in the children then leave shared pages alone
 
@@ -88,7 +123,8 @@ def _exit_code(end: SystemExit) -> int:
 
 
 def _tell(before: set[str]) -> None:
-    assert _learned is not None
+    if _learned is None:
+        return
     own = [
         name
         for name, module in list(sys.modules.items())
@@ -117,6 +153,7 @@ def run_forked(command: Sequence[str], environment: dict[str, str]) -> tuple[int
     os.close(writing)
     try:
         with open(reading, encoding="utf-8", errors="replace") as output:
+            _load_ahead(output)
             text = output.read()
         return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), text
     except KeyboardInterrupt:

@@ -114,6 +114,12 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
         raise UsageError(f"{where}: input {missing[0]!r} is missing", hint=f"{stage.name} needs it")
 
 
+def step_modules(pipeline: Pipeline) -> list[str]:
+    """Return the modules that its steps run."""
+    stages = [stage_by_name(step.stage) for step in pipeline.step]
+    return [f"stages.{stage.folder}.{stage.module}" for stage in stages]
+
+
 def resolve_variables(pipeline: Pipeline, given: Mapping[str, str]) -> dict[str, str | None]:
     """Fill in defaults. Raises UsageError for unknown or missing variables."""
     unknown = sorted(set(given) - set(pipeline.variables))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 
 from schemas.artifact import Artifact
@@ -68,11 +69,14 @@ def check_version(root: Path, manifest: Manifest) -> type[Artifact]:
 
 def check_sizes(root: Path, manifest: Manifest) -> None:
     """Check that every payload file is there with its size. Raises BadInput naming the first that is not."""
-    real_root = os.path.realpath(root)
+    real_folder = cache(os.path.realpath)
+    within = real_folder(root) + os.sep
     for record in manifest.files:
         path = root / record.path
+        folder, name = os.path.split(path)
         try:
-            inside = os.path.realpath(path).startswith(real_root + os.sep)
+            real_path = os.path.realpath(path) if os.path.islink(path) else os.path.join(real_folder(folder), name)
+            inside = real_path.startswith(within)
             size = path.stat().st_size if path.is_file() else None
         except (OSError, ValueError) as error:
             raise BadInput(f"{root}: {record.path!r:.80}: {getattr(error, 'strerror', None) or error}") from None

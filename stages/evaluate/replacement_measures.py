@@ -13,13 +13,13 @@ import numpy as np
 
 from schemas.cad_scene import CadScene, CadSceneFile, Replacement
 from schemas.contact_graph import ContactGraphFile
-from schemas.ground_truth import GroundTruth, TrueObject
+from schemas.ground_truth import TrueObject
 from stages.evaluate.alignment_errors import AlignmentError, alignment_error
 from stages.evaluate.correspondence import assign, merge_stuff_nodes, node_affinity
 from stages.evaluate.functional_equivalence import Equivalence, equivalence, same_relation
 from stages.evaluate.joint_errors import JointError, joint_errors, placed_joints
 from stages.evaluate.model_shapes import ModelShape, PlacedShape
-from stages.evaluate.shape_loading import model_shapes, placed_candidate, true_shapes
+from stages.evaluate.shape_loading import model_shapes, placed_candidate
 from stages.evaluate.truth import TrueRoom
 from stages.kit.measurement.layout_pieces import layout_pieces
 from stages.kit.measurement.room_penetrations import Penetration, room_penetrations
@@ -296,25 +296,21 @@ class RoomReplacements:
 
 
 def replacements_of(
-    ground_truth: GroundTruth,
+    true_models: Mapping[str, PlacedShape],
     truth: TrueRoom,
     cad_scene: CadScene,
     *,
-    world_from_log: np.ndarray,
     overlaps: Mapping[tuple[int, int], float] | None = None,
     minimum_iou: float = 0.25,
     library_models: Path | None = None,
     best_single: bool = False,
-) -> RoomReplacements | None:
-    """Read shapes and measure one room; None when the ground truth has no room with models (an annotated scan).
+) -> RoomReplacements:
+    """Read the scene's shapes and measure one room.
 
-    `truth` is `load_truth(ground_truth, world_from_log, ...)`, `overlaps` from `point_overlaps` where there is a map.
-    `library_models` is `models/` of the CAD library: `best_single` (the scene before the global check) needs it,
-    as the CAD scene holds copies of the chosen models only. Raises BadInput when a file is broken.
+    `true_models` are the `true_shapes` of the ground truth, `truth` its `load_truth`, `overlaps` from `point_overlaps`
+    where there is a map. `library_models` is `models/` of the CAD library: `best_single` (the scene before the global
+    check) needs it, as the CAD scene holds copies of the chosen models only. Raises BadInput when a file is broken.
     """
-    true_models = true_shapes(ground_truth, world_from_log)
-    if not true_models:
-        return None
     scene = with_best_single(cad_scene.info) if best_single else cad_scene.info
     chosen = {r.node: r.chosen for r in scene.replacements if r.decision == "cad" and r.chosen is not None}
     roots = [cad_scene.path("models"), *([library_models] if library_models is not None else [])]

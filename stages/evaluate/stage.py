@@ -36,6 +36,7 @@ from stages.evaluate.plan_measures import measure_plan
 from stages.evaluate.replacement_measures import replacements_of
 from stages.evaluate.replacement_record import record_replacements
 from stages.evaluate.results import Part
+from stages.evaluate.shape_loading import true_shapes
 from stages.evaluate.trajectory_measures import count_poses, measure_trajectory
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.kit.formats.trajectories import read_tum
@@ -250,31 +251,24 @@ def _evaluate_replacement(
     inputs: Inputs, parameters: EvaluateParameters, cad_scene: CadScene, ground_truth: GroundTruth, truth: TrueRoom
 ) -> None:
     """Measure the scene, and where the library is given and `cad` recorded it, the scene before the global check."""
-    measured = replacements_of(
-        ground_truth,
-        truth,
-        cad_scene,
-        world_from_log=world_from_log(inputs.sequence),
-        overlaps=inputs.overlaps,
-        minimum_iou=parameters.node_match_iou,
-    )
-    if measured is None:
+    true_models = true_shapes(ground_truth, world_from_log(inputs.sequence))
+    if not true_models:  # an annotated scan
         return
+    minimum_iou = parameters.node_match_iou
+    measured = replacements_of(true_models, truth, cad_scene, overlaps=inputs.overlaps, minimum_iou=minimum_iou)
     record_replacements(inputs.part("replacement"), measured)
     if inputs.cad_library is None or all(r.best_single is None for r in cad_scene.info.replacements):
         return
     before = replacements_of(
-        ground_truth,
+        true_models,
         truth,
         cad_scene,
-        world_from_log=world_from_log(inputs.sequence),
         overlaps=inputs.overlaps,
-        minimum_iou=parameters.node_match_iou,
+        minimum_iou=minimum_iou,
         library_models=inputs.cad_library.path("models"),
         best_single=True,
     )
-    if before is not None:
-        record_replacements(inputs.part("replacement_before_check"), before)
+    record_replacements(inputs.part("replacement_before_check"), before)
 
 
 def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context: Context) -> None:

@@ -12,6 +12,7 @@ from stages.fuse.annotated_scan import AnnotatedScan
 from stages.fuse.point_surface import local_axes
 from stages.fuse.unnamed_pieces import CEILING, FLOOR, LEVEL, SAME_LEVEL, unnamed_pieces
 from stages.fuse.walls import of_walls
+from stages.kit.geometry.cells import cell_keys
 from stages.kit.geometry.point_clouds import vertex_normals
 
 FLOOR_SHARE, LEAST_FLOOR = 0.25, 0.5
@@ -55,9 +56,8 @@ def told_apart(scan: AnnotatedScan, voxel: float, minimum_area: float, where: Pa
 
 def _cubes(points: np.ndarray, edge: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the first point of every cube of `edge` [m] that holds any, and the cube (N,) of every point."""
-    cubes = np.floor(points / edge).astype(np.int64)
-    _, first, inverse = np.unique(cubes, axis=0, return_index=True, return_inverse=True)
-    return first, inverse.reshape(-1)
+    _, first, inverse = np.unique(cell_keys(points, edge), return_index=True, return_inverse=True)
+    return first, inverse
 
 
 def _into_the_room(points: np.ndarray) -> np.ndarray:

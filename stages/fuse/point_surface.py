@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from stages.kit.geometry.cells import row_keys
+
 NEIGHBOURS = 12
 """Points around one that say how the surface lies there."""
 
@@ -16,8 +18,7 @@ def thinned(
     `edge` [m]; faces that collapse or come twice are gone."""
     cubes = np.floor(vertices / edge).astype(np.int64)
     keys = np.column_stack([cubes, instance])
-    _, inverse = np.unique(keys, axis=0, return_inverse=True)
-    inverse = inverse.reshape(-1)
+    _, inverse = np.unique(row_keys(keys), return_inverse=True)
     count = np.bincount(inverse)
     means = np.stack([np.bincount(inverse, weights=vertices[:, k]) / count for k in range(3)], axis=1)
     paint = np.stack([np.bincount(inverse, weights=colors[:, k]) / count for k in range(3)], axis=1)

@@ -1,7 +1,11 @@
-"""Progress: a rich bar on a terminal, plain lines elsewhere, nothing in tests. Also times the named parts of a step."""
+"""Progress: a rich bar on a terminal, plain lines elsewhere, nothing in tests. Also times the named parts of a step.
+
+Where make runs several steps at once, they have lines even on a terminal, each with the name of what is made.
+"""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -32,11 +36,11 @@ class SilentProgress:
 
 
 class LineProgress(SilentProgress):
-    """Plain lines on standard error, at most one every `interval` seconds."""
+    """Plain lines on standard error, at most one every `interval` seconds, that begin with a name."""
 
-    def __init__(self, interval: float = 5.0) -> None:
+    def __init__(self, interval: float = 5.0, name: str = "") -> None:
         super().__init__()
-        self.interval = interval
+        self.interval, self.start = interval, f"{name}: " if name else ""
 
     def track(self, items: Iterable[Item], *, total: int | None = None, description: str = "") -> Iterator[Item]:
         """Yield the items and print a line now and then."""
@@ -49,12 +53,13 @@ class LineProgress(SilentProgress):
             if now - last >= self.interval:
                 last = now
                 of = f"/{total}" if total else ""
-                print(f"{description}: {count}{of} ({count / (now - started):.1f}/s)", file=sys.stderr, flush=True)
+                rate = count / (now - started)
+                print(f"{self.start}{description}: {count}{of} ({rate:.1f}/s)", file=sys.stderr, flush=True)
 
     @contextmanager
     def step(self, description: str) -> Iterator[None]:
         """Say what begins, and time it."""
-        print(f"{description} ...", file=sys.stderr, flush=True)
+        print(f"{self.start}{description} ...", file=sys.stderr, flush=True)
         with super().step(description):
             yield
 
@@ -72,8 +77,10 @@ class BarProgress(SilentProgress):
         yield from track(items, description=description, total=total, console=Console(stderr=True), transient=True)
 
 
-def progress_for(stream_is_terminal: bool, quiet: bool = False) -> SilentProgress:
-    """Choose how progress is shown."""
+def progress_for(stream_is_terminal: bool, quiet: bool = False, name: str = "") -> SilentProgress:
+    """Choose how progress is shown; `name` is that of what is made."""
     if quiet:
         return SilentProgress()
+    if "--jobserver" in os.environ.get("MAKEFLAGS", ""):
+        return LineProgress(name=name)
     return BarProgress() if stream_is_terminal else LineProgress()

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPoint, Polygon
+from shapely.geometry import Polygon
 
 from schemas.base import as_vector
 from schemas.errors import BadInput
@@ -65,10 +65,7 @@ def surface_planes(
     size = points.max(axis=0) - points.min(axis=0)
     surface = 2 * float(size[0] * size[1] + size[1] * size[2] + size[0] * size[2])
     width = min(support_width, 0.35 * float(size[:2].min()))
-    bounds = np.array([[solid.vertices.min(axis=0), solid.vertices.max(axis=0)] for solid in solids])
-    edges = [
-        np.unique(np.sort(solid.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0) for solid in solids
-    ]
+    edges = _Edges(solids)
     planes = []
     for normal, offset, area, facets in _coplanar_facets(solids):
         up = normal[2] > UPRIGHT
@@ -76,15 +73,13 @@ def surface_planes(
         if area < least:
             continue
         basis = _basis(normal)
-        union = shapely.union_all([_outline(corners @ basis.T) for corners in facets])
+        union = shapely.union_all(_outlines([corners @ basis.T for corners in facets]))
         gaps = COVER_GAPS + tuple(gap for gap in CLEARANCES if up and gap <= 0.25 * size[2])
-        cover = []
-        for height in (offset - gap for gap in gaps):
-            near = np.flatnonzero(_bounds_reach(bounds, normal, height))
-            if sections is not None:
-                sections.take(len(near))
-            cover += [_section(solids[k].vertices, edges[k], normal, height, basis) for k in near.tolist()]
-        exposed = union.difference(shapely.union_all([c for c in cover if c is not None]))
+        heights = offset - np.array(gaps)
+        near = edges.reach(normal, heights)
+        if sections is not None:
+            sections.take(int(near.sum()))
+        exposed = union.difference(shapely.union_all(edges.sections(normal, heights, basis, near)))
         regions = _regions(exposed, width) if up else [exposed]
         for region in regions:
             if region.area < least:
@@ -115,23 +110,25 @@ def _coplanar_facets(solids: Sequence[Solid]) -> list[tuple[np.ndarray, float, f
         corners = solid.vertices[solid.faces]
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         doubled = np.linalg.norm(cross, axis=1)
-        for k in np.flatnonzero(~solid.curved & (doubled > 1e-10)):
-            normal = cross[k] / doubled[k]
-            offset = -float(normal @ corners[k].mean(axis=0))
-            key = (*(int(v) for v in np.round(normal * 200)), round(offset * 1000))
-            entry = groups.setdefault(key, ([], [], [], {}))
-            entry[0].append(normal * doubled[k])
-            entry[1].append(offset * doubled[k])
+        flat = np.flatnonzero(~solid.curved & (doubled > 1e-10))
+        corners, cross, doubled = corners[flat], cross[flat], doubled[flat]
+        normals = cross / doubled[:, None]
+        offsets = -np.array([normal @ middle for normal, middle in zip(normals, corners.mean(axis=1), strict=True)])
+        keys = np.column_stack([np.round(normals * 200), np.round(offsets * 1000)]).astype(int).tolist()
+        for k, key in enumerate(keys):
+            entry = groups.setdefault(tuple(key), ([], [], [], {}))
+            entry[0].append(normals[k] * doubled[k])
+            entry[1].append(float(offsets[k] * doubled[k]))
             entry[2].append(float(doubled[k]))
             entry[3].setdefault(number, []).append(corners[k])
     planes = []
     for key in sorted(groups):
-        normals, offsets, weights, facets = groups[key]
-        normal = np.sum(normals, axis=0)
+        crosses, moments, weights, facets = groups[key]
+        normal = np.sum(crosses, axis=0)
         normal = normal / np.linalg.norm(normal)
         total = sum(weights)
         planes.append(
-            (normal, sum(offsets) / total, 0.5 * total, [np.concatenate(corners) for corners in facets.values()])
+            (normal, sum(moments) / total, 0.5 * total, [np.concatenate(corners) for corners in facets.values()])
         )
     return planes
 
@@ -144,29 +141,42 @@ def _basis(normal: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _outline(points: np.ndarray) -> Polygon:
-    return MultiPoint(points).convex_hull
+def _outlines(point_sets: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the convex hulls of sets of points in the plane, each (N, 2)."""
+    owners = np.repeat(np.arange(len(point_sets)), [len(points) for points in point_sets])
+    return np.asarray(shapely.convex_hull(shapely.multipoints(np.concatenate(point_sets), indices=owners)))
 
 
-def _bounds_reach(bounds: np.ndarray, normal: np.ndarray, height: float) -> np.ndarray:
-    """Return (S,) bool: which bounding boxes (S, 2, 3) cross the plane n.v + height = 0."""
-    center, half = bounds.mean(axis=1), 0.5 * (bounds[:, 1] - bounds[:, 0])
-    return np.abs(center @ normal + height) < half @ np.abs(normal)
+class _Edges:
+    """The edges of convex solids, all in one row."""
 
+    def __init__(self, solids: Sequence[Solid]) -> None:
+        bounds = np.array([[solid.vertices.min(axis=0), solid.vertices.max(axis=0)] for solid in solids])
+        self.center, self.half = bounds.mean(axis=1), 0.5 * (bounds[:, 1] - bounds[:, 0])
+        pairs = [
+            np.unique(np.sort(solid.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+            for solid in solids
+        ]
+        self.owner = np.repeat(np.arange(len(solids)), [len(each) for each in pairs])
+        corners = [solid.vertices[each] for solid, each in zip(solids, pairs, strict=True)]
+        self.start, self.end = np.concatenate(corners).transpose(1, 0, 2)
 
-def _section(
-    vertices: np.ndarray, edges: np.ndarray, normal: np.ndarray, height: float, basis: np.ndarray
-) -> Polygon | None:
-    """Return the cross-section of a convex solid with the plane n.v + height = 0, in the plane's basis, or None."""
-    signed = vertices @ normal + height
-    start, end = signed[edges[:, 0]], signed[edges[:, 1]]
-    crossing = (start < 0) != (end < 0)
-    if not crossing.any():
-        return None
-    weight = (start[crossing] / (start[crossing] - end[crossing]))[:, None]
-    points = vertices[edges[crossing, 0]] * (1 - weight) + vertices[edges[crossing, 1]] * weight
-    outline = _outline(points @ basis.T)
-    return outline if outline.area > 0 else None
+    def reach(self, normal: np.ndarray, heights: np.ndarray) -> np.ndarray:
+        """Return (H, S) bool: which solids' bounding boxes cross the planes n.v + height = 0."""
+        return np.abs(self.center @ normal + heights[:, None]) < self.half @ np.abs(normal)
+
+    def sections(self, normal: np.ndarray, heights: np.ndarray, basis: np.ndarray, asked: np.ndarray) -> np.ndarray:
+        """Return the cross-sections of solids with the planes n.v + height = 0, in their basis; `asked`: (H, S)."""
+        start, end = self.start @ normal + heights[:, None], self.end @ normal + heights[:, None]
+        plane, edge = np.nonzero(((start < 0) != (end < 0)) & asked[:, self.owner])
+        if not len(edge):
+            return np.empty(0, object)
+        start, end = start[plane, edge], end[plane, edge]
+        weight = (start / (start - end))[:, None]
+        points = (self.start[edge] * (1 - weight) + self.end[edge] * weight) @ basis.T
+        solids = np.unique(plane * len(self.center) + self.owner[edge], return_inverse=True)[1]
+        outlines = np.asarray(shapely.convex_hull(shapely.multipoints(points, indices=solids)))
+        return outlines[shapely.area(outlines) > 0]
 
 
 def _regions(exposed: shapely.Geometry, width: float) -> list[shapely.Geometry]:

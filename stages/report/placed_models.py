@@ -21,6 +21,7 @@ class ModelShelf:
     def __init__(self, cad_scene: CadScene, library: CadLibrary | None = None) -> None:
         self._roots = [cad_scene.path("models")] + ([library.path("models")] if library is not None else [])
         self._models: dict[str, CadModel] = {}
+        self._pieces: dict[tuple[object, ...], list[ConvexPiece]] = {}
 
     def folder(self, model_id: str) -> Path | None:
         """Return the folder of a model, None when nobody has it."""
@@ -50,7 +51,9 @@ class ModelShelf:
         folder = self.folder(candidate.model_id)
         if folder is None:
             return []
-        pieces = posed_collision(folder, self._model(folder), candidate.joints, candidate.scale)
-        pose = np.array(candidate.world_from_model)
-        in_model = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
-        return [piece.placed(pose) for piece in in_model if piece is not None]
+        shape = (folder, candidate.scale, *sorted(candidate.joints.items()))
+        if shape not in self._pieces:
+            pieces = posed_collision(folder, self._model(folder), candidate.joints, candidate.scale)
+            found = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
+            self._pieces[shape] = [piece for piece in found if piece is not None]
+        return [piece.placed(np.array(candidate.world_from_model)) for piece in self._pieces[shape]]

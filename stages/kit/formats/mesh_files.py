@@ -14,6 +14,7 @@ import re
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -36,6 +37,8 @@ MOST_OVERLAP = 4
 """Bytes of the arrays of a GLB for one of the file."""
 LARGEST_TEXT_MESH = 128 * 2**20
 """Bytes of a PLY or STL file that is text, for which trimesh takes ten times as much."""
+REMEMBERED_BYTES = 2**15
+"""Files up to this size are parsed once."""
 _GLB_COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _GLB_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
@@ -130,6 +133,19 @@ def _check_mesh(mesh: trimesh.Trimesh, path: str, *, may_be_empty: bool, hint: s
 
 
 def _parse(data: bytes, kind: str) -> trimesh.Trimesh | None:
+    if len(data) > REMEMBERED_BYTES:
+        return _parsed(data, kind)
+    found = _remembered(data, kind)
+    return found.copy() if found is not None else None
+
+
+@lru_cache(maxsize=1024)
+def _remembered(data: bytes, kind: str) -> trimesh.Trimesh | None:
+    """Pieces of models and rooms are read again and again: to be checked, moved, drawn, measured."""
+    return _parsed(data, kind)
+
+
+def _parsed(data: bytes, kind: str) -> trimesh.Trimesh | None:
     try:
         # From memory and without a resolver, so that names inside the file lead nowhere.
         loaded = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.kit.geometry.cells import cell_keys
 from stages.kit.geometry.planes import PlaneFit, plane_distances, ransac_plane
 from stages.kit.geometry.transforms import rotation_between, transform_from
 
@@ -57,8 +58,7 @@ def mean_camera_up(world_from_camera: np.ndarray) -> np.ndarray | None:
 
 def grid_samples(points: np.ndarray, normals: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Return one point (M, 3) and its normal for every occupied cell of a grid of `size` [m], in cell order."""
-    cells = np.floor(points / size).astype(np.int64)
-    _, first = np.unique(cells, axis=0, return_index=True)
+    _, first = np.unique(cell_keys(points, size), return_index=True)
     return points[first], normals[first]
 
 

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from schemas.errors import BadInput
+from stages.kit.geometry.cells import row_keys
 
 MOST_SAMPLES = 50_000_000
 """Points on the large triangles of one mesh: 2,500 m^2 at a centimetre."""
@@ -89,8 +90,9 @@ def clusters(points: np.ndarray, distance: float) -> np.ndarray:
     if count == 0:
         return np.zeros(0, dtype=int)
     edge = distance / 2
-    cells, cell_of = np.unique(np.floor(points / edge).astype(np.int64), axis=0, return_inverse=True)
-    cell_of = cell_of.reshape(-1)
+    all_cells = np.floor(points / edge).astype(np.int64)
+    _, one, cell_of = np.unique(row_keys(all_cells), return_index=True, return_inverse=True)
+    cells = all_cells[one]
     pairs = cKDTree(cells).query_pairs(2.0, output_type="ndarray")
     links = coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
     label = connected_components(links, directed=False)[1][cell_of]

@@ -11,6 +11,7 @@ import trimesh
 from numba import njit
 
 from schemas.errors import BadInput
+from stages.kit.geometry.cells import row_keys
 from stages.kit.rendering.patterns import Material, is_wood
 
 CREASE_COSINE = float(np.cos(np.deg2rad(40.0)))
@@ -110,11 +111,12 @@ def corner_normals(corners: np.ndarray, normals: np.ndarray, crease_cosine: floa
     `corners` (F, 3, 3) [m], `normals` (F, 3) unit face normals.
     """
     faces = len(corners)
-    keys = np.round(corners.reshape(-1, 3) * 1e5).astype(np.int64)
-    _, vertex = np.unique(keys, axis=0, return_inverse=True)
-    vertex = vertex.reshape(-1)
-    order = np.argsort(vertex, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(vertex))]).astype(np.int64)
+    keys = row_keys(np.round(corners.reshape(-1, 3) * 1e5).astype(np.int64))
+    order = np.argsort(keys, kind="stable")
+    begins = np.diff(keys[order], prepend=keys[order[0]] - 1) != 0
+    vertex = np.empty(len(keys), dtype=np.int64)
+    vertex[order] = np.cumsum(begins) - 1
+    start = np.append(np.flatnonzero(begins), len(keys))
     edge = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = 0.5 * np.linalg.norm(edge, axis=1)
     return _smooth_normals(vertex.reshape(faces, 3), start, order // 3, normals, areas, crease_cosine)

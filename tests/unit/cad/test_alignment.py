@@ -108,11 +108,11 @@ def test_solver_agrees_with_scipy(library):
     residuals = residual_function(match, WEIGHTS)
     start = np.array([1.0, 0.45, *match.frame.center[:2]])
     _, cost = levenberg_marquardt(residuals, start, 2000, tolerance=1e-12)
-    reference = least_squares(residuals, start, method="lm", max_nfev=4000)
+    reference = least_squares(lambda x: residuals(x[None])[0], start, method="lm", max_nfev=4000)
     assert cost <= 2 * reference.cost * 1.01 + 1e-9
 
 
 def test_solver_survives_fewer_residuals_than_parameters():
-    solution, cost = levenberg_marquardt(lambda x: np.array([x[0] - 3.0]), np.zeros(4), 200)
+    solution, cost = levenberg_marquardt(lambda rows: rows[:, :1] - 3.0, np.zeros(4), 200)
     assert cost < 1e-8 and solution[0] == pytest.approx(3.0, abs=1e-4)
     assert np.allclose(solution[1:], 0)

@@ -18,13 +18,8 @@ from stages.evaluate.functional_equivalence import (
     similar_size,
 )
 from stages.evaluate.model_shapes import PlacedShape
-from stages.evaluate.replacement_measures import (
-    measure_replacements,
-    replacements_of,
-    retrieval_rank,
-    room_summary,
-    with_best_single,
-)
+from stages.evaluate.replacement_measures import measure_replacements, retrieval_rank, room_summary, with_best_single
+from stages.evaluate.shape_loading import true_shapes
 from stages.evaluate.truth import load_truth
 from tests.unit.evaluate.handmade import ROOM, Thing, graph_of, make_cad_scene, make_ground_truth, model_pose
 from tests.unit.evaluate.shapes import box_model, cupboard
@@ -167,7 +162,5 @@ def test_small_judgements():
     assert look_of(SHAPES["cup_a"], {"lid": (0, 0, 0)}) == pytest.approx(look_of(SHAPES["cup_a"]))  # no such part
 
 
-def test_a_truth_without_a_room_is_not_measured(tmp_path):
-    artifact = make_ground_truth(tmp_path / "truth")  # its room has no URDF
-    room = load_truth(artifact, np.eye(4), 40)
-    assert replacements_of(artifact, room, make_cad_scene(tmp_path / "cad"), world_from_log=np.eye(4)) is None
+def test_a_truth_without_a_room_has_no_shapes(tmp_path):
+    assert true_shapes(make_ground_truth(tmp_path / "truth"), np.eye(4)) == {}  # its room has no URDF

@@ -124,9 +124,7 @@ def overlaps(bodies: list[BundleBody]) -> dict[tuple[int, int], float]:
 
 def measured(truth: GroundTruth, cad: CadScene, bodies: list[BundleBody], **more) -> RoomReplacements:
     seen = load_truth(truth, TURNED, 40)
-    found = replacements_of(truth, seen, cad, world_from_log=TURNED, overlaps=overlaps(bodies), **more)
-    assert found is not None
-    return found
+    return replacements_of(true_shapes(truth, TURNED), seen, cad, overlaps=overlaps(bodies), **more)
 
 
 def test_the_true_room_out_of_the_library_has_no_errors(tmp_path, library, truth, bodies):

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from stages.kit.geometry.cells import cell_keys
+
 STEPS = 65_535
 """Of a coordinate, between the least and the largest of its mesh: 0.15 mm over 10 m."""
 
@@ -48,9 +50,7 @@ class Block:
 def thinned_mesh(vertices: np.ndarray, faces: np.ndarray, edge: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices (K, 3), faces (G, 3) and which old vertex gives each its colour (K,): one vertex, the mean, in
     each cube of `edge` [m]; faces that collapse or come twice are gone."""
-    cubes = np.floor(vertices / edge).astype(np.int64)
-    _, first, inverse = np.unique(cubes, axis=0, return_index=True, return_inverse=True)
-    inverse = inverse.reshape(-1)
+    _, first, inverse = np.unique(cell_keys(vertices, edge), return_index=True, return_inverse=True)
     count = np.bincount(inverse)
     means = np.stack([np.bincount(inverse, weights=vertices[:, k]) / count for k in range(3)], axis=1)
     corners = inverse[faces]

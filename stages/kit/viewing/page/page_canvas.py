@@ -20,6 +20,7 @@ from schemas.plain_text import cleaned
 from schemas.scene_parts import Box, Camera
 from stages.kit.formats.foxglove import PNG_START
 from stages.kit.geometry.boxes import box_corners
+from stages.kit.geometry.cells import cell_keys
 from stages.kit.geometry.transforms import apply
 from stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_color, vertex_colors
 from stages.kit.viewing.page.library import three_js
@@ -322,8 +323,7 @@ def shape_key(vertices: np.ndarray) -> bytes:
 def _thinned_to(shapes: Iterable[np.ndarray], edge: float) -> int:
     """Return how many vertices are left of all shapes with cubes of `edge` [m]."""
     return sum(
-        len(vertices) if len(vertices) <= SMALL else len(np.unique(np.floor(vertices / edge).astype(np.int64), axis=0))
-        for vertices in shapes
+        len(vertices) if len(vertices) <= SMALL else len(np.unique(cell_keys(vertices, edge))) for vertices in shapes
     )
 
 
