@@ -34,6 +34,7 @@ from stages.cad.stage import METHODS, choose_and_write, find_candidates
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.map_measures import label_true_points, load_map
 from stages.evaluate.replacement_measures import ObjectResult, replacements_of
+from stages.evaluate.shape_loading import true_shapes
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.kit.stage import Parameters
 from stages.urdf.mobility import BUILT_IN, STANDS
@@ -199,15 +200,13 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
         shared.overlaps[panoptic_map.root] = overlaps_of(room.truth, panoptic_map)
     overlaps = shared.overlaps[panoptic_map.root]
     measured = replacements_of(
-        room.truth_artifact,
+        true_shapes(room.truth_artifact, room.world_from_log),
         room.truth,
         scene,
-        world_from_log=room.world_from_log,
         overlaps=overlaps,
         minimum_iou=OPTIONS.node_match_iou,
         library_models=library.path("models"),
     )
-    assert measured is not None
     objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
     distance, edges = measure_graph(room.truth, graph, overlaps)
     summary = scene.info
