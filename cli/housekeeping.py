@@ -106,7 +106,7 @@ def run(
         for line in expected.lines():
             _say(line)
     # what forks share would count for a limit
-    with forked_steps(chain) if max_memory is None else nullcontext():
+    with forked_steps(chain, tuple(only or ())) if max_memory is None else nullcontext():
         reports = run_pipeline(
             chain, out, values, extra=extra, only=tuple(only or ()), announce=(lambda text: None) if quiet else _say
         )

@@ -64,9 +64,9 @@ def run_command(arguments: list[str]) -> tuple[int, str]:
     return process.returncode, output
 
 
-def forked_steps(pipeline: Pipeline) -> AbstractContextManager[None]:
+def forked_steps(pipeline: Pipeline, only: Collection[str] = ()) -> AbstractContextManager[None]:
     """Let this process run its steps in forks of itself inside, where that is safe, with their code loaded once."""
-    return forking.begun(step_modules(pipeline)) if sys.platform == "linux" else nullcontext()
+    return forking.begun(step_modules(pipeline, only)) if sys.platform == "linux" else nullcontext()
 
 
 def run_pipeline(

@@ -25,8 +25,10 @@ from typing import IO, BinaryIO, NoReturn
 
 from stages.engine import interruption
 
-AT_WORK = 2.0
+AT_WORK = 1.0
 """A child that runs for so long makes something [s]."""
+NEXT = 2
+"""Commands whose code is loaded ahead."""
 
 _forks = False
 _ahead: tuple[str, ...] = ()
@@ -47,7 +49,10 @@ def begin(learned: BinaryIO) -> None:
 
 @contextmanager
 def begun(ahead: Iterable[str]) -> Iterator[None]:
-    """Let this process run commands in forks of itself inside, and load modules while the first long one works."""
+    """Let this process run commands in forks of itself inside.
+
+    `ahead`: the module that each of them will load. While a long one works, those of the next ones are loaded here.
+    """
     global _forks, _ahead
     forked, _forks, _ahead = _forks, True, tuple(ahead)
     try:
@@ -66,13 +71,16 @@ def load_learned() -> None:
 
 
 def _load_ahead(output: IO[str]) -> None:
-    """Load what was asked for ahead, once a child is at work: one that finds all up to date ends before."""
+    """Load what the next commands need, once a child is at work: one that finds all up to date ends before.
+
+    No more than that: what is loaded here counts for the memory of every child that changes it.
+    """
     global _ahead
+    _ahead = _ahead[1:]
     if not _ahead or select.select([output], [], [], AT_WORK)[0]:
         return
-    names, _ahead = _ahead, ()
     with interruption.waiting():
-        _load(names)
+        _load(_ahead[:NEXT])
 
 
 def _load(names: Iterable[str]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -114,9 +114,9 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
         raise UsageError(f"{where}: input {missing[0]!r} is missing", hint=f"{stage.name} needs it")
 
 
-def step_modules(pipeline: Pipeline) -> list[str]:
-    """Return the modules that its steps run."""
-    stages = [stage_by_name(step.stage) for step in pipeline.step]
+def step_modules(pipeline: Pipeline, only: Collection[str] = ()) -> list[str]:
+    """Return the module that each of its steps runs, or those of the steps `only`."""
+    stages = [stage_by_name(step.stage) for step in pipeline.step if not only or step.name in only]
     return [f"stages.{stage.folder}.{stage.module}" for stage in stages]
 
 
