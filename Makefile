@@ -27,7 +27,7 @@ $(STAMP): requirements.lock pyproject.toml data/setup.sh
 	touch $@
 
 .PHONY: extras
-extras: $(VENV)/.extras ## Install the extras too: Rerun, Ray, MuJoCo, atheris, transformers, ONNX Runtime
+extras: $(VENV)/.extras ## Install the extras too: Rerun, Ray, atheris, transformers, ONNX Runtime
 
 $(VENV)/.extras: requirements-extras.lock $(STAMP)
 	$(PYTHON) -m pip --disable-pip-version-check install --quiet -r requirements-extras.lock

@@ -21,7 +21,8 @@ def follow(
         typer.Option("--needle-radius", min=0.002, max=0.05, help="Radius of the half circle [m]; else rig.json's."),
     ] = None,
     masks: Annotated[
-        Path | None, typer.Option("--masks", help="Folder of masks of your own: NNNNNN_left.png by the pair's number.")
+        Path | None,
+        typer.Option("--masks", help="Folder of masks of your own: NAME_left.png, NAME_right.png, by the pair's name."),
     ] = None,
     segmenter: Annotated[
         Path | None, typer.Option("--segmenter", help="Checkpoint of the segmenter; else the one that comes along.")
@@ -36,11 +37,11 @@ def follow(
 
     Lines go to standard output as soon as they are known. What cannot be read is a line that says so.
     """
-    from stages.suture.following import Follower, growing_pairs, named_pairs, read_rig
+    from stages.suture.following import Follower, growing_pairs, name_of, named_pairs, read_rig
     from stages.suture.masks import masks_in, network_masks
 
     stereo, radius = read_rig(rig)
-    make = masks_in(masks, (stereo.height, stereo.width)) if masks is not None else network_masks(segmenter)
+    make = masks_in(masks, (stereo.height, stereo.width), name_of) if masks is not None else network_masks(segmenter)
     follower = Follower(stereo, make, needle_radius or radius, cuts=masks is None)
     pairs = named_pairs(sys.stdin) if str(pictures) == "-" else growing_pairs(pictures, latest=latest, idle=idle)
     for files in pairs:

@@ -28,12 +28,15 @@ def _refuse_foreign_packages() -> None:
 
 
 class _Lines(logging.Formatter):
-    """Messages on one line each, cleaned of what they name."""
+    """Messages on one line each, cleaned of what they name; the columns of a table's line stay where they are."""
 
     def format(self, record: logging.LogRecord) -> str:
-        from schemas.plain_text import one_line
+        from schemas.plain_text import LONGEST_LINE, cleaned, one_line
 
-        return one_line(super().format(record)) if record.exc_info is None else super().format(record)
+        text = super().format(record)
+        if record.exc_info is not None:
+            return text
+        return cleaned(text) if len(text) <= LONGEST_LINE and len(text.splitlines()) == 1 else one_line(text)
 
 
 def _set_up_logging(level: int) -> None:

@@ -139,7 +139,7 @@ def _common_options(stage: Stage) -> list[inspect.Parameter]:
         _parameter(
             "json_output", bool, typer.Option(False, "--json", help="One JSON object on standard output.", **panel)
         ),
-        flag("quiet", "No progress, warnings only."),
+        flag("quiet", "No progress: the result and warnings only."),
         flag("debug", "Show the traceback of an error."),
     ]
 

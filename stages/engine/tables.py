@@ -42,7 +42,7 @@ def as_tables(artifact: Artifact) -> dict[str, pandas.DataFrame]:
         if once:
             rows[attribute] = [once]
         for name, found in rows.items():
-            tables[name if name not in tables else f"{attribute}.{name}"] = pandas.DataFrame(found)
+            tables[name if name not in tables else f"{attribute}.{name}"] = pandas.DataFrame(_of_one_shape(found))
     return tables
 
 
@@ -81,6 +81,12 @@ def _row(model: Model, table: str, rows: dict[str, list[Row]], above: Row, key: 
         for word, record in pairs:
             found.append(_row(record, own, rows, told if word is None else {**told, "name": word}, key=own))
     return row
+
+
+def _of_one_shape(rows: list[Row]) -> list[Row]:
+    """Return the rows without the empty cell of a record that other rows have: there it is columns with dots."""
+    inside = {column[:end] for row in rows for column in row for end, letter in enumerate(column) if letter == "."}
+    return [{name: cell for name, cell in row.items() if cell is not None or name not in inside} for row in rows]
 
 
 def _below(table: str, name: str) -> str:

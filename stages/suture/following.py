@@ -50,6 +50,19 @@ class PairFiles:
     skipped: int = 0
 
 
+@dataclass(frozen=True)
+class NamedPair(Pair):
+    """A pair that is called as its pictures are: which ones are passed over nobody knows beforehand, so a number that
+    counts the pairs taken would find the masks of others."""
+
+    name: str = ""
+
+
+def name_of(pair: NamedPair) -> str:
+    """Return how the masks of a pair are called."""
+    return pair.name
+
+
 def read_rig(path: Path) -> tuple[StereoRig, float]:
     """Read rig.json: a rectified pair, and the needle's radius [m], the usual one where it names none. Raises BadInput
     in one line."""
@@ -177,7 +190,8 @@ class Follower:
         began = time.monotonic()
         said: dict[str, Any] = {"name": files.name, "frame": self._count, "whole": True}
         try:
-            pair = Pair(self._count, 0.0, 0, self._picture(files.left), self._picture(files.right))
+            pictures = self._picture(files.left), self._picture(files.right)
+            pair = NamedPair(self._count, 0.0, 0, *pictures, name=files.name)
             said["taken"] = files.left.stat().st_mtime
             answer = self._near(pair)
             said["whole"] = answer is None

@@ -92,15 +92,20 @@ def _from_files(sequence: Sequence, folder: Path | None, segmenter: Path | None,
     return masks_in(folder, size)
 
 
-def masks_in(folder: Path, size: tuple[int, int]) -> MaskMaker:
-    """Return what reads a frame's masks from files by its number. Raises BadInput where there is no folder."""
+def numbered(pair: Pair) -> str:
+    """Return how the masks of a frame are called, by its number."""
+    return f"{pair.index:06d}"
+
+
+def masks_in(folder: Path, size: tuple[int, int], name_of: Callable[[Any], str] = numbered) -> MaskMaker:
+    """Return what reads a frame's masks from the files of its name. Raises BadInput where there is no folder."""
     if not folder.is_dir():
         raise BadInput(
             f"{folder}: no folder of masks", hint="give a folder with 000000_left.png, 000000_right.png, ..."
         )
 
     def make(pair: Pair) -> EyeMasks:
-        eyes = [read_label_image(folder / f"{pair.index:06d}_{side}.png", size) for side in SIDES]
+        eyes = [read_label_image(folder / f"{name_of(pair)}_{side}.png", size) for side in SIDES]
         needle = tuple((eye == NEEDLE) | (eye == WHITE) for eye in eyes)
         thread = tuple(eye == THREAD for eye in eyes)
         hidden = tuple((eye == LEFT_DRIVER) | (eye == RIGHT_DRIVER) for eye in eyes)

@@ -6,11 +6,13 @@ import importlib.util
 import inspect
 import re
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from cli.application import build_application
+from stages.engine.pipelines import pipeline_path, read_pipeline
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -107,6 +109,35 @@ def test_commands_that_are_named_exist_and_have_these_options(page: Path) -> Non
             wrong.append(f"no command: {line}")
         elif flags - options()[name] - {"--help"}:
             wrong.append(f"{name}: no {', '.join(sorted(flags - options()[name]))}")
+    assert wrong == []
+
+
+TYPED_IN_ORDER = [
+    "index.md",
+    "EDIT.md",
+    "POSES.md",
+    *(f"tutorials/{page.name}" for page in ROOT.glob("docs/tutorials/*.md")),
+]
+"""Pages whose commands a reader types from the first to the last."""
+RUNS = {"outputs/demo": "demo", "outputs/room": "reconstruct"}
+"""What readers have made before: `make demo`, and the run of docs/tutorials/own_log.md."""
+
+
+@pytest.mark.parametrize("page", sorted(TYPED_IN_ORDER))
+def test_commands_that_are_typed_in_order_read_what_was_made_before(page: str) -> None:
+    blocks = re.findall(r"^```[^\n]*\n(.*?)^```", (ROOT / "docs" / page).read_text(), re.DOTALL | re.MULTILINE)
+    made = {
+        f"{folder}/{step.name}" for folder, name in RUNS.items() for step in read_pipeline(pipeline_path(name)).step
+    }
+    wrong = []
+    for line in "\n".join(blocks).replace("\\\n", " ").splitlines():
+        words = line.split(" #")[0].split()
+        if "scenewright" not in words[:1] or words[1] == "inspect":
+            continue
+        outs = {after for word, after in pairwise(words) if word == "--out"}
+        read = {word.rstrip("/") for word in words if re.fullmatch(r"(?:outputs|run)/[\w./-]+", word)} - outs
+        wrong += [(line, path) for path in sorted(read) if not any(f"{path}/".startswith(f"{out}/") for out in made)]
+        made |= outs
     assert wrong == []
 
 

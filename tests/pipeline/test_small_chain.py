@@ -78,6 +78,12 @@ def test_the_map_and_the_graph_are_about_the_room(run_folder: Path) -> None:
 
 
 NOTEBOOKS = sorted((REPOSITORY / "docs" / "notebooks").glob("*.ipynb"))
+SAID = {
+    "compare_mappings": (r"corruption 0\.2", r"map/pq", r"parameter merging: ours -> thesis"),
+    "own_backend": (r"--hues\b", r"\b6 hues: [1-9]\d* masks in 24 frames", r"12 hues: [1-9]\d* masks in 24 frames"),
+    "own_log": (r"<sequence ", r"(?m)^    floor_", r"(?m)^        table_", r"scene\.urdf", r"movable"),
+}
+"""What each of them says of the small room."""
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
@@ -108,6 +114,12 @@ def test_notebooks_run(path: Path, run_folder: Path, tmp_path: Path, monkeypatch
         if "image/png" in output.get("data", {})
     ]
     assert pictures, "every notebook shows something"
+    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    told = "".join(  # streams come in pieces
+        output["text"] if "text" in output else f"\n{output.get('data', {}).get('text/plain', '')}\n"
+        for output in outputs
+    )
+    assert [words for words in SAID[path.stem] if not re.search(words, told)] == [], told
 
 
 def test_a_second_run_has_nothing_to_do(run_folder: Path) -> None:

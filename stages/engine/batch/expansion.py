@@ -177,7 +177,8 @@ class SceneCommand(Protocol):
 def scene_command(batch: Batch, run: PlannedRun, folder: Path, *, force: bool) -> tuple[str, ...]:
     """Return the command line that runs a scene: what a person would type for this scene alone."""
     settings = [word for name, value in sorted(run.settings.items()) for word in ("--set", f"{name}={value}")]
-    words = [sys.executable, "-m", "cli", "run", str(batch.pipeline_file), "--out", str(folder), *settings]
+    accepted = [word for outcome in batch.spec.accept for word in ("--accept", outcome)]
+    words = [sys.executable, "-m", "cli", "run", str(batch.pipeline_file), "--out", str(folder), *settings, *accepted]
     return (*words, *(("--force",) if force else ()))
 
 
@@ -185,6 +186,8 @@ def make_jobs(batch: Batch, out: Path, *, force: bool = False, command: SceneCom
     """Return the jobs of a batch in order of execution; run folders lie under `out`, which is made absolute."""
     out = Path(os.path.abspath(out))
     facts, paths, limits = pipeline_facts(batch.pipeline), input_variables(batch.pipeline), batch.spec.limits
+    if batch.spec.accept:  # without it, what a batch before this key was there made stays as it is
+        facts["accept"] = sorted(batch.spec.accept)
     storage = batch.spec.storage
     file_state_once = lru_cache(None)(file_state)
     jobs = []

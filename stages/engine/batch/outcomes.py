@@ -38,8 +38,8 @@ MACHINE_FAILED = 6
 """Exit code of a scene that was stopped at a limit or lost with its worker."""
 
 MEANINGS: dict[Outcome, str] = {
-    "done": "every step ended well",
-    "not ok": "a step wrote an artifact whose outcome is not ok, and the pipeline does not accept it",
+    "done": "every step ended well, or as `accept` in the batch file allows",
+    "not ok": "a step wrote an artifact whose outcome is neither ok nor one of `accept` in the batch file",
     "bad input": "an input cannot be used as it is",
     "usage": "a value is out of range or an option unknown",
     "missing dependency": "a library, weight file or device is not there",

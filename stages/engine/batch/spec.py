@@ -156,6 +156,8 @@ class BatchSpec(_Strict):
 
     pipeline: Line
     set: dict[str, Value] = {}
+    accept: tuple[Line, ...] = Field((), strict=False)
+    """Outcomes of steps besides ok after which a scene has ended well, as `run --accept` takes them."""
     scene: tuple[SceneSpec, ...] = Field((), strict=False)
     data: DataSpec | None = None
     parameters: tuple[ParameterSet, ...] = Field((), strict=False)

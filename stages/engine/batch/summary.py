@@ -60,7 +60,7 @@ def reason_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> Tabl
 
 
 def accepted_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> Table:
-    """Return outcomes besides ok that the pipeline accepts: scenes that ended well, with a step that did not."""
+    """Return outcomes besides ok that the batch file accepts: scenes that ended well, with a step that did not."""
     counts: Counter[tuple[str, str]] = Counter()
     for job in jobs:
         result = latest.get(job.name)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from schemas.cad_library import ImportedModel
 from stages.library.importing.frames import unit_name
 
-HEADER = ("model", "class", "size [m]", "joints", "unit", "up", "front", "findings")
+HEADER = ("model", "class", "size [m]", "joints", "unit", "up", "front", "good for", "findings")
 LONGEST_NAME = 44
 
 
@@ -26,7 +26,7 @@ def _row(record: ImportedModel) -> tuple[str, ...]:
     name = name if len(name) <= LONGEST_NAME else f"...{name[3 - LONGEST_NAME :]}"
     findings = "; ".join(record.findings)
     if record.size is None or record.unit is None:
-        return (name, record.class_name or "-", "-", "-", "-", "-", "-", f"left out: {findings}")
+        return (name, record.class_name or "-", "-", "-", "-", "-", "-", "-", f"left out: {findings}")
     return (
         name,
         record.class_name,
@@ -35,5 +35,20 @@ def _row(record: ImportedModel) -> tuple[str, ...]:
         f"{unit_name(record.unit)} ({record.unit_from})",
         f"{record.up} ({record.up_from})",
         f"{record.front} ({record.front_from})",
+        _good_for(record),
         findings,
     )
+
+
+def _good_for(record: ImportedModel) -> str:
+    """Return what can be done with a model, in few words."""
+    uses = {
+        "carried": record.can_be_carried,
+        "opened": record.can_be_opened,
+        "opened by a handle": record.can_be_opened and record.has_handle,
+        "contains": record.can_contain,
+        "supports": record.can_support,
+    }
+    if uses["opened by a handle"]:
+        del uses["opened"]
+    return ", ".join(use for use, can in uses.items() if can) or "-"

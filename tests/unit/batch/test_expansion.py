@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,27 @@ def test_scenes_times_parameters_times_seeds(tmp_path: Path) -> None:
     assert run.values == run.settings | {"weights": None}
     command = next(j.command for j in make_jobs(batch, tmp_path / "o") if j.name == run.name)
     assert command[3:5] == ("run", f"{tmp_path}/tiny.toml") and f"log={tmp_path}/logs/b.txt" in command
+
+
+def test_accepted_outcomes_reach_every_scene_and_decide_what_has_run(tmp_path: Path) -> None:
+    batch = batch_of(tmp_path, {"a": "write"}, head='accept = ["empty", "unsettled"]')
+    plain, job, turned = (
+        make_jobs(replace(batch, spec=batch.spec.model_copy(update={"accept": accept})), tmp_path / "o")[0]
+        for accept in ((), batch.spec.accept, ("unsettled", "empty"))
+    )
+    assert job.command == (*plain.command, "--accept", "empty", "--accept", "unsettled")
+    assert turned.fingerprint == job.fingerprint != plain.fingerprint
+
+
+@pytest.mark.parametrize("page", ["BATCH.md", "tutorials/batch.md"])
+def test_batch_files_of_the_docs_are_read(page: str) -> None:
+    """Each block by itself, or, where it is a part, added to the first."""
+    text = (Path(__file__).resolve().parents[3] / "docs" / page).read_text()
+    blocks = [part.split("```")[0] for part in text.split("```toml\n")[1:]]
+    whole = tomllib.loads(blocks[0])
+    assert len(blocks) >= 3
+    for block in blocks:
+        check_spec(whole | tomllib.loads(block), page)
 
 
 def test_without_parameters_and_seeds_a_scene_is_its_own_folder(tmp_path: Path) -> None:

@@ -253,7 +253,7 @@ def _moveit_shape(lines, object_pose: np.ndarray) -> np.ndarray:
     return apply(object_pose @ pose, points)
 
 
-@pytest.mark.skipif(importlib.util.find_spec("spark_dsg") is None, reason="spark_dsg is an extra (make extras)")
+@pytest.mark.skipif(importlib.util.find_spec("spark_dsg") is None, reason="needs spark_dsg")
 def test_hydra_reads_its_graph(scene: InteractiveScene, tmp_path: Path) -> None:
     import spark_dsg
 

@@ -171,6 +171,10 @@ def test_every_list_of_every_kind_is_a_table(root: Path) -> None:
             for cell in table[column]:
                 assert not isinstance(cell, Model), f"{name}: {column}"
                 assert not (isinstance(cell, tuple) and any(isinstance(entry, Model) for entry in cell)), name
+            if any(other.startswith(f"{column}.") for other in table.columns):
+                assert table[column].notna().any(), (
+                    f"{name}: {column} is empty, what it holds stands in columns of its own"
+                )
 
 
 def test_tables_say_what_the_documents_say(run: dict) -> None:
@@ -280,13 +284,15 @@ def test_notebooks_are_whole_and_carry_no_outputs(path: Path) -> None:
     assert code and all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
 
 
-def test_examples_of_the_docs_run(run_folder: Path, tmp_path: Path) -> None:
-    """Every python block of docs/PYTHON.md, in order, on the tiny run."""
-    text = (REPOSITORY / "docs" / "PYTHON.md").read_text()
+@pytest.mark.parametrize(("page", "least"), [("PYTHON.md", 5), ("tutorials/cad_models.md", 1)])
+def test_examples_of_the_docs_run(page: str, least: int, run_folder: Path, tmp_path: Path) -> None:
+    """Every python block of the page, in order, on the tiny run."""
+    text = (REPOSITORY / "docs" / page).read_text()
     blocks = [part.split("```")[0] for part in text.split("```python\n")[1:]]
-    assert len(blocks) >= 5
+    assert len(blocks) >= least
     (tmp_path / "outputs").mkdir()
-    (tmp_path / "outputs" / "demo").symlink_to(run_folder)
+    for name in ("demo", "room"):
+        (tmp_path / "outputs" / name).symlink_to(run_folder)
     script = tmp_path / "examples.py"
     script.write_text("\n".join(blocks))
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}

@@ -570,6 +570,9 @@ def test_the_command_takes_a_folder_and_prints_a_table(tmp_path, capsys) -> None
     (row,) = [line for line in said.err.splitlines() if line.startswith("mug ")]
     assert row.split()[:7] == ["mug", "cup", "0.08", "x", "0.08", "x", "0.10"]
     assert "m (assumed)" in row and "+y (assumed)" in row
+    (head,) = [line for line in said.err.splitlines() if line.startswith("model ")]
+    assert head.index("size [m]") == row.index("0.08"), "columns stand under each other"
+    assert row[head.index("good for") :].startswith("carried"), "what a cup is good for"
     twice = ["library", "add", str(tmp_path), "--models", str(tmp_path), "--out", str(out)]
     assert command_line(twice) == 2 and command_line(["library", "add", "--out", str(out)]) == 2
     assert command_line(["library", "add", str(tmp_path / "nowhere"), "--out", str(out)]) == 3

@@ -16,7 +16,7 @@ import pytest
 
 from schemas.errors import BadInput
 from stages.suture import following
-from stages.suture.following import Follower, growing_pairs, named_pairs, read_rig
+from stages.suture.following import Follower, growing_pairs, name_of, named_pairs, read_rig
 from stages.suture.masks import EyeMasks, masks_in
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.estimators import ESTIMATORS
@@ -36,10 +36,10 @@ RIG = {
 @pytest.fixture(scope="module")
 def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("masks")
-    for number in range(2):
+    for name in ("000000", "000001", "one"):
         for eye, side in enumerate(("left", "right")):
             mask = drawn_mask(TWO_CAMERAS, pose_at(), eye).astype(np.uint8)
-            cv2.imwrite(str(folder / f"{number:06d}_{side}.png"), mask)
+            cv2.imwrite(str(folder / f"{name}_{side}.png"), mask)
     return folder
 
 
@@ -84,7 +84,7 @@ def test_pairs_are_taken_as_they_arrive_and_whole(tmp_path: Path) -> None:
 def test_a_pair_becomes_a_line_and_a_broken_picture_an_abstention(masks: Path, tmp_path: Path) -> None:
     arrive(tmp_path, "one")
     arrive(tmp_path, "two", (96, 128))
-    follower = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280)), NEEDLE_RADIUS)
+    follower = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280), name_of), NEEDLE_RADIUS)
     one, two = (follower.line(files) for files in growing_pairs(tmp_path, latest=False, idle=0.0))
     assert one["name"] == "one" and not one["abstained"] and np.array(one["covariance"]).shape == (6, 6)
     assert np.array(one["camera_from_needle"])[:3, 3] == pytest.approx(pose_at().centre, abs=2e-3)
@@ -94,6 +94,16 @@ def test_a_pair_becomes_a_line_and_a_broken_picture_an_abstention(masks: Path, t
         list(named_pairs(["alone.png"]))
 
 
+def test_a_pair_that_was_passed_over_takes_its_masks_along(masks: Path, tmp_path: Path) -> None:
+    """The first pair that is taken has no masks; those of the one before it, which was skipped, are not its own."""
+    for name in ("000000", "000002"):
+        arrive(tmp_path, name)
+    (files,) = growing_pairs(tmp_path, latest=True, idle=0.0)
+    line = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280), name_of), NEEDLE_RADIUS).line(files)
+    assert files.skipped == 1 and line["frame"] == 0
+    assert line["camera_from_needle"] is None and "000002_left.png" in line["abstained"]
+
+
 def test_with_an_abstention_comes_no_pose(masks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The estimator's best guess is kept by `suture needle` for looking at; here a robot may act on it."""
     monkeypatch.setattr(
@@ -101,7 +111,7 @@ def test_with_an_abstention_comes_no_pose(masks: Path, tmp_path: Path, monkeypat
     )
     arrive(tmp_path, "000000")
     (files,) = growing_pairs(tmp_path, latest=False, idle=0.0)
-    line = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280)), NEEDLE_RADIUS).line(files)
+    line = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280), name_of), NEEDLE_RADIUS).line(files)
     assert line["abstained"] == "hardly a needle"
     assert line["camera_from_needle"] is None and line["covariance"] is None
 
@@ -148,7 +158,7 @@ def test_an_answer_near_that_is_far_from_where_it_was_is_looked_at_whole(
     monkeypatch.setattr(following, "estimate", astray)
     for name in ("000000", "000001"):
         arrive(tmp_path, name)
-    follower = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280)), NEEDLE_RADIUS)
+    follower = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280), name_of), NEEDLE_RADIUS)
     lines = [follower.line(files) for files in growing_pairs(tmp_path, latest=False, idle=0.0)]
     assert [line["whole"] for line in lines] == [True, True]
     assert np.array(lines[1]["camera_from_needle"])[:3, 3] == pytest.approx(pose_at().centre, abs=2e-3)
