@@ -208,9 +208,7 @@ def make_command(stage: Stage) -> Callable[..., int]:
             device=options["device"],
             force=options["force"],
             dry_run=options["dry_run"],
-            progress=progress_for(
-                sys.stderr.isatty(), quiet=options["quiet"] or options["json_output"], name=options["out"].name
-            ),
+            progress=progress_for(sys.stderr.isatty(), quiet=options["quiet"], name=options["out"].name),
             command=("scenewright", *sys.argv[1:]),
             max_memory=parse_limit(options["max_memory"]) if options["max_memory"] is not None else None,
             shared=options.get("shared"),
