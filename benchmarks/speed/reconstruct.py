@@ -18,17 +18,19 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import psutil
 from pydantic import Field
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import circumstances, write_measured
 from benchmarks.tabulation import Figure
 from schemas.errors import UsageError
-from stages.engine.batch.processes import proportional_memory, resident_memory
+from stages.engine.batch.processes import descendants, resident_memory
 from stages.engine.chain import REPOSITORY
 from stages.kit.measurement.tables import Table, as_markdown
 
@@ -84,7 +86,7 @@ def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
 
     def watch() -> None:
         while process.poll() is None:
-            peak[0] = max(peak[0], proportional_memory(process.pid))
+            peak[0] = max(peak[0], _proportional_memory(process.pid))
             peak[1] = max(peak[1], resident_memory(process.pid))
             time.sleep(SECONDS_BETWEEN_LOOKS)
 
@@ -108,6 +110,15 @@ def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
         if name in steps:
             steps[name]["seconds"] = end - start
     return Run(ended - began, _processor_seconds() - used, peak[0], peak[1], steps)
+
+
+def _proportional_memory(pid: int) -> int:
+    """Return the memory of a process and all below it [bytes], pages that they share counted once (Linux)."""
+    total = 0
+    for number in (pid, *descendants(pid)):
+        with suppress(psutil.Error):
+            total += psutil.Process(number).memory_full_info().pss
+    return total
 
 
 def _processor_seconds() -> float:

@@ -191,5 +191,5 @@ class Surfaces:
             self._trees[large.name] = cKDTree(large.points)
         tree = self._trees[large.name]
         # Far points are slow to look up; a few give a bound that leaves out most of the others.
-        bound = np.nextafter(tree.query(small.points[::EVERY])[0].min(), np.inf)
-        return float(tree.query(small.points, distance_upper_bound=bound)[0].min())
+        bound = tree.query(small.points[::EVERY])[0].min()
+        return float(min(bound, tree.query(small.points, distance_upper_bound=bound)[0].min()))

@@ -73,7 +73,8 @@ def surface_planes(
         if area < least:
             continue
         basis = _basis(normal)
-        union = shapely.union_all(_outlines([corners @ basis.T for corners in facets]))
+        of_solid = np.repeat(np.arange(len(facets)), [len(corners) for corners in facets])
+        union = shapely.union_all(_hulls(np.concatenate([corners @ basis.T for corners in facets]), of_solid))
         gaps = COVER_GAPS + tuple(gap for gap in CLEARANCES if up and gap <= 0.25 * size[2])
         heights = offset - np.array(gaps)
         near = edges.reach(normal, heights)
@@ -141,10 +142,9 @@ def _basis(normal: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _outlines(point_sets: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the convex hulls of sets of points in the plane, each (N, 2)."""
-    owners = np.repeat(np.arange(len(point_sets)), [len(points) for points in point_sets])
-    return np.asarray(shapely.convex_hull(shapely.multipoints(np.concatenate(point_sets), indices=owners)))
+def _hulls(points: np.ndarray, owners: np.ndarray) -> np.ndarray:
+    """Return the convex hull of each owner's points (N, 2); `owners` (N,) are 0, 0, 1, ..."""
+    return np.asarray(shapely.convex_hull(shapely.multipoints(points, indices=owners)))
 
 
 class _Edges:
@@ -175,7 +175,7 @@ class _Edges:
         weight = (start / (start - end))[:, None]
         points = (self.start[edge] * (1 - weight) + self.end[edge] * weight) @ basis.T
         solids = np.unique(plane * len(self.center) + self.owner[edge], return_inverse=True)[1]
-        outlines = np.asarray(shapely.convex_hull(shapely.multipoints(points, indices=solids)))
+        outlines = _hulls(points, solids)
         return outlines[shapely.area(outlines) > 0]
 
 

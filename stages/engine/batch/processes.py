@@ -56,15 +56,6 @@ def resident_memory(pid: int) -> int:
     return total
 
 
-def proportional_memory(pid: int) -> int:
-    """Return the memory of a process and all below it [bytes], pages that they share counted once (Linux)."""
-    total = 0
-    for number in (pid, *descendants(pid)):
-        with suppress(psutil.Error):
-            total += psutil.Process(number).memory_full_info().pss
-    return total
-
-
 def created_at(pid: int) -> float | None:
     """Return when a process began [s since 1970], or None when there is none or it has ended."""
     try:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
 
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Relation
-from stages.graph.evidence import polygon_middle, share_inside, shared_middle
+from stages.graph.evidence import EVERY, Surfaces, polygon_middle, share_inside, shared_middle
 from stages.graph.parameters import GraphParameters
 from stages.graph.stage import run
 from stages.kit.geometry.boxes import box_from_bounds
@@ -135,3 +137,15 @@ def test_middle_of_a_polygon_and_shares_of_boxes():
     assert share_inside(half_out, outer) == pytest.approx(0.5)
     assert shared_middle(half_out, outer) == pytest.approx((0.75, 0.3, 0.3))
     assert shared_middle(outer, box_from_bounds((2, 2, 2), (3, 3, 3))) is None
+
+
+@pytest.mark.parametrize("meet", [None, 0, 1, EVERY - 1])
+def test_the_least_distance_of_points_is_that_of_all_pairs(meet):
+    random = np.random.default_rng(5)
+    few, many = random.normal(size=(3 * EVERY, 3)), random.normal(size=(5 * EVERY, 3)) + (4.0, 0.0, 0.0)
+    if meet is not None:
+        many[7] = few[meet]
+    first, second = (SimpleNamespace(name=name, points=points) for name, points in (("a", few), ("b", many)))
+    expected = np.linalg.norm(few[:, None] - many[None], axis=2).min()
+    assert Surfaces().distance(first, second) == pytest.approx(expected, abs=1e-12)
+    assert (expected == 0.0) == (meet is not None)
