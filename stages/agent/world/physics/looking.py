@@ -45,7 +45,7 @@ class Looking:
             pose = look_at(eye, eye + away)
             picture = take(renderer, HEAD, pose, self._robot.random)
             points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
-            there = head.steady(picture.depth).reshape(-1)
+            there = head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points)
             clouds.append(points[there])
             for entry in self._segmenter.furniture(picture, map_from_true @ pose):
                 own = there & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
@@ -83,6 +83,7 @@ class Looking:
                 self._robot.log.mistaken("missed", f"look {name}")
         self._segmenter.missed.clear()
         self.looked_from = self._robot.base
+        found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
         near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
         old = [s for s in self._seen.surfaces if not self._seen.belongs(s, at, piece, close)]
         self._seen.surfaces = old + near
