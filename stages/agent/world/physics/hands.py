@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -56,6 +56,9 @@ class Hold:
     """Height of the tool point over the foot of what is held [m], the hand as it grasped."""
     rotation: np.ndarray
     """Of the hand then, base frame."""
+    home: np.ndarray
+    """Arm (7,) with which it is carried about: folded, and the hand as upright as it grasped, since what is held above
+    its middle swings between the fingers when they turn."""
 
 
 @dataclass(frozen=True)
@@ -224,11 +227,20 @@ def _one_grasp(
     low, high = surface.low, surface.high
     box = np.eye(4)
     box[:3, 3] = (low + high) / 2
-    hold = Hold(high - low, inverse(map_from_tool) @ box, float(map_from_tool[2, 3] - low[2]), map_from_tool[:3, :3])
+    hold = Hold(
+        high - low,
+        inverse(map_from_tool) @ box,
+        float(map_from_tool[2, 3] - low[2]),
+        map_from_tool[:3, :3],
+        beliefs.description.carry,
+    )
     beliefs.world.set_pose(name, _far())
     beliefs.hold(hold)
     checker.allow(touch=(HELD,))
-    home = planner.path(base, lift[-1], beliefs.description.carry)
+    folded = planner.folded(base, lift[-1], tally)
+    if folded is not None:
+        hold = replace(hold, home=folded)
+    home = planner.path(base, lift[-1], hold.home)
     return Motion(
         (Segment(whole_body(base, reach), opening), Segment(whole_body(base, approach[::-1]), opening, SLOW)),
         (Segment(whole_body(base, lift), 0.0, SLOW), Segment(whole_body(base, home), 0.0, 0.6)),

@@ -84,6 +84,11 @@ class RobotInRoom:
         """Return the transform (4, 4) of localisation's error."""
         return base_pose(self.believed, self.description) @ inverse(base_pose(self.true_base(), self.description))
 
+    @property
+    def home(self) -> np.ndarray:
+        """Arm (7,) with which it drives."""
+        return self.description.carry if self.hold is None else self.hold.home
+
     def arm_to(self, arm: np.ndarray) -> None:
         """Bring the arm to joint values; with empty hands it is put there."""
         base = self.true_base()
