@@ -31,8 +31,8 @@ PITCHES = (np.pi / 2, 1.1, 0.7)
 """How steeply the hand comes, from above first [rad]."""
 HEIGHTS = (0.5, 0.65, 0.8, 0.35)
 """Shares of the thing's height at which an aslant hand grips it, that of its middle first."""
-SLICE = 0.012
-"""Points within so much of a height say where the middle of the thing is there [m]."""
+OFF = 0.012
+"""Distances from the middle that differ by less are as good as each other [m]."""
 OF_ONE_PITCH = 8
 """Grasps that come equally steeply, at most: where the arm cannot come from above, the others have their turn."""
 ASIDE = 0.3
@@ -53,23 +53,23 @@ def antipodal_grasps(points: np.ndarray, normals: np.ndarray, opening: float, fl
         deepest = max(high[2] - FINGER_DEPTH, (low[2] + high[2]) / 2 - 0.005)
         heights = [deepest] if rank == 0 else [low[2] + share * (high[2] - low[2]) for share in HEIGHTS]
         for height in heights:
-            at = np.array([*_middle_at(points, height), height])
-            at[2] = max(height, floor + 0.004 + TIP_BEFORE * np.sin(pitch))
+            at = np.array([*_middle_above(points, height), max(height, floor + 0.004 + TIP_BEFORE * np.sin(pitch))])
             for number in range(HEADINGS):
                 found = _grasp_at(points, normals, at, 2 * np.pi * number / HEADINGS, pitch, opening)
                 if found is not None:
                     pose, square, width = found
-                    off = round(abs(height - (low[2] + high[2]) / 2) / SLICE)
+                    off = round(abs(height - (low[2] + high[2]) / 2) / OFF)
                     kind = (square < FACES, rank, -round(square / ALIKE), off, round(width / ALIKE_WIDE))
                     made.append((kind, number * 7 % HEADINGS, pose))
     made.sort(key=lambda entry: entry[:2])
     return [pose for *_, pose in made]
 
 
-def _middle_at(points: np.ndarray, height: float) -> np.ndarray:
-    """Return the middle (2,) of what was seen of a thing about a height; of all of it where that is little."""
-    there = np.abs(points[:, 2] - height) < SLICE
-    own = points[there, :2] if there.sum() >= 2 * LEAST else points[:, :2]
+def _middle_above(points: np.ndarray, height: float) -> np.ndarray:
+    """Return the middle (2,) of what was seen of a thing from a height upwards: with its top, since the far one of its
+    sides was not seen, and without what is wider below."""
+    above = points[:, 2] > height - OFF
+    own = points[above, :2] if above.sum() >= LEAST else points[:, :2]
     return np.percentile(own, [2, 98], axis=0).mean(axis=0)
 
 
@@ -86,18 +86,19 @@ def _grasp_at(
     between = way_in & (depth > -FINGER_BAND)
     if between.sum() < LEAST:
         return None
+    shift = np.percentile(along[way_in], [3, 97]).mean()
+    along = along - shift
     first, last = np.percentile(along[between], [3, 97])
-    along = along - (first + last) / 2
     under_palm = (np.abs(along) < PALM[0]) & (np.abs(aside) < PALM[1])
     room = (opening - MARGIN) / 2
     if np.abs(along[way_in]).max() > room or (under_palm & (depth < -FINGER_DEPTH)).sum() > LEAST:
         return None
-    half, facing = (last - first) / 2, np.abs(normals @ closing)
-    ends = [between & (along < ENDS - half), between & (along > half - ENDS)]
+    facing = np.abs(normals @ closing)
+    ends = [between & (along < first + ENDS), between & (along > last - ENDS)]
     square = max((float(facing[end].mean()) for end in ends if end.any()), default=0.0)
     pose = np.eye(4)
     pose[:3, :3] = axes
-    pose[:3, 3] = at + (first + last) / 2 * closing
+    pose[:3, 3] = at + shift * closing
     return pose, square, float(last - first)
 
 
