@@ -236,7 +236,9 @@ def _faces(base: Base, piece: SeenFurniture) -> bool:
 
 
 def _one_carries_the_other(item: Item, seen: Detection) -> bool:
-    """Whether one of two is a carrier and the other too narrow to be that."""
+    """Whether one of two is a carrier and the other too narrow to be that, as far as the picture shows all of it."""
+    if not seen.whole and seen.label == item.label:
+        return False
     narrow, wide = sorted((item.radius, seen.radius))
     wider = item.label if item.radius >= seen.radius else seen.label
     return wider in CARRIERS and narrow < UNLIKE * wide

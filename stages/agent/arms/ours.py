@@ -205,8 +205,8 @@ class OwnSkills(CommonSkills):
         return Outcome(False, "no_way", f"no way to {place} was found", {"base_poses": len(poses)})
 
     def _stations(self, place: str, at: Position) -> Iterator[Base]:
-        """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short arm
-        explores until one is known."""
+        """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short
+        arm explores until one is known."""
         tried: list[Base] = []
         while len(tried) < TRIES:
             fresh = self._fresh(place, at, tried)
@@ -220,7 +220,7 @@ class OwnSkills(CommonSkills):
             yield fresh
 
     def _fresh(self, place: str, at: Position, tried: list[Base]) -> Base | None:
-        """Return the nearest base pose that reaches a position and is none of those that were tried or failed for it."""
+        """Return the nearest base pose that reaches a position and was not tried, nor failed, for it."""
         poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
         poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off))
         known = tried + self._remembered(place, at)

@@ -13,8 +13,7 @@ FINGER_DEPTH = 0.032
 FINGER_BAND = 0.011
 """Half the breadth of a finger tip [m], and how far before and behind the tool point the fingers press."""
 PALM = (0.105, 0.033)
-"""Half the palm's extent along which the fingers close, and across [m]: nothing may be nearer to it than the fingers are
-long."""
+"""Half the palm's extent along which the fingers close, and across [m]: it comes no nearer than fingers are long."""
 MARGIN = 0.012
 """Room between the open fingers and the thing, both sides together [m]."""
 ENDS = 0.008

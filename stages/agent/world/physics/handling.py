@@ -143,7 +143,8 @@ class Handling:
             self._robot.log.done("release", step, False, "", "")
             return Felt(True)
         support = self._seen.support(at)
-        here = Spot((at[0], at[1], support), self._seen.rim(at, support), self._seen.boxes(), self._seen.boxes(at))
+        around, beside = self._seen.boxes(), self._seen.boxes(at)
+        here = Spot((at[0], at[1], support), self._seen.rim(at, support), around, beside, self._seen.beside_on(at))
         try:
             self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:

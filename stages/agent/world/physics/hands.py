@@ -41,6 +41,8 @@ TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 
 SLOW = 0.35
 SAMPLES = 500
 """Of one path search."""
+NESTLES = 0.015
+"""Boxes of round things are so much wider than they are [m]: fruit may lie that near to fruit."""
 HELD = "held"
 """Name of the box of what is in the hand."""
 Box = tuple[np.ndarray, np.ndarray]
@@ -173,7 +175,7 @@ def plan_grasp(
     searches = 2
     for grasp in grasps:
         try:
-            motion = _one_grasp(planner, base, arm, surface, name, grasp, tally)
+            motion = _one_grasp(planner, base, arm, surface, name, grasp, target.floor, tally)
         except MotionFailed as failed:
             tally.failed(failed)
             searches -= 1
@@ -195,6 +197,14 @@ def _inside(surface: Surface) -> np.ndarray:
     return np.all((surface.points > surface.low - slack) & (surface.points < surface.high + slack), axis=1)
 
 
+def _whole(surface: Surface, floor: float) -> Box:
+    """Return the box of a thing, down to where it ends if it is as high as it is wide, or to what it stands on: the
+    lower half of what is round was not seen."""
+    low, high = surface.low.copy(), surface.high
+    low[2] = max(min(low[2], high[2] - (high - low)[:2].min()), min(low[2], floor))
+    return low, high
+
+
 def _one_grasp(
     planner: ArmPlanner,
     base: np.ndarray,
@@ -202,6 +212,7 @@ def _one_grasp(
     surface: Surface,
     name: str,
     map_from_tool: np.ndarray,
+    floor: float,
     tally: Tally,
 ) -> Motion | None:
     beliefs = planner.model
@@ -224,7 +235,7 @@ def _one_grasp(
         return None
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
-    low, high = surface.low, surface.high
+    low, high = _whole(surface, floor)
     box = np.eye(4)
     box[:3, 3] = (low + high) / 2
     hold = Hold(
@@ -266,6 +277,8 @@ class Spot:
     """All that stands there."""
     beside: dict[str, Box]
     """The same without what covers the spot, which the hand comes down into."""
+    nestled: tuple[str, ...]
+    """What lies beside it on the same carrier: what is held may come down against it."""
 
 
 def plan_release(
@@ -286,8 +299,8 @@ def plan_release(
     foot = hold.foot if hold is not None else 0.0
     beliefs.hold(hold)
     beliefs.robot.set(Configuration(base, arm, opening))
-    beliefs.checker.allow(touch=(HELD,) if hold is not None else ())
     beliefs.show(spot.beside)
+    beliefs.checker.allow((HELD,) if hold is not None else (), dict.fromkeys(spot.nestled, NESTLES))
     heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
     try:
         for turn, tilt in TURNS:

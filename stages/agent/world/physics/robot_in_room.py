@@ -126,7 +126,7 @@ class RobotInRoom:
             self.arm = arms[-1]
 
     def in_hand(self, points: np.ndarray) -> np.ndarray:
-        """Return (N,) bool: points (N, 3) of the map that are of what it believes to hold, or a finger's breadth off."""
+        """Return (N,) bool: points (N, 3) of the map that are of what it believes to hold, or next to it."""
         if self.hold is None:
             return np.zeros(len(points), bool)
         map_from_tool = base_pose(self.believed, self.description) @ forward(self.beliefs.chain, self.arm)

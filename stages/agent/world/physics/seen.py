@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
@@ -117,6 +118,12 @@ class Seen:
                 boxes[f"thing_{number}"] = (low, high)
         return boxes
 
+    def beside_on(self, at: Position) -> tuple[str, ...]:
+        """Return the names, as of `boxes`, of what lies on the thing that covers a position."""
+        carriers = [s for s in self.surfaces if _covers(s, at)]
+        lying = (k for k, s in enumerate(self.surfaces) if any(s is not c and _covers(c, s.middle) for c in carriers))
+        return tuple(f"thing_{k}" for k in lying)
+
     def rim(self, at: Position, support: float) -> float:
         """Return the height [m] of the top of what was seen around a position, `support` where that is nothing."""
         return max([support, *(float(s.high[2]) for s in self.surfaces if _covers(s, at))])
@@ -133,7 +140,7 @@ class Seen:
         return self.pieces[piece].top
 
 
-def _covers(surface: Surface, at: Position) -> bool:
+def _covers(surface: Surface, at: Sequence[float] | np.ndarray) -> bool:
     """Whether a position is within the outline of a surface, or a finger's breadth from it."""
     low, high, point = surface.low[:2], surface.high[:2], np.array(at[:2])
     return bool(np.all((point > low - 0.03) & (point < high + 0.03)))
