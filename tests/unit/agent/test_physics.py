@@ -19,6 +19,7 @@ from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.eyes import Surface, fuse
 from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
+from stages.agent.world.physics.hands import whole_box
 from stages.agent.world.physics.head import SeenPiece, enter, steady
 from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 
@@ -188,13 +189,30 @@ def test_what_is_put_into_a_box_does_not_drag_it_along() -> None:
     body.close()
 
 
-def test_what_the_hand_holds_is_no_obstacle(body: PhysicsBody) -> None:
+def test_what_the_hand_holds_is_carried_upright_and_is_no_obstacle(body: PhysicsBody) -> None:
     body.sweep()
-    apple = next(d for d in body.look(ABOVE, close=False).detections if d.label == "apple")
-    assert body.grasp(apple.position, "apple", 0).ok
+    cup = next(d for d in body.look(ABOVE, close=False).detections if d.label == "cup")
+    assert body.grasp(cup.position, "cup", 0).ok
     assert body.drive(Base(2.0, 0.8, -np.pi / 2), 1.0, "").ok
+    assert body._room.world.pose("cup_0")[2, 2] > 0.97
     cells = 0.1 * body.sweep().occupied
     assert len(cells) and np.hypot(*(cells - (2.0, 0.8)).T).min() > 0.6
+
+
+def test_a_cup_is_gripped_in_its_middle_though_its_back_was_not_seen(body: PhysicsBody) -> None:
+    body.sweep()
+    cup = next(d for d in body.look(ABOVE, close=False).detections if d.label == "cup")
+    assert body.grasp(cup.position, "cup", 0).ok
+    assert body._robot.driver.robot.configuration().opening > 0.064  # 68 mm across
+
+
+def test_what_is_round_goes_down_to_its_foot() -> None:
+    away = np.random.default_rng(4).normal(size=(3000, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    seen = np.array([0.0, 0.0, 0.78]) + 0.035 * away[away[:, 2] > 0]
+    apple = Surface("apple", seen, away[away[:, 2] > 0], "red", 0.0, 2)
+    assert apple.low[2] > 0.775 and abs(whole_box(apple, 0.74)[0][2] - 0.745) < 0.006
+    assert whole_box(apple, 0.77)[0][2] == 0.77, "it stands on something"
 
 
 def test_what_came_apart_is_one_piece_of_furniture() -> None:

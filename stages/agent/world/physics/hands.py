@@ -197,7 +197,7 @@ def _inside(surface: Surface) -> np.ndarray:
     return np.all((surface.points > surface.low - slack) & (surface.points < surface.high + slack), axis=1)
 
 
-def _whole(surface: Surface, floor: float) -> Box:
+def whole_box(surface: Surface, floor: float) -> Box:
     """Return the box of a thing, down to where it ends if it is as high as it is wide, or to what it stands on: the
     lower half of what is round was not seen."""
     low, high = surface.low.copy(), surface.high
@@ -235,7 +235,7 @@ def _one_grasp(
         return None
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
-    low, high = _whole(surface, floor)
+    low, high = whole_box(surface, floor)
     box = np.eye(4)
     box[:3, 3] = (low + high) / 2
     hold = Hold(
