@@ -18,10 +18,13 @@ import numpy as np
 import torch
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count
 from benchmarks.reporting_seeds import Method, newest
 from benchmarks.steps import made, opened
+from benchmarks.tabulation import Figure
 from schemas.suture_needle import SutureNeedle
+from stages.kit.measurement.bootstrap import Interval
+from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.stage import Parameters
 from stages.suture.evaluation.judgement import judged
 from stages.suture.masks import learned_masks, spoiled_masks
@@ -131,11 +134,6 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     return tuple(map(str, range(FRAMES))) if there else ()
 
 
-def share(name: str) -> Measure:
-    """Share of the views of which something holds [%]."""
-    return Measure(lambda records: 100 * float(np.mean([getattr(r, name) for r in records])) if records else None, "%")
-
-
 def _visible(record: Sight) -> Sight | None:
     return record if record.visible else None
 
@@ -156,6 +154,19 @@ SUBCASES: dict[str, tuple[str, Callable[[Sight], Sight | None]]] = {
 }
 
 
+def shares(results: Results) -> dict[str, float | Interval | Figure | None]:
+    """The shares with Wilson's intervals: of five hundred views without a false needle a bootstrap says nothing."""
+    flat: dict[str, float | Interval | Figure | None] = {}
+    for case in results.cases:
+        records = results.of("ours", case)
+        for name in ("answered", "right"):
+            there = sum(getattr(record, name) for record in records)
+            low, high = wilson_interval(there, len(records))
+            share = 100 * there / len(records)
+            flat[f"ours/{case}/{name}"] = Figure(share, 100 * low, 100 * high, len(records), "%")
+    return flat
+
+
 EXPERIMENT = Experiment(
     name="stitch_absent",
     title="A needle, or none",
@@ -173,7 +184,8 @@ EXPERIMENT = Experiment(
     measure=measure,
     record=Sight,
     subcases=SUBCASES,
-    measures={"answered": share("answered"), "right": share("right")},
+    measures={"views": Measure(count, interval=False)},
+    more_figures=shares,
     quick_seeds=10,
     parameters=AbsentParameters,
     places=frozenset({"data"}),
