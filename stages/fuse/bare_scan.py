@@ -43,7 +43,7 @@ def told_apart(scan: AnnotatedScan, voxel: float, minimum_area: float, where: Pa
     ceiling = level & (height > CEILING)
     walls = of_walls(middles, normals, ~floor & ~ceiling, edge)
     layout = floor | ceiling | walls
-    piece = unnamed_pieces(
+    piece, _ = unnamed_pieces(
         middles, normals, np.zeros(len(middles), np.int32), layout, voxel=edge, minimum_area=minimum_area
     )
     most = int(piece.max(initial=0))

@@ -11,6 +11,7 @@ from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.vocabulary import UNNAMED, Vocabulary
 from stages.fuse.counts import TripleCounts
 from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
+from stages.fuse.impossible_names import without_impossible_names
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
@@ -19,6 +20,9 @@ from stages.fuse.strange_places import thing_score, without_names
 from stages.fuse.surface import Surface, extract_surface
 from stages.kit.formats.map_files import mesh_name
 from stages.kit.stage import Progress
+
+FLAT_TOPPED = ("table", "desk")
+"""Classes of things that end at their level top."""
 
 
 @dataclass(frozen=True)
@@ -93,17 +97,28 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
         entities, labelled = extract_entities(
             surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
         )
-        strange = parameters.merging == "ours" and is_strange(source, parameters)
+        ours = parameters.merging == "ours"
+        strange = ours and is_strange(source, parameters)
+        things, scores = mapper.merging.things, grouping.class_scores
         if strange:
-            things, scores = mapper.merging.things, grouping.class_scores
             score_of = {e.instance: thing_score(e.segments, scores, things, mapper.sightings) for e in entities}
             entities, labelled = without_names(entities, labelled, score_of, things, unnamed)
-        if parameters.unnamed_area > 0 and parameters.merging == "ours":
+        elif ours:
+            entities, labelled = without_impossible_names(
+                entities, labelled, scores, mapper.sightings, vocabulary, unnamed
+            )
+        if parameters.unnamed_area > 0 and ours:
             entities, labelled = (by_geometry if strange else with_unnamed_pieces)(
                 surface,
                 entities,
                 labelled,
-                Classes(*(vocabulary.by_name(name).id for name in ("floor", "wall", "ceiling", UNNAMED))),
+                Classes(
+                    floor=vocabulary.by_name("floor").id,
+                    wall=vocabulary.by_name("wall").id,
+                    ceiling=vocabulary.by_name("ceiling").id,
+                    unnamed=unnamed,
+                    tables=frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED),
+                ),
                 voxel=parameters.voxel_size,
                 minimum_area=parameters.unnamed_area,
             )

@@ -23,6 +23,8 @@ class Classes:
     wall: int
     ceiling: int
     unnamed: int
+    tables: frozenset[int] = frozenset()
+    """Of things that end at their level top."""
 
 
 def with_unnamed_pieces(
@@ -44,8 +46,17 @@ def with_unnamed_pieces(
     normals = vertex_normals(vertices, surface.faces)
     room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling))
     walls = of_walls(vertices, normals, (room | (labelled.instance == 0)) & (vertices[:, 2] > FLOOR), voxel)
-    piece = unnamed_pieces(vertices, normals, labelled.instance, room | walls, voxel=voxel, minimum_area=minimum_area)
-    return _with_pieces(surface, entities, labelled, piece, classes.unnamed)
+    piece, instance = unnamed_pieces(
+        vertices,
+        normals,
+        labelled.instance,
+        room | walls,
+        voxel=voxel,
+        minimum_area=minimum_area,
+        tables={e.instance for e in entities if e.class_id in classes.tables},
+    )
+    kept, labelled = _cut_anew(surface, entities, labelled, instance)
+    return _with_pieces(surface, kept, labelled, piece, classes.unnamed)
 
 
 def by_geometry(
@@ -70,7 +81,7 @@ def by_geometry(
     known = (class_id == classes.floor) | ((class_id == classes.ceiling) & (vertices[:, 2] > CEILING))
     walls = of_walls(vertices, normals, ~known & (vertices[:, 2] > FLOOR), voxel)
     proposed = np.where(class_id == classes.unnamed, instance, 0)
-    piece = unnamed_pieces(
+    piece, _ = unnamed_pieces(
         vertices,
         normals,
         np.zeros_like(instance),
@@ -106,6 +117,25 @@ def _over_floor(surface: Surface, labelled: LabelledSurface, classes: Classes) -
     """Return the vertices (V, 3) [m] with the floor at 0, None where there is none."""
     level = surface.vertices[labelled.class_id == classes.floor, 2]
     return surface.vertices - [0.0, 0.0, float(np.median(level))] if len(level) else None
+
+
+def _cut_anew(
+    surface: Surface, entities: Sequence[ExtractedEntity], labelled: LabelledSurface, instance: np.ndarray
+) -> tuple[list[ExtractedEntity], LabelledSurface]:
+    """Return entities and labels where things have the surface that `instance` (V,) says, without those that have none
+    left."""
+    changed = instance != labelled.instance
+    touched = set(np.union1d(instance[changed], labelled.instance[changed]).tolist())
+    of_face, class_of = face_labels(instance, surface.faces), {e.instance: e.class_id for e in entities}
+    kept = []
+    for entity in entities:
+        if entity.instance in touched:
+            entity = replace(entity, mesh=cut_mesh(surface, np.flatnonzero(of_face == entity.instance)))
+        if len(entity.mesh.faces):
+            kept.append(entity)
+    class_id = labelled.class_id.copy()
+    class_id[changed] = [class_of.get(number, 0) for number in instance[changed].tolist()]
+    return kept, LabelledSurface(labelled.segment, class_id, instance)
 
 
 def _with_pieces(

@@ -7,6 +7,8 @@ not to be relied on they propose parts, and geometry says what becomes of them.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from scipy import ndimage
 from scipy.sparse import coo_matrix
@@ -52,13 +54,17 @@ def unnamed_pieces(
     voxel: float,
     minimum_area: float,
     proposed: np.ndarray | None = None,
-) -> np.ndarray:
-    """Return the piece of every vertex (V,), from 1 in the order of size; 0 for what is named or of the room itself.
+    tables: Collection[int] = (),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the piece of every vertex (V,), from 1 in the order of size, 0 for what is named or of the room itself;
+    and the instance (V,) of the named thing that every vertex is of, 0 for pieces.
 
     vertices (V, 3) [m], z up, the floor at 0; normals (V, 3); instance (V,), 0 where no mask named the surface; `room`
     (V,): floor, walls and ceiling; `proposed` (V,): what doubtful masks took for one thing each, 0 for none; `voxel`
-    [m]. Left out is what has less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and
-    what lies within the outline of a named thing and begins below its top: a leg, or a leaf that its mask missed.
+    [m]; `tables`: instances that end at their level top, so that what their mask took with them is a piece where it
+    rises over the top. Left out is what has less than `minimum_area` [m^2] and neither stands on a level top nor was
+    proposed, and what lies within the outline of a named thing and begins below its top: a leg, or a leaf that its mask
+    missed, which is of the thing where it touches it. Under a table are legs of chairs too: they stay unnamed.
     """
     piece = np.zeros(len(vertices), np.int32)
     members = np.flatnonzero((instance == 0) & ~room & (vertices[:, 2] > FLOOR))
@@ -66,13 +72,31 @@ def unnamed_pieces(
     parts = _components(points, voxel, None if proposed is None else proposed[members])
     whole = set() if proposed is None else set(parts[proposed[members] > 0].tolist())
     parts, standing = _cut_at_tops(points, normals[members], parts, voxel)
-    names = np.where(room, 0, instance)
+    names, freed = np.where(room, 0, instance), set()
+    for table in sorted(tables):
+        loose = _of_named(points, parts, vertices[names == table])
+        around = np.concatenate([np.flatnonzero(names == table), members[loose]])
+        cut, on_top = _cut_at_tops(vertices[around], normals[around], np.zeros(len(around), int), voxel)
+        first = 1 + int(parts.max(initial=0))
+        freed |= set((first + cut[cut > 0]).tolist())
+        standing |= {first + part for part in on_top if part}
+        part_of = np.full(len(vertices), -1)
+        part_of[members] = parts
+        part_of[around[cut > 0]] = first + cut[cut > 0]
+        names[around[cut > 0]] = 0
+        members = np.flatnonzero(part_of >= 0)
+        points, parts = vertices[members], part_of[members]
     for _, top in _tops(vertices, normals, names, voxel):
         if names[top[0]] > 0:
             level, footprint = float(np.median(vertices[top, 2])), _Footprint(vertices[top, :2], voxel)
             standing |= _standing_on(level, footprint, points, parts)
-    named = [vertices[names == name] for name in np.unique(names[names > 0])]
-    alone = ~_of_named(points, parts, named)
+    alone, of_named = np.ones(len(points), bool), instance.astype(np.int32)
+    for name in np.unique(names[names > 0]).tolist():
+        thing = vertices[names == name]
+        left = alone & _of_named(points, parts, thing) & ~np.isin(parts, sorted(freed))
+        alone &= ~left
+        if name not in tables:
+            of_named[members[left & _touching(points, np.where(left, parts, -1), thing, voxel)]] = name
     members, points, parts = members[alone], points[alone], parts[alone]
     parts = _joined(points, normals[members], parts, standing, whole, voxel, minimum_area)
     kept = []
@@ -85,7 +109,7 @@ def unnamed_pieces(
             kept.append(own)
     for number, own in enumerate(sorted(kept, key=lambda own: (-len(own), own[0])), 1):
         piece[own] = number
-    return piece
+    return piece, np.where(piece > 0, 0, of_named).astype(np.int32)
 
 
 def _components(points: np.ndarray, voxel: float, proposed: np.ndarray | None = None) -> np.ndarray:
@@ -197,16 +221,23 @@ def _common(first: np.ndarray, second: np.ndarray) -> float:
     return len(np.intersect1d(first, second, assume_unique=True)) / len(first)
 
 
-def _of_named(points: np.ndarray, parts: np.ndarray, named: list[np.ndarray]) -> np.ndarray:
+def _of_named(points: np.ndarray, parts: np.ndarray, thing: np.ndarray) -> np.ndarray:
     """Return which points (N,) are of parts that lie over or under a named thing (M, 3) and begin below its top."""
     result = np.zeros(len(points), bool)
-    for thing in named:
-        beside = cKDTree(thing[:, :2]).query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE
-        top = float(np.quantile(thing[:, 2], TOP))
-        for part in np.unique(parts[beside]):
-            own = parts == part
-            result |= own & bool(points[own, 2].min() < top - SAME_LEVEL and beside[own].mean() >= WITHIN)
+    beside = cKDTree(thing[:, :2]).query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE
+    top = float(np.quantile(thing[:, 2], TOP))
+    for part in np.unique(parts[beside]):
+        own = parts == part
+        result |= own & bool(points[own, 2].min() < top - SAME_LEVEL and beside[own].mean() >= WITHIN)
     return result
+
+
+def _touching(points: np.ndarray, parts: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
+    """Return which points (N,) are of parts, -1 for none, that touch a thing (M, 3) and are smaller than it."""
+    of_part = np.flatnonzero(parts >= 0)
+    near = of_part[cKDTree(thing).query(points[of_part], distance_upper_bound=2.0 * voxel)[0] < 2.0 * voxel]
+    names, sizes = np.unique(parts[of_part], return_counts=True)
+    return np.isin(parts, np.intersect1d(parts[near], names[sizes < len(thing)]))
 
 
 def _joined(

@@ -30,7 +30,8 @@ def write_checkpoint(folder: Path, trainer: Trainer, losses: Sequence[float]) ->
     arrays["poses"] = np.array([each.camera_from_world for each in trainer.views]).reshape(-1, 4, 4)
     arrays["pose_moments"] = np.array([(each.first, each.second) for each in trainer.views]).reshape(-1, 2, 6)
     arrays["pose_steps"] = np.array([each.steps for each in trainer.views], np.int64)
-    arrays["origins"], arrays["tried"] = state.origins, np.array(state.tried, np.int64).reshape(-1, 2)
+    arrays |= {"origins": state.origins, "guessed": state.guessed}
+    arrays["tried"] = np.array(state.tried, np.int64).reshape(-1, 2)
     arrays["edge_ends"] = np.array([(e.target, e.source, e.switchable) for e in state.edges], np.int64).reshape(-1, 3)
     arrays["edge_motions"] = np.array([edge.target_from_source for edge in state.edges]).reshape(-1, 4, 4)
     arrays["edge_information"] = np.array([edge.information for edge in state.edges]).reshape(-1, 6, 6)
@@ -71,7 +72,7 @@ def read_checkpoint(folder: Path, trainer: Trainer, arriving: Sequence[Arrival])
             )
         ]
         tried = [(int(target), int(source)) for target, source in arrays["tried"]]
-        before = (arrays["moved"], arrays["pull"], arrays["origins"], edges, tried)
+        before = (arrays["moved"], arrays["pull"], arrays["origins"], arrays["guessed"], edges, tried)
         state = TrainerState(moments, *before, **{name: facts[name] for name in FACTS})
         trainer.go_on(gaussians, views, state)
         return [float(loss) for loss in arrays["losses"]]

@@ -50,6 +50,10 @@ class Pull:
         added = np.zeros(count - len(self.sums))
         self.sums, self.seen = np.concatenate([self.sums, added]), np.concatenate([self.seen, added])
 
+    def keep(self, kept: np.ndarray) -> None:
+        """Forget all Gaussians but these (N,)."""
+        self.sums, self.seen = self.sums[kept], self.seen[kept]
+
     def means(self) -> np.ndarray:
         """Return the mean pull (N,)."""
         return self.sums / np.maximum(self.seen, 1)

@@ -102,7 +102,7 @@ def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
 
 BUILD = Stage(
     name="splat build",
-    version=5,
+    version=6,
     summary="Learn a room as 3-D Gaussians from posed pictures that arrive one after another",
     parameters=BuildParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from stages.kit.geometry.cameras import back_project
+from stages.kit.geometry.cameras import back_project, project
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.harmonics import LEVEL_0
 from stages.splat.views import PosedView
+
+DEPTH_ERROR = 0.08
+"""Farther apart, over the depth, what is shown and what was measured are two things."""
+
+
+class Seeds(NamedTuple):
+    """Gaussians to add."""
+
+    gaussians: Gaussians
+    guessed: np.ndarray
+    """(N,) bool: set where no depth was measured, so that a later view may see through them."""
 
 
 def at_pixels(
@@ -48,3 +61,16 @@ def filled(depth: np.ndarray) -> np.ndarray:
         return depth
     rows, columns = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     return depth[rows, columns]
+
+
+def seen_through(points: np.ndarray, view: PosedView, camera_from_world: np.ndarray) -> np.ndarray:
+    """Return which points (N, 3) [m], in the world, lie before the depth that a view measured there, as (N,) bool."""
+    if view.depth is None:
+        return np.zeros(len(points), bool)
+    pixels, depth = project(apply(camera_from_world, points.astype(float)), view.camera)
+    height, width = view.depth.shape
+    columns, rows = np.nan_to_num(np.round(pixels), nan=-1).clip(-1, max(width, height)).astype(int).T
+    inside = (depth > 0) & (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+    measured = np.zeros(len(points))
+    measured[inside] = view.depth[rows[inside], columns[inside]]
+    return measured > depth * (1 + DEPTH_ERROR)

@@ -18,6 +18,7 @@ from stages.splat.density import Pull, grown, useless
 from stages.splat.losses import loss_of
 from stages.splat.methods.method import Method
 from stages.splat.optimizer import RowAdam
+from stages.splat.seeding import Seeds, seen_through
 from stages.splat.views import PosedView
 
 MOMENTS = (0.9, 0.999)
@@ -34,6 +35,8 @@ class TrainerState:
     """(2, N) sums and counts."""
     origins: np.ndarray
     """(N,) the view that set each Gaussian."""
+    guessed: np.ndarray
+    """(N,) which were set where no depth was measured."""
     edges: list[Edge]
     tried: list[tuple[int, int]]
     """Of the adjustment."""
@@ -79,7 +82,7 @@ class Trainer:
         self.steps = 0
         self._adam, self._pull = RowAdam(), Pull(0)
         self._rounds, self._was_reset = 0, False
-        self._origins = np.zeros(0, np.int64)
+        self._origins, self._guessed = np.zeros(0, np.int64), np.zeros(0, bool)
 
     @property
     def moves_poses(self) -> bool:
@@ -94,6 +97,7 @@ class Trainer:
             self._adam.steps,
             pull,
             self._origins,
+            self._guessed,
             self.adjustment.edges,
             sorted(self.adjustment.tried),
             self.steps,
@@ -107,11 +111,14 @@ class Trainer:
         self._adam.moments, self._adam.steps = state.moments, state.moved
         self._pull.sums, self._pull.seen = state.pull
         self._rounds, self._was_reset = state.rounds, state.was_reset
-        self._origins = state.origins
+        self._origins, self._guessed = state.origins, state.guessed
         self.adjustment.edges, self.adjustment.tried = list(state.edges), set(state.tried)
 
     def add_view(self, view: PosedView, *, last: bool = False) -> None:
-        """Take a new picture in: Gaussians are set where the method wants them. After the `last` all are adjusted."""
+        """Take a new picture in: guesses that it sees through go, and Gaussians are set where the method wants them.
+
+        After the `last` all are adjusted.
+        """
         pose = view.camera_from_world.copy()
         if self.adjust_every and self.views:
             # The motion since the view before is taken as it is given, until it is adjusted.
@@ -121,12 +128,18 @@ class Trainer:
         if self.adjust_every and (last or len(self.views) % self.adjust_every == 0):
             self._adjust()
         learned = self.views[-1]
+        guesses = np.flatnonzero(self._guessed)
+        kept = np.ones(len(self.gaussians), bool)
+        kept[guesses] = ~seen_through(self.gaussians.means[guesses], view, learned.camera_from_world)
+        if not kept.all():
+            self._keep(kept)
         shown = self.draw(learned).picture
-        more = self.method.seed(view, shown, learned.camera_from_world, self.random)
+        more, guessed = self.method.seed(view, shown, learned.camera_from_world, self.random)
         room = max(0, self.most - len(self.gaussians))
         if len(more) > room:
-            more = more.taken(np.sort(self.random.permutation(len(more))[:room]))
-        self._add(more, np.full(len(more), len(self.views) - 1))
+            rows = np.sort(self.random.permutation(len(more))[:room])
+            more, guessed = more.taken(rows), guessed[rows]
+        self._add(Seeds(more, guessed), np.full(len(more), len(self.views) - 1))
 
     def _adjust(self) -> None:
         before = inverses(np.array([each.camera_from_world for each in self.views]))
@@ -175,23 +188,28 @@ class Trainer:
         self.gaussians = with_harmonics(self.gaussians, (degree + 1) ** 2)
         self._adam.extend(self.gaussians)
 
-    def _add(self, more: Gaussians, origins: np.ndarray) -> None:
+    def _add(self, more: Seeds, origins: np.ndarray) -> None:
         self._origins = np.concatenate([self._origins, origins])
-        self.gaussians = self.gaussians.joined(with_harmonics(more, self.gaussians.harmonics.shape[1]))
+        self._guessed = np.concatenate([self._guessed, more.guessed])
+        self.gaussians = self.gaussians.joined(with_harmonics(more.gaussians, self.gaussians.harmonics.shape[1]))
         self._adam.extend(self.gaussians)
         self._pull.extend(len(self.gaussians))
+
+    def _keep(self, kept: np.ndarray) -> None:
+        self.gaussians = self.gaussians.taken(kept)
+        self._adam.keep(kept)
+        self._pull.keep(kept)
+        self._origins, self._guessed = self._origins[kept], self._guessed[kept]
 
     def _change_density(self) -> None:
         density = self.method.density
         self._rounds += 1
         more, parents, gone = grown(self.gaussians, self._pull.means(), density, self.random)
-        origins = self._origins[parents]
+        seeds, origins = Seeds(more, self._guessed[parents]), self._origins[parents]
         gone |= useless(self.gaussians, density, self._was_reset)
-        self.gaussians = self.gaussians.taken(~gone)
-        self._adam.keep(~gone)
-        self._origins = self._origins[~gone]
+        self._keep(~gone)
         self._pull = Pull(len(self.gaussians))
-        self._add(more, origins)
+        self._add(seeds, origins)
         if density.reset_every and self._rounds % density.reset_every == 0:
             least = 2 * density.least_opacity
             np.minimum(

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import Picture
 from stages.splat.density import Density
 from stages.splat.losses import LossWeights
+from stages.splat.seeding import Seeds
 from stages.splat.views import PosedView
 
-Seeding = Callable[[PosedView, Picture, np.ndarray, np.random.Generator], Gaussians]
+Seeding = Callable[[PosedView, Picture, np.ndarray, np.random.Generator], Seeds]
 """(new view, what the Gaussians so far show there, camera_from_world, random) -> Gaussians to add."""
 
 

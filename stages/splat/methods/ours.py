@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import Picture
 from stages.splat.density import Density
 from stages.splat.losses import LossWeights
 from stages.splat.methods.method import Method, Rate
-from stages.splat.seeding import at_pixels, filled
+from stages.splat.seeding import DEPTH_ERROR, Seeds, at_pixels, filled
 from stages.splat.views import PosedView
 
 SPACING = 4
@@ -21,15 +20,13 @@ WIDTH = 0.5
 """Its standard deviation, over the spacing."""
 OPACITY = 0.7
 COVERED = 0.6
-"""Alpha from which on a pixel counts as explained ..."""
-DEPTH_ERROR = 0.08
-"""... unless what is shown lies farther behind the measured depth than this, over the depth."""
+"""Alpha from which on a pixel counts as explained, unless what is shown lies behind the measured depth."""
 
 
-def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random: np.random.Generator) -> Gaussians:
+def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random: np.random.Generator) -> Seeds:
     """Return a Gaussian as wide as its share of the picture in every square that the Gaussians so far do not explain.
 
-    Where depth is unknown, the nearest known one is taken.
+    Where depth is unknown, the nearest known one is guessed.
     """
     measured = np.zeros(view.color.shape[:2], np.float32) if view.depth is None else view.depth
     depth = filled(measured)
@@ -43,7 +40,8 @@ def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random:
     pixels = pixels.reshape(-1, 2)
     pixels = pixels[open_pixels[pixels[:, 0], pixels[:, 1]]]
     deviations = WIDTH * SPACING * depth[pixels[:, 0], pixels[:, 1]] / view.camera.fx
-    return at_pixels(view, pixels, depth, deviations, OPACITY, camera_from_world)
+    gaussians = at_pixels(view, pixels, depth, deviations, OPACITY, camera_from_world)
+    return Seeds(gaussians, measured[pixels[:, 0], pixels[:, 1]] <= 0)
 
 
 METHOD = Method(

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import Picture
 from stages.splat.density import Density
 from stages.splat.losses import LossWeights
 from stages.splat.methods.method import Method, Rate
-from stages.splat.seeding import at_pixels
+from stages.splat.seeding import Seeds, at_pixels
 from stages.splat.views import PosedView
 
 PIXELS, DEVIATION, OPACITY = 500, 0.02, 0.2
 
 
-def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random: np.random.Generator) -> Gaussians:
+def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random: np.random.Generator) -> Seeds:
     """Return a Gaussian of 2 cm at each of 500 random pixels with depth."""
     depth = np.zeros(view.color.shape[:2], np.float32) if view.depth is None else view.depth
     known = np.argwhere(depth > 0)
     pixels = known[np.sort(random.permutation(len(known))[:PIXELS])]
-    return at_pixels(view, pixels, depth, np.full(len(pixels), DEVIATION), OPACITY, camera_from_world)
+    gaussians = at_pixels(view, pixels, depth, np.full(len(pixels), DEVIATION), OPACITY, camera_from_world)
+    return Seeds(gaussians, np.zeros(len(pixels), bool))
 
 
 METHOD = Method(

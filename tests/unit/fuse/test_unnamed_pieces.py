@@ -47,12 +47,24 @@ def pieces(
     area: float = 0.05,
     proposed: np.ndarray | None = None,
 ) -> np.ndarray:
+    owner = scene[2]
+    return of_instances(scene, np.where(np.isin(owner, named), owner + 1, 0), area, proposed)[0]
+
+
+def of_instances(
+    scene: tuple[np.ndarray, np.ndarray, np.ndarray],
+    instance: np.ndarray,
+    area: float = 0.05,
+    proposed: np.ndarray | None = None,
+    tables: tuple[int, ...] = (),
+) -> tuple[np.ndarray, np.ndarray]:
     vertices, faces, owner = scene
     normals = vertex_normals(vertices, faces)
-    instance = np.where(np.isin(owner, named), owner + 1, 0)
     walls = of_walls(vertices, normals, (instance == 0) & (vertices[:, 2] > FLOOR), VOXEL)
     room = walls | (owner == 0)
-    return unnamed_pieces(vertices, normals, instance, room, voxel=VOXEL, minimum_area=area, proposed=proposed)
+    return unnamed_pieces(
+        vertices, normals, instance, room, voxel=VOXEL, minimum_area=area, proposed=proposed, tables=tables
+    )
 
 
 def of_part(piece: np.ndarray, owner: np.ndarray, part: int) -> int:
@@ -117,10 +129,39 @@ def test_a_chair_beside_a_table_and_a_tall_cabinet_beside_a_counter_are_things_o
     assert (piece[front] == of_part(piece, owner, 3)).mean() > 0.8
 
 
+def test_what_a_mask_took_with_a_table_is_cut_from_it() -> None:
+    table, seat, back, box = (
+        ((-1.0, -1.0, 0.68), (0.2, -0.2, 0.72)),
+        ((-0.6, -0.3, 0.4), (-0.2, 0.1, 0.44)),
+        ((-0.6, -0.18, 0.44), (-0.2, -0.14, 0.95)),
+        ((-0.3, -0.8, 0.72), (-0.1, -0.5, 0.9)),
+    )
+    scene = room(table, seat, back, box)
+    owner = scene[2]
+    instance = np.where(np.isin(owner, (2, 4, 5)), 7, 0)
+    kept, own = of_instances(scene, instance)
+    assert not kept[np.isin(owner, (2, 4, 5))].any() and (own[owner == 4] == 7).all()
+    piece, own = of_instances(scene, instance, tables=(7,))
+    chair, thing = of_part(piece, owner, 4), of_part(piece, owner, 5)
+    assert of_part(piece, owner, 2) == 0 and 0 < chair != thing > 0
+    assert of_part(piece, owner, 3) == chair, "the seat goes with the back"
+    assert (own[owner == 2] == 7).mean() > 0.9 and not own[piece > 0].any()
+
+
+def test_a_leaf_that_touches_is_of_the_named_thing() -> None:
+    plant = ((-1.0, -1.0, 0.1), (-0.4, -0.4, 1.2))
+    touching, apart = ((-0.4, -0.8, 0.4), (-0.34, -0.6, 0.6)), ((-0.35, -0.8, 0.75), (-0.32, -0.6, 0.85))
+    scene = room(plant, touching, apart)
+    owner = scene[2]
+    piece, own = of_instances(scene, np.where(owner == 2, 9, 0))
+    assert not piece.any()
+    assert (own[np.isin(owner, (2, 3))] == 9).all() and not own[owner == 4].any()
+
+
 def test_small_and_empty() -> None:
     scene = room(BOX)
     assert pieces(scene, area=5.0).max() == 0
-    nothing = unnamed_pieces(
+    nothing, _ = unnamed_pieces(
         np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int), np.zeros(0, bool), voxel=VOXEL, minimum_area=0.1
     )
     assert nothing.shape == (0,)

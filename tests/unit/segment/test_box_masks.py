@@ -7,11 +7,11 @@ import pytest
 
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
+from stages.kit.class_extents import extent_of, is_plausible
 from stages.kit.geometry.transforms import look_at
 from stages.segment.backends.detector.agreement import Thing
 from stages.segment.backends.detector.backend import merge_duplicates, paint
 from stages.segment.backends.detector.box_masks import FrameGeometry, box_mask, frame_geometry
-from stages.segment.backends.detector.plausibility import extent_of, is_plausible
 from stages.segment.backends.detector.room import find_floor, find_room, find_walls, room_masks, sample_surface
 from stages.segment.geometric import segment_depth
 from tests.unit.segment.scenes import combine

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -15,7 +17,7 @@ from stages.splat.building import arrivals, carried_poses, train
 from stages.splat.density import Density, grown, useless
 from stages.splat.losses import LossWeights, loss_of, signal_to_noise, structural_similarity
 from stages.splat.methods import ours, thesis
-from stages.splat.seeding import filled
+from stages.splat.seeding import filled, seen_through
 from stages.splat.training import Trainer
 from stages.splat.views import PosedView
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
@@ -96,6 +98,23 @@ def test_what_is_explained_is_not_explained_again() -> None:
         trainer.step()
     trainer.add_view(view)
     assert first > 200 and len(trainer.gaussians) - first < 0.5 * first
+
+
+def test_a_guess_that_a_later_picture_sees_through_goes() -> None:
+    """The first picture knows one column, at half its depth, and guesses the rest; the third knows all."""
+    known = views()[0]
+    assert known.depth is not None
+    guessing = known.depth * np.where(np.arange(known.depth.shape[1]) == 0, 0.5, 0.0).astype(np.float32)
+    trainer = Trainer(ours.METHOD, CompiledRasterizer(), np.random.default_rng(0))
+    trainer.add_view(replace(known, depth=guessing))
+    assert trainer.state().guessed.mean() > 0.9
+
+    trainer.add_view(replace(known, depth=np.zeros_like(known.depth)))
+    assert trainer.state().guessed.any(), "a picture without depth sees through nothing"
+    trainer.add_view(known)
+    assert not trainer.state().guessed.any() and len(trainer.gaussians) > 200
+    through = seen_through(trainer.gaussians.means, known, known.camera_from_world)
+    assert 0 < through.sum() < 20, "what was measured, wrong or not, is left to training"
 
 
 def test_pictures_bring_no_more_gaussians_than_there_may_be() -> None:

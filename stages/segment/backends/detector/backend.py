@@ -9,11 +9,11 @@ import numpy as np
 from schemas.errors import MissingDependency
 from schemas.sequence import SequenceFile
 from schemas.vocabulary import UNNAMED, SemanticClass, Vocabulary, load_vocabulary
+from stages.kit.class_extents import extent_of, is_plausible
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.segment.backends.detector import DetectorParameters
 from stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
 from stages.segment.backends.detector.box_masks import box_mask, frame_geometry
-from stages.segment.backends.detector.plausibility import extent_of, is_plausible
 from stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
 from stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
 from stages.segment.backends.detector.yolox import Detections, Detector

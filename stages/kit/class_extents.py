@@ -49,7 +49,7 @@ SMALLEST_EXTENT = {
     "bench": 0.4,
     "person": 0.3,
 }
-"""Shortest diagonal of what is seen of it when the image does not cut it off [m]."""
+"""Shortest diagonal of what is seen of it when nothing cuts it off [m]."""
 
 
 def extent_of(points: np.ndarray) -> float:
@@ -59,7 +59,8 @@ def extent_of(points: np.ndarray) -> float:
 
 
 def is_plausible(class_name: str, extent: float, *, cut_off: bool) -> bool:
-    """Whether a thing of the class can have this extent [m]; only its largest size counts when it is cut off."""
+    """Whether a thing of the class can have this extent [m]; only its largest size counts when a picture cuts it
+    off."""
     if extent > LARGEST_EXTENT.get(class_name, np.inf):
         return False
     return cut_off or extent >= SMALLEST_EXTENT.get(class_name, 0.0)
