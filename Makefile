@@ -275,11 +275,12 @@ stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the the
 	$(EXPERIMENT) stitch_trials --out $(OUTPUTS)/experiments/stitch-trials$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: stitch-train stitch-segmentation stitch-thread
-# Rendered views are kept in one folder for all three: 168 to train on and to validate with, 100 to report on.
+# Rendered views are kept in one folder for all three: 206 to train on and to validate with, 100 to report on.
 STITCH_VIEWS := $(OUTPUTS)/experiments/stitch-views
-stitch-train: setup ## Train the needle and thread network anew, half a CPU hour with rendering (QUICK=1: 40 steps)
+stitch-train: setup ## Train the needle and thread network anew, an hour of a core with rendering (QUICK=1: 40 steps)
 	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)
 	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --steps 3000 --start $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)
+	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --cluttered --start $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-cluttered$(if $(QUICK),-quick)
 
 stitch-segmentation: setup ## The network's masks on held-out views, and the needle's pose from them (QUICK=1: four views)
 	$(EXPERIMENT) stitch_segmentation --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-segmentation$(if $(QUICK),-quick) $(ASKED)

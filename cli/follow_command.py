@@ -13,7 +13,9 @@ import typer
 def follow(
     pictures: Annotated[
         Path,
-        typer.Argument(help="Folder of NAME_left.png and NAME_right.png that grows; `-`: two files a line of stdin."),
+        typer.Argument(
+            help="Folder of NAME_left.png and NAME_right.png (.jpg, .bmp) that grows; `-`: two files a line of stdin."
+        ),
     ],
     rig: Annotated[Path, typer.Option("--rig", help="rig.json: the rectified pair (docs/STITCH.md).")],
     needle_radius: Annotated[
@@ -43,6 +45,7 @@ def follow(
     stereo, radius = read_rig(rig)
     make = masks_in(masks, (stereo.height, stereo.width), name_of) if masks is not None else network_masks(segmenter)
     follower = Follower(stereo, make, needle_radius or radius, cuts=masks is None)
+    follower.ready()
     pairs = named_pairs(sys.stdin) if str(pictures) == "-" else growing_pairs(pictures, latest=latest, idle=idle)
     for files in pairs:
         sys.stdout.write(json.dumps(follower.line(files), allow_nan=False) + "\n")

@@ -3,11 +3,13 @@
 Cases: `empty_pictures`, rendered scenes without a needle, with highlights and blood, by the network's masks;
 `empty_masks`, masks made of thread and jaws; `needle_pictures` and `needle_masks`, the same with a needle (every second
 picture cluttered, masks spoiled); `endoscope`, recorded frames of tissue without a needle (../shared/data). A third of
-the rendered scenes is an endoscope's. `python -m benchmarks.training.needle_presence` fits the test on tuning seeds.
+the rendered scenes is an endoscope's. `python -m benchmarks.training.needle_presence` fits the test on tuning seeds, of
+which the network saw none in its training.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,21 +18,28 @@ import numpy as np
 import torch
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count
+from benchmarks.reporting_seeds import Method, newest
 from benchmarks.steps import made, opened
+from benchmarks.tabulation import Figure
 from schemas.suture_needle import SutureNeedle
+from stages.kit.measurement.bootstrap import Interval
+from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.stage import Parameters
 from stages.suture.evaluation.judgement import judged
 from stages.suture.masks import learned_masks, spoiled_masks
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
+from stages.suture.segmentation.checkpoint import BUNDLED
 from stages.suture.segmentation.infer import Segmenter
 from stages.suture.world.clutter import cluttered, false_masks
 from stages.suture.world.render import StereoView, render
 from stages.suture.world.sampling import seen_scene
 
-TUNING, REPORTING = range(100), range(2000, 2500)
+NEEDLES = "needles"
+"""Group of the reporting seeds (reporting_seeds.toml)."""
+TUNING, REPORTING = tuple(map(str, range(300, 400))), newest(NEEDLES).seeds
 RECORDED = "endoscope"
 FRAMES = 10
 VIEWS = {"empty_pictures": 500, "empty_masks": 500, "needle_pictures": 150, "needle_masks": 500}
@@ -47,8 +56,8 @@ class AbsentParameters(Parameters):
 @dataclass(frozen=True)
 class Sight:
     """What the estimator said of one view. `found`: its best guess is right, `right`: and the answer; `visible`: the
-    needle's plane is more than 15 degrees from edge-on; `presence`: the features of the test of presence (empty
-    where no outline came that far)."""
+    needle's plane is more than 15 degrees from edge-on; `cluttered`: blood and highlights lie over the picture, the
+    needle too; `presence`: the features of the test of presence (empty where no outline came that far)."""
 
     answered: bool
     found: bool
@@ -56,16 +65,17 @@ class Sight:
     visible: bool
     reason: str
     presence: tuple[float, ...] = ()
+    cluttered: bool = False
 
 
-def sight_of(answer: NeedleEstimate, view: StereoView | None = None) -> Sight:
+def sight_of(answer: NeedleEstimate, view: StereoView | None = None, cluttered: bool = False) -> Sight:
     """Return the record of one answer; `view` where there is a needle."""
     answered = answer.pose is not None and not answer.abstained
     found = right = visible = False
     if view is not None:
         judgement = judged("ours", "", 0, view, answer)
         found, right, visible = judgement.right, judgement.within, judgement.visible
-    return Sight(answered, found, right, visible, answer.abstained, answer.presence_features)
+    return Sight(answered, found, right, visible, answer.abstained, answer.presence_features, cluttered)
 
 
 def _learned(view: StereoView) -> NeedleObservation:
@@ -73,6 +83,11 @@ def _learned(view: StereoView) -> NeedleObservation:
     assert view.left.image is not None and view.right.image is not None
     masks = learned_masks(segmenter.masks(view.left.image), segmenter.masks(view.right.image))
     return masks.observation(view.rig, None)
+
+
+def is_cluttered(case: str, seed: int) -> bool:
+    """Whether blood and highlights are painted over a view's pictures."""
+    return case == "empty_pictures" or (case == "needle_pictures" and seed % 2 == 1)
 
 
 def observe(case: str, seed: int) -> tuple[NeedleObservation, StereoView]:
@@ -85,7 +100,7 @@ def observe(case: str, seed: int) -> tuple[NeedleObservation, StereoView]:
         return spoiled_masks(view.left, view.right, seed)[0].observation(rig, None), view
     if case == "needle_pictures":
         pictured = render(scene)
-        return _learned(cluttered(pictured, random) if seed % 2 else pictured), view
+        return _learned(cluttered(pictured, random) if is_cluttered(case, seed) else pictured), view
     empty = replace(scene, without_needle=True)
     if case == "empty_pictures":
         return _learned(cluttered(render(empty), random)), view
@@ -105,22 +120,18 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Sigh
             yield trial, Sight(not said.abstained, False, False, False, said.abstained)
         return
     for trial in trials:
-        observation, view = observe(trial.case, int(trial.seed))
-        answer = estimate(observation)
-        yield trial, sight_of(answer, view if trial.case.startswith("needle") else None)
+        seed = int(trial.seed)
+        observation, view = observe(trial.case, seed)
+        truth = view if trial.case.startswith("needle") else None
+        yield trial, sight_of(estimate(observation), truth, is_cluttered(trial.case, seed))
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """Views, or frames where the recording is there; nothing is tuned on it."""
     if case != RECORDED:
-        return tuple(map(str, (TUNING if bench.tuning else REPORTING)[: VIEWS[case]]))
+        return (TUNING if bench.tuning else REPORTING)[: VIEWS[case]]
     there = not bench.tuning and (bench.parameters.data / "surgt_stereo").is_dir()
     return tuple(map(str, range(FRAMES))) if there else ()
-
-
-def share(name: str) -> Measure:
-    """Share of the views of which something holds [%]."""
-    return Measure(lambda records: 100 * float(np.mean([getattr(r, name) for r in records])) if records else None, "%")
 
 
 def _visible(record: Sight) -> Sight | None:
@@ -131,10 +142,29 @@ def _all(record: Sight) -> Sight:
     return record
 
 
+def _visible_where(cluttered: bool) -> Callable[[Sight], Sight | None]:
+    return lambda record: record if record.visible and record.cluttered == cluttered else None
+
+
 SUBCASES: dict[str, tuple[str, Callable[[Sight], Sight | None]]] = {
     **{case: (case, _all) for case in (*VIEWS, RECORDED)},
     **{f"{case}_visible": (case, _visible) for case in VIEWS if case.startswith("needle")},
+    "needle_pictures_visible_plain": ("needle_pictures", _visible_where(False)),
+    "needle_pictures_visible_cluttered": ("needle_pictures", _visible_where(True)),
 }
+
+
+def shares(results: Results) -> dict[str, float | Interval | Figure | None]:
+    """The shares with Wilson's intervals: of five hundred views without a false needle a bootstrap says nothing."""
+    flat: dict[str, float | Interval | Figure | None] = {}
+    for case in results.cases:
+        records = results.of("ours", case)
+        for name in ("answered", "right"):
+            there = sum(getattr(record, name) for record in records)
+            low, high = wilson_interval(there, len(records))
+            share = 100 * there / len(records)
+            flat[f"ours/{case}/{name}"] = Figure(share, 100 * low, 100 * high, len(records), "%")
+    return flat
 
 
 EXPERIMENT = Experiment(
@@ -147,14 +177,18 @@ EXPERIMENT = Experiment(
     "rendered world; ten frames of one recording are few.",
     arms={"ours": "ours"},
     cases=(*VIEWS, RECORDED),
+    seed_group=NEEDLES,
+    method=Method(("suture needle",), {"ours": {"network": hashlib.sha256(BUNDLED.read_bytes()).hexdigest()[:16]}}),
     seeds_of=seeds_of,
     together=lambda trial: (trial.case, "" if trial.case == RECORDED else trial.seed),
     measure=measure,
     record=Sight,
     subcases=SUBCASES,
-    measures={"answered": share("answered"), "right": share("right")},
+    measures={"views": Measure(count, interval=False)},
+    more_figures=shares,
     quick_seeds=10,
     parameters=AbsentParameters,
     places=frozenset({"data"}),
+    inputs=lambda bench, trial: [BUNDLED],
     steps=("ingest", "suture needle"),
 )

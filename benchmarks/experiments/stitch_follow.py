@@ -1,7 +1,8 @@
 """A moving needle followed by `suture follow`: what a pair takes, and how often its pose is right.
 
-Rendered pairs of an endoscope, the network's masks. Arm `whole` looks at all of every picture, as a needle is looked
-for first; `ours` looks where the needle was, and at all of it when it is lost. Times are processor times of one thread.
+Rendered pairs of an endoscope, the network's masks, or masks of one's own (`own_masks`: the true ones as mask files).
+Arm `whole` looks at all of every picture, as a needle is looked for first; the others look where the needle was, and at
+all of it when it is lost. Times are processor times of one thread, from the files to the line.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ import torch
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from stages.suture.evaluation.judgement import judged
-from stages.suture.following import Follower, growing_pairs
-from stages.suture.masks import network_masks
+from stages.suture.following import Follower, growing_pairs, name_of
+from stages.suture.masks import masks_in, network_masks
 from stages.suture.needle.observation import NeedleEstimate
 from stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, NeedlePose
 from stages.suture.world.render import StereoView, render
@@ -27,8 +28,9 @@ from stages.suture.world.sampling import seen_scene
 from stages.suture.world.scene import moved_scene, random_motions
 
 FRAMES = 8
+OWN, WHOLE = "own_masks", "whole"
 CALIBRATION_ERROR = 0.15
-TUNING, REPORTING = range(20, 40), range(2403, 2409)
+TUNING, REPORTING = range(20, 40), range(3100, 3110)
 
 
 @dataclass(frozen=True)
@@ -45,13 +47,23 @@ class Line:
 Lines = tuple[Line, ...]
 
 
-def followed(folder: Path, views: Sequence[StereoView], cuts: bool) -> Lines:
-    """Return what is said of the pairs of a folder; without `cuts` each is looked at as if it were the first."""
-    follower = Follower(ENDOSCOPE, network_masks(None), NEEDLE_RADIUS, cuts=True)
+def follower_of(arm: str, folder: Path) -> Follower:
+    """Return what an arm follows with, ready."""
+    own = arm == OWN
+    size = (ENDOSCOPE.height, ENDOSCOPE.width)
+    make = masks_in(folder / OWN, size, name_of) if own else network_masks(None)
+    follower = Follower(ENDOSCOPE, make, NEEDLE_RADIUS, cuts=not own)
+    follower.ready()
+    return follower
+
+
+def followed(folder: Path, views: Sequence[StereoView], arm: str) -> Lines:
+    """Return what is said of the pairs of a folder; by `whole` each is looked at as if it were the first."""
+    follower = follower_of(arm, folder)
     lines: list[Line] = []
     for files, view in zip(growing_pairs(folder, latest=False, idle=0.0), views, strict=True):
-        if not cuts:
-            follower = Follower(ENDOSCOPE, network_masks(None), NEEDLE_RADIUS)
+        if arm == WHOLE:
+            follower = follower_of(arm, folder)
         began = time.process_time()
         line = follower.line(files)
         seconds = time.process_time() - began
@@ -71,12 +83,14 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Line
     moved = [moved_scene(scene, motion, index) for index, motion in enumerate(random_motions(scene, FRAMES))]
     views = [render(one) for one in moved]
     with TemporaryDirectory() as place:
+        (Path(place) / OWN).mkdir()
         for number, view in enumerate(views):
             for side, eye in (("left", view.left), ("right", view.right)):
                 assert eye.image is not None
                 cv2.imwrite(str(Path(place) / f"{number:03d}_{side}.png"), eye.image[..., ::-1])
+                cv2.imwrite(str(Path(place) / OWN / f"{number:03d}_{side}.png"), eye.bodies)
         for trial in trials:
-            yield trial, followed(Path(place), views, trial.arm == "ours")
+            yield trial, followed(Path(place), views, trial.arm)
 
 
 def pairs_of(records: Sequence[Lines]) -> list[Line]:
@@ -99,16 +113,23 @@ def seconds(which: str) -> Measure:
     return Measure(of, "s")
 
 
+def rate(records: Sequence[Lines]) -> float | None:
+    """Return how many pairs a second a core follows: pairs before which the needle was known, those looked at whole
+    after all among them, over the time of all of them."""
+    times = [line.seconds for line in pairs_of(records) if line.found]
+    return len(times) / sum(times) if times else None
+
+
 EXPERIMENT = Experiment(
     name="stitch_follow",
     title="A needle followed from pair to pair",
     simulated="Needle, thread, drivers and pad before an endoscope, 1280 x 960 pixels; the needle moves by a few "
     "millimetres and degrees from pair to pair.",
     knows="The needle's radius and its taper, which is the renderer's own; most of the calibration; masks are the "
-    "network's.",
+    "network's, or true ones.",
     does_not_show="Anything about real pictures; a needle that goes far between two pairs; a second needle that comes "
     "into the picture while the first is followed. Times are of a busy machine.",
-    arms={"ours": "ours", "whole": "all of every picture"},
+    arms={"ours": "ours", OWN: "masks of one's own", WHOLE: "all of every picture"},
     cases=("endoscope",),
     tuning=tuple(map(str, TUNING)),
     reporting=tuple(map(str, REPORTING)),
@@ -116,6 +137,7 @@ EXPERIMENT = Experiment(
     measure=measure,
     record=Lines,
     measures={
+        "pairs_a_second": Measure(rate, "1/s"),
         "seconds_of_known": seconds("found"),
         "seconds": seconds("all"),
         "whole": share("whole"),

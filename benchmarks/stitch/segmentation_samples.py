@@ -1,7 +1,8 @@
 """Training samples of the needle and thread network: crops of rendered views, changed strongly.
 
 Changes: place, scale, turn, mirror; light (gains, gamma, contrast, a slope of light, glare), colour of everything and
-of the thread alone, saturation; blur, motion blur, noise; whole backgrounds of other patterns; cut-outs that hide.
+of the thread alone, saturation; blur, motion blur, noise; whole backgrounds of other patterns; cut-outs that hide;
+blood over everything, and highlights that are thin, bright and bent as a needle is.
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ REACH = 196
 """A crop turned and made smaller by 0.7 reaches so far [px]."""
 BODIES_OF = ((NEEDLE,), (THREAD,), (LEFT_DRIVER, RIGHT_DRIVER))
 """The bodies that each of CLASSES stands for."""
+BEFORE_JAWS = 25
+"""Side [px] of the square about a driver's pixel in which a needle lies before its jaws."""
+HIDES = 0.9
+"""What is painted over a thing more opaquely than this hides it."""
 PICTURES_KEPT = 480
 """So many decoded pictures are kept in memory, 5 MB each."""
 
@@ -54,17 +59,25 @@ def masks_of(bodies: np.ndarray) -> np.ndarray:
 
 
 def sample(
-    picture: np.ndarray, bodies: np.ndarray, random: np.random.Generator, needles: float = 0.35
+    picture: np.ndarray,
+    bodies: np.ndarray,
+    random: np.random.Generator,
+    needles: float = 0.35,
+    before_jaws: float = 0.0,
+    clutter: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a changed crop (CROP, CROP, 3) uint8 and its targets (3, CROP, CROP) float32 in 0..1; a share `needles`
-    (at most 0.75) of the crops lies about the needle."""
-    crop, masks = _placed(picture, bodies, random, needles)
+    (at most 0.75) of the crops lies about the needle, `before_jaws` of those where it is before a driver, and a share
+    `clutter` shows blood and highlights."""
+    crop, masks = _placed(picture, bodies, random, needles, before_jaws)
     image = crop.astype(np.float32) / 255.0
     if random.random() < 0.25:
         image = _before_other_background(image, masks, random)
     if random.random() < 0.35:
         image = _other_thread(image, masks[1], random)
     image = _lit(image, random)
+    if clutter and random.random() < clutter:
+        image, masks = _cluttered(image, masks, random)
     if random.random() < 0.4:
         image, masks = _cut_out(image, masks, random)
     image = _sensed(image, random)
@@ -72,13 +85,17 @@ def sample(
 
 
 def _placed(
-    picture: np.ndarray, bodies: np.ndarray, random: np.random.Generator, needles: float
+    picture: np.ndarray, bodies: np.ndarray, random: np.random.Generator, needles: float, before_jaws: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a crop about needle or thread (or anywhere), in half of the cases turned and scaled, mirrored, with soft
     masks."""
     rows, columns = bodies.shape
     wanted = random.choice([NEEDLE, THREAD, LEFT_DRIVER, 0], p=[needles, 0.75 - needles, 0.1, 0.15])
-    places = np.flatnonzero(bodies == wanted)
+    chosen = bodies == wanted
+    if wanted == NEEDLE and before_jaws and random.random() < before_jaws:
+        drivers = np.isin(bodies, (LEFT_DRIVER, RIGHT_DRIVER)).astype(np.uint8)
+        chosen = chosen & (cv2.dilate(drivers, np.ones((BEFORE_JAWS, BEFORE_JAWS), np.uint8)) > 0)
+    places = np.flatnonzero(chosen)
     if len(places) == 0:
         places = np.arange(bodies.size)
     row, column = divmod(int(places[random.integers(len(places))]), columns)
@@ -162,6 +179,59 @@ def _cut_out(image: np.ndarray, masks: np.ndarray, random: np.random.Generator) 
         image[window] = _pattern(random)[window] if random.random() < 0.5 else random.uniform(0.0, 1.0, 3)
         masks[:, top : top + height, left : left + width] = 0.0
     return image, masks
+
+
+def _cluttered(image: np.ndarray, masks: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Return the picture under up to two stains of blood and up to six highlights, and the masks without what these
+    hide."""
+    for _ in range(int(random.integers(0, 3))):
+        image, masks = _painted(image, masks, _stain(random), _blood(random))
+    for _ in range(int(random.integers(0, 7))):
+        bright = random.uniform(0.55, 1.0) * random.uniform(0.93, 1.0, 3)
+        image, masks = _painted(image, masks, _highlight(random), bright)
+    return image, masks
+
+
+def _painted(
+    image: np.ndarray, masks: np.ndarray, opacity: np.ndarray, colour: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    share = opacity[..., None]
+    return (image * (1.0 - share) + colour * share).astype(np.float32), masks * (opacity < HIDES)
+
+
+def _blood(random: np.random.Generator) -> np.ndarray:
+    return np.array([random.uniform(0.15, 0.55), *random.uniform(0.0, 0.1, 2)])
+
+
+def _stain(random: np.random.Generator) -> np.ndarray:
+    """Return the opacity (CROP, CROP) of a smooth stain of any form with a soft or a sharp edge."""
+    size = int(random.integers(2, 7))
+    coarse = random.standard_normal((size, size)).astype(np.float32)
+    height: np.ndarray = cv2.resize(coarse, (CROP, CROP), interpolation=cv2.INTER_CUBIC)
+    edge = np.clip((height - random.uniform(-1.0, 0.5)) * random.uniform(2.0, 12.0), 0.0, 1.0)
+    return np.asarray(random.uniform(0.3, 0.95) * edge)
+
+
+def _highlight(random: np.random.Generator) -> np.ndarray:
+    """Return the opacity (CROP, CROP) of a spot, a straight streak, or a line that is bent by up to two thirds of a
+    turn."""
+    canvas = np.zeros((CROP, CROP), np.float32)
+    middle = random.uniform(0.0, CROP, 2)
+    turn, kind, thick = random.uniform(0.0, 360.0), int(random.integers(3)), int(random.integers(1, 8))
+    size = float(np.exp(random.uniform(np.log(3.0), np.log(90.0))))
+    axes = [max(int(size), 1), max(int(size * random.uniform(0.2, 1.0)), 1)]
+    if kind == 0:
+        spot = [max(axis // 3, 1) for axis in axes]
+        cv2.ellipse(canvas, middle.astype(int).tolist(), spot, turn, 0, 360, 1.0, -1, cv2.LINE_AA)
+    elif kind == 1:
+        way = size * np.array([np.cos(turn), np.sin(turn)])
+        first, last = ((middle + side * way).astype(int).tolist() for side in (-1, 1))
+        cv2.line(canvas, first, last, 1.0, thick, cv2.LINE_AA)
+    else:
+        cv2.ellipse(
+            canvas, middle.astype(int).tolist(), axes, turn, 0, random.uniform(20, 240), 1.0, thick, cv2.LINE_AA
+        )
+    return np.asarray(random.uniform(0.4, 1.0) * cv2.GaussianBlur(canvas, (0, 0), random.uniform(0.4, 2.0)))
 
 
 def _sensed(image: np.ndarray, random: np.random.Generator) -> np.ndarray:

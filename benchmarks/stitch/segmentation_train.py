@@ -2,11 +2,13 @@
 
     python -m benchmarks.stitch.segmentation_train --out FOLDER [--quick] [--steps N] [--batch N] [--seed N]
     python -m benchmarks.stitch.segmentation_train --out OTHER --views FOLDER/views --start CHECKPOINT [--steps N]
+    python -m benchmarks.stitch.segmentation_train --out THIRD --views FOLDER/views --start OTHER/... --cluttered
 
-Views that are not in FOLDER/views yet are rendered first (seeds 0 to 99 before the two cameras, 200 to 211 before the
-endoscope; 450 to 455 validate). A step's samples depend on the seed and on the number of the step alone, and the state
-is written every few minutes, so that a run that was stopped ends with the bytes of one that was not, on the same
-machine. The result is `segmentation.safetensors`, the moving average of the weights.
+Views that are not in FOLDER/views yet are rendered first (seeds 0 to 99 before the two cameras, in the second run to
+149; 200 to 211 before the endoscope, in the third to 249; 450 to 455 validate). A step's samples depend on the seed and
+on the number of the step alone, and the state is written every few minutes, so that a run that was stopped ends with
+the bytes of one that was not, on the same machine. The result is `segmentation.safetensors`, the moving average of the
+weights.
 """
 
 from __future__ import annotations
@@ -33,21 +35,26 @@ WEIGHT_DECAY, WARM_UP = 0.02, 0.03
 FILE = "segmentation.safetensors"
 SAMPLES_A_PICTURE = 2
 CAMERAS, ENDOSCOPES, VALIDATION = range(100), range(200, 212), range(450, 456)
-CAMERAS_REFINED = range(150)
-"""A refinement sees more views."""
+CAMERAS_REFINED, ENDOSCOPES_CLUTTERED = range(150), range(200, 250)
+"""The refinement sees more views of the two cameras, the last run more of the endoscope's."""
 
 
 @dataclass(frozen=True)
 class Phase:
-    """Peak learning rate, weights of the classes in the loss, share of the crops about the needle."""
+    """Peak learning rate, weights of the classes in the loss, share of the crops about the needle, of those where it is
+    before jaws, and of the crops with blood and highlights."""
 
     peak_rate: float
     weights: tuple[float, float, float]
     needles: float
+    before_jaws: float = 0.0
+    clutter: float = 0.0
 
 
 FIRST, REFINED = Phase(4e-3, (1.0, 1.0, 0.3), 0.35), Phase(2e-3, (2.0, 1.0, 0.3), 0.55)
-"""The needle is the rarest class and bright jaws the hardest background: a second run goes on with more of it."""
+CLUTTERED = Phase(2e-3, (2.0, 1.0, 0.3), 0.5, before_jaws=0.5, clutter=0.6)
+"""The needle is the rarest class and bright jaws the hardest background: a second run goes on with more of it. A third
+learns what is thin and bright and no needle, and needles and jaws under blood."""
 
 
 @dataclass(frozen=True)
@@ -59,16 +66,19 @@ class Plan:
     seed: int
     pictures: int
     start: str = ""
+    cluttered: bool = False
 
     @property
     def phase(self) -> Phase:
         """What the run asks for: a beginning, or a refinement of the checkpoint with the digest `start`."""
+        if self.cluttered:
+            return CLUTTERED
         return REFINED if self.start else FIRST
 
 
 def batch_of(views: Views, plan: Plan, step: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Return inputs (batch, 3, H, W) and targets (batch, 3, H, W) of a step."""
-    number = max(plan.batch // SAMPLES_A_PICTURE, 1)
+    number, phase = max(plan.batch // SAMPLES_A_PICTURE, 1), plan.phase
     per_epoch = max(1, len(views) // number)
     epoch, place = divmod(step, per_epoch)
     order = np.random.default_rng([plan.seed, 1, epoch]).permutation(len(views))
@@ -77,7 +87,7 @@ def batch_of(views: Views, plan: Plan, step: int) -> tuple[torch.Tensor, torch.T
         picture, bodies = views[int(index)]
         for turn in range(plan.batch // number):
             random = np.random.default_rng([plan.seed, 2, step, int(index), turn])
-            made.append(sample(picture, bodies, random, plan.phase.needles))
+            made.append(sample(picture, bodies, random, phase.needles, phase.before_jaws, phase.clutter))
     inputs = normalised(torch.from_numpy(np.stack([image for image, _ in made])))
     return inputs, torch.from_numpy(np.stack([masks for _, masks in made]))
 
@@ -95,7 +105,7 @@ def loss_of(logits: torch.Tensor, targets: torch.Tensor, weights: tuple[float, f
 class Run(TrainingRun):
     """A training run and its state on disk."""
 
-    average_decay, gradient_norm = 0.997, 5.0
+    average_decay, gradient_norm, single_precision = 0.997, 5.0, True
 
     def __init__(self, plan: Plan, out: Path, start: Path | None = None) -> None:
         self.plan = plan
@@ -107,9 +117,7 @@ class Run(TrainingRun):
         """Take one step and return its loss."""
         self.network.train()
         inputs, targets = batch_of(views, self.plan, self.step)
-        with torch.autocast("cpu", torch.bfloat16):
-            logits = self.network(inputs)
-        loss = loss_of(logits.float(), targets, self.plan.phase.weights)
+        loss = loss_of(self.network(inputs), targets, self.plan.phase.weights)
         self.descend(loss, rate_at(self.step, self.plan.steps, self.plan.phase.peak_rate, WARM_UP))
         return float(loss.detach())
 
@@ -147,6 +155,9 @@ class Options(Recipe):
 
     views: Path | None = Field(None, description="Where rendered views are kept; OUT/views if not given")
     start: Path | None = Field(None, description="Refine this checkpoint")
+    cluttered: bool = Field(
+        False, description="Refine it with blood and highlights, needles before jaws, more endoscopes"
+    )
     steps: int = Field(2000, description="Steps")
     batch: int = Field(8, description="Crops a step")
     seed: int = Field(0, description="Seed")
@@ -159,13 +170,17 @@ def main() -> None:
     torch.set_num_threads(1)
     folder = options.views or options.out / "views"
     few = 2 if options.quick else None
-    cameras = CAMERAS if options.start is None else CAMERAS_REFINED
+    cameras = CAMERAS if options.start is None or options.cluttered else CAMERAS_REFINED
     stems = [kept_view(folder, TWO_CAMERAS, seed) for seed in cameras[:few]]
-    stems += [kept_view(folder, ENDOSCOPE, seed) for seed in ENDOSCOPES[:few]]
+    stems += [
+        kept_view(folder, ENDOSCOPE, seed) for seed in (ENDOSCOPES_CLUTTERED if options.cluttered else ENDOSCOPES)[:few]
+    ]
     validation = Views([kept_view(folder, TWO_CAMERAS, seed) for seed in VALIDATION[:few]])
     views = Views(stems)
     digest = "" if options.start is None else hashlib.sha256(options.start.read_bytes()).hexdigest()[:16]
-    plan = Plan(40 if options.quick else options.steps, options.batch, options.seed, len(views), digest)
+    plan = Plan(
+        40 if options.quick else options.steps, options.batch, options.seed, len(views), digest, options.cluttered
+    )
     run = Run(plan, options.out, options.start)
     train(
         run,

@@ -1,7 +1,8 @@
 """A needle followed while pictures arrive: pairs of a folder that grows, or of a pipe that names them, to poses.
 
-In a folder a pair is `<name>_left.png` and `<name>_right.png` (or .jpg), in the order of their names; it is taken when
-neither file has changed from one look to the next. A pipe names two files a line.
+In a folder a pair is `<name>_left.png` and `<name>_right.png` (.jpg, .bmp), in the order of their names; it is taken
+when neither file has changed from one look to the next. A pipe names two files a line. Where masks are given, pictures
+are not decoded: their sizes are all that is asked of them.
 """
 
 from __future__ import annotations
@@ -9,21 +10,24 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TextIO
 
 import cv2
 import numpy as np
+from PIL import Image, UnidentifiedImageError
 from pydantic import ValidationError
 
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import file_content, file_json
 from schemas.suture_scene import RigFile
 from stages.suture.masks import EyeMasks, MaskMaker
 from stages.suture.needle.estimate import estimate
-from stages.suture.needle.observation import NeedleEstimate
+from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from stages.suture.needle.radius import as_if_usual, in_metres
 from stages.suture.needle.records import as_estimate_record
+from stages.suture.needle.starts import FARTHEST, NEAREST
 from stages.suture.pairs import SQUARE, Pair
 from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
@@ -31,7 +35,7 @@ LARGEST_PICTURE = 64 * 2**20
 RIG_HINT = (
     'a rig is {"camera": {"width", "height", "fx", "fy", "cx", "cy"}, "baseline": metres}; docs/STITCH.md shows one'
 )
-ENDINGS = (".png", ".jpg")
+ENDINGS = (".png", ".jpg", ".bmp")
 AROUND, RIM = NEEDLE_RADIUS / 2, 48
 """How far from where it was a needle is looked for [m] (one that seems farther is looked at whole: few starts may end
 in another outline of the same masks), and how far a window reaches beyond that [px], so that what lies at its edge is
@@ -69,9 +73,7 @@ def read_rig(path: Path) -> tuple[StereoRig, float]:
     try:
         record = RigFile.model_validate(file_json(path, LARGEST_PICTURE, hint=RIG_HINT), strict=False)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        raise BadInput(f"{path}: {where:.100}: {first['msg']:.200}", hint=RIG_HINT) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=RIG_HINT) from None
     camera = record.camera
     if min(camera.fx, camera.fy) <= 0 or abs(camera.fx / camera.fy - 1.0) > SQUARE:
         raise BadInput(
@@ -183,6 +185,21 @@ class Follower:
         self._guess: NeedlePose | None = None
         self._count = 0
 
+    def ready(self) -> None:
+        """Look for a drawn needle once, so that what has to be loaded or compiled is so before the first pair arrives:
+        that takes most of a minute where nothing was compiled on this machine yet."""
+        rig, size = self._rig, (self._rig.height, self._rig.width)
+        matrix = np.eye(4)
+        matrix[2, 3] = np.clip(4.0 * NEEDLE_RADIUS * rig.focal / rig.height, 2.0 * NEAREST, 0.9 * FARTHEST)
+        points = NeedlePose(matrix).points(ARC)
+        masks = [np.zeros(size, np.uint8) for _ in range(2)]
+        for mask, pixels in zip(masks, (rig.left(points), rig.right(points)), strict=True):
+            cv2.polylines(mask, [np.round(pixels).astype(np.int32)], False, 1, 3)
+        if self._cuts:
+            black = np.zeros((*size, 3), np.uint8)
+            self._make(NamedPair(0, 0.0, 0, black, black))
+        estimate(NeedleObservation(rig, masks[0] > 0, masks[1] > 0, None), self._seed, NeedlePose(matrix), near=True)
+
     def line(self, files: PairFiles) -> dict[str, Any]:
         """Return what is known of the needle in a pair: `camera_from_needle` (4, 4) [m], `covariance` (6, 6),
         `tip_probability`, `abstained`, `whole` (whether all of both pictures was looked at), and what it took. A
@@ -193,10 +210,12 @@ class Follower:
             pictures = self._picture(files.left), self._picture(files.right)
             pair = NamedPair(self._count, 0.0, 0, *pictures, name=files.name)
             said["taken"] = files.left.stat().st_mtime
-            answer = self._near(pair)
+            masks = None if self._cuts else self._make(pair)
+            answer = self._near(pair, masks)
             said["whole"] = answer is None
             if answer is None:
-                answer = estimate(self._make(pair).observation(self._rig, None), self._seed, self._guess)
+                seen = masks or self._make(pair)
+                answer = estimate(seen.observation(self._rig, None), self._seed, self._guess)
         except BadInput as error:
             self._guess = None
             said |= UNKNOWN | {"abstained": str(error)}
@@ -208,17 +227,16 @@ class Follower:
         self._count += 1
         return said | {"skipped": files.skipped, "seconds": round(time.monotonic() - began, 4)}
 
-    def _near(self, pair: Pair) -> NeedleEstimate | None:
-        """Return the needle near where it was; None where it is not found there, or reaches out of the windows."""
+    def _near(self, pair: Pair, masks: EyeMasks | None) -> NeedleEstimate | None:
+        """Return the needle near where it was, in the pair's masks or those of the windows alone; None where it is not
+        found there, or reaches out of the windows."""
         if self._guess is None:
             return None
         windows = windows_about(self._rig, self._guess, self._reach(self._guess) + RIM)
-        if self._cuts:
+        if masks is None:
             if any(side.stop - side.start < 2 * RIM for window in windows for side in window):
                 return None
             masks = masks_within(self._make, pair, windows)
-        else:
-            masks = self._make(pair)
         answer = estimate(masks.observation(self._rig, None), self._seed, self._guess, near=True)
         if answer.abstained or answer.pose is None:
             return None
@@ -236,12 +254,26 @@ class Follower:
         return self._rig.focal * AROUND / float(pose.centre[2])
 
     def _picture(self, path: Path) -> np.ndarray:
+        """Return a picture (H, W, 3); without its pixels (H, W, 0) where masks are not made of it."""
         content = file_content(path, LARGEST_PICTURE, hint="give the pictures of both eyes")
-        picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+        picture = _decoded(content) if self._cuts else _size_alone(content)
         size = (self._rig.height, self._rig.width)
         if picture is None or picture.shape[:2] != size:
             what = "no picture" if picture is None else f"{picture.shape[1]} x {picture.shape[0]} pixels"
             raise BadInput(
                 f"{path}: {what}, the rig's are {size[1]} x {size[0]}", hint="rectified pictures of that size"
             )
-        return picture[..., ::-1]
+        return picture
+
+
+def _decoded(content: bytes) -> np.ndarray | None:
+    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+    return None if picture is None else picture[..., ::-1]
+
+
+def _size_alone(content: bytes) -> np.ndarray | None:
+    try:
+        with Image.open(BytesIO(content)) as picture:
+            return np.empty((picture.height, picture.width, 0), np.uint8)
+    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError):
+        return None

@@ -1,11 +1,12 @@
 """The network's masks of needle and thread on held-out rendered views, and the needle's pose from them.
 
-Reporting seeds begin at 2630: those from 1000 on, and from 2600, were seen with earlier estimators. Estimators run on
-spoiled true masks and on learned ones. Times are CPU times of one thread.
+Reporting seeds are the first of their group (reporting_seeds.toml). Estimators run on spoiled true masks and on learned
+ones. Times are CPU times of one thread.
 """
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ import torch
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.experiment import MEASURES as POSES
 from benchmarks.experiments.stitch_needle.views import CASES, observe
+from benchmarks.reporting_seeds import Method, newest
 from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
 from stages.suture.evaluation.judgement import Estimate, judged
 from stages.suture.masks import learned_masks
@@ -25,13 +27,16 @@ from stages.suture.needle.estimate import estimate
 from stages.suture.needle.radius_fit import estimate_without_radius
 from stages.suture.needle.thesis import thesis_estimate
 from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from stages.suture.segmentation.checkpoint import BUNDLED
 from stages.suture.segmentation.infer import Masks, Segmenter
 from stages.suture.world.render import Eye
 from stages.suture.world.sampling import seen_scene
 from stages.suture.world.scene import NeedleScene
 from stages.suture.world.tubes import NEEDLE, THREAD
 
-TUNING, REPORTING = range(450, 550), range(2630, 2730)
+NEEDLES = "needles"
+"""Group of the reporting seeds."""
+TUNING, REPORTING = range(450, 550), newest(NEEDLES).seeds[:150]
 VIEWS, NETWORK = "views", "network"
 ESTIMATORS = {"thesis": thesis_estimate, "ours": estimate}
 MASKS = ("spoiled", "learned")
@@ -289,11 +294,13 @@ EXPERIMENT = Experiment(
     knows="The picture; for the pose the needle's taper, and its radius but for the arm that fits it.",
     does_not_show="Anything about real pictures: it has seen one rendered world, one pad, one needle, one kind of "
     "driver, and was trained once. Disparity is no matcher's. A needle of another radius: the fitted radius is that of "
-    "the usual needle. Few views are few.",
+    "the usual needle.",
     arms={name: name for name in (NETWORK, *(f"{arm}_{masks}" for masks in MASKS for arm in ESTIMATORS), FITTED)},
     cases=(VIEWS,),
     tuning=tuple(map(str, TUNING)),
-    reporting=tuple(map(str, REPORTING)),
+    reporting=REPORTING,
+    seed_group=NEEDLES,
+    method=Method(("suture needle",), {"ours": {"network": hashlib.sha256(BUNDLED.read_bytes()).hexdigest()[:16]}}),
     together=lambda trial: trial.seed,
     measure=measure,
     record=Masked | Fitted | Estimate,

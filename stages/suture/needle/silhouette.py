@@ -299,9 +299,9 @@ def camera_of(rig: StereoRig) -> np.ndarray:
     return np.array([rig.focal, rig.centre[0], rig.centre[1], rig.baseline])
 
 
-def arc_at(rig: StereoRig, pose: np.ndarray, shift: np.ndarray) -> Arc:
-    """Return the needle at a pose (4, 4) for the compiled functions."""
-    return Arc(np.ascontiguousarray(pose, dtype=np.float64), shift, camera_of(rig), ON_CIRCLE, RADII, GROWTH)
+def arc_at(rig: StereoRig, pose: np.ndarray, shift: np.ndarray, growth: float = GROWTH) -> Arc:
+    """Return the needle at a pose (4, 4) for the compiled functions; masks are wider by `growth` [px]."""
+    return Arc(np.ascontiguousarray(pose, dtype=np.float64), shift, camera_of(rig), ON_CIRCLE, RADII, growth)
 
 
 def fit_outline(
@@ -311,11 +311,13 @@ def fit_outline(
     shift: np.ndarray,
     levels: tuple[tuple[float, int], ...],
     polish: int = 0,
+    growth: float = GROWTH,
 ) -> Outline:
-    """Return the outline moved onto the masks from `pose`, whose tip it takes for the tip.
+    """Return the outline moved onto the masks from `pose`, whose tip it takes for the tip; masks are taken to be wider
+    than the wire by `growth` [px] on either side.
 
     `levels` are widths of the logistic function [px] and the most steps with each; `polish` steps at the last of them
     count less what is off by much. The information is the polished one's, the misfit the plain one's.
     """
-    arc, cost, information = _fitted(arc_at(rig, pose.camera_from_needle, shift), sheets, levels, polish)
+    arc, cost, information = _fitted(arc_at(rig, pose.camera_from_needle, shift, growth), sheets, levels, polish)
     return Outline(NeedlePose(arc.pose), arc.shift, cost, information)

@@ -94,6 +94,23 @@ def test_a_pair_becomes_a_line_and_a_broken_picture_an_abstention(masks: Path, t
         list(named_pairs(["alone.png"]))
 
 
+def test_with_masks_of_ones_own_a_pair_is_read_once_and_its_pictures_are_not_decoded(
+    masks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second pair that is lost near is looked at whole in the masks that were read already."""
+    read = []
+    make = masks_in(masks, (960, 1280), name_of)
+    follower = Follower(TWO_CAMERAS, lambda pair: read.append(pair.name) or make(pair), NEEDLE_RADIUS)
+    follower.ready()
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("a picture that nothing is made of was decoded"))
+    monkeypatch.setattr(following, "AROUND", -1.0)
+    for name in ("000000", "000001"):
+        arrive(tmp_path, name)
+    lines = [follower.line(files) for files in growing_pairs(tmp_path, latest=False, idle=0.0)]
+    assert [line["whole"] for line in lines] == [True, True] and read == ["000000", "000001"]
+    assert not any(line["abstained"] for line in lines)
+
+
 def test_a_pair_that_was_passed_over_takes_its_masks_along(masks: Path, tmp_path: Path) -> None:
     """The first pair that is taken has no masks; those of the one before it, which was skipped, are not its own."""
     for name in ("000000", "000002"):

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
+from stages.suture.masks import spoiled_masks
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.radius import as_if_usual, in_metres
 from stages.suture.needle.radius_fit import Radius, estimate_without_radius, fitted_radius, together
 from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from stages.suture.world.sampling import seen_scene
 from tests.unit.suture.needle_cases import observed, pose_at
 
 
@@ -30,6 +33,26 @@ def test_a_radius_is_found_with_the_pose(factor: float) -> None:
     told = in_metres(estimate(replace(seen, rig=rig)), radius)
     spread, known = (np.trace(one.covariance[:3, :3]) for one in (answer, told))
     assert spread > known, "a radius that is not known makes the distance less sure"
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_masks_too_wide_or_too_thin_are_no_larger_or_smaller_needle(side: int) -> None:
+    """A wire that is a quarter wider in the masks would be a needle a quarter larger, did the fit not ask for both."""
+    seen = replace(observed(pose_at()), disparity=None)
+    change, kernel = (cv2.dilate, cv2.erode)[side < 0], np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+    left, right = (change(mask.astype(np.uint8), kernel) > 0 for mask in (seen.left_mask, seen.right_mask))
+    found = fitted_radius(replace(seen, left_mask=left, right_mask=right))
+    assert found is not None
+    assert abs(found.metres - NEEDLE_RADIUS) < min(0.01 * NEEDLE_RADIUS, 2 * found.deviation)
+
+
+@pytest.mark.parametrize("seed", [313, 327, 351])
+def test_the_deviation_holds_the_error(seed: int) -> None:
+    """Tuning views whose radius was off by three to four of its deviations before growth and rivals were in them."""
+    _, view = seen_scene(seed, calibration_error=0.15)
+    masks, _ = spoiled_masks(view.left, view.right, seed)
+    found = fitted_radius(masks.observation(view.rig, None), seed)
+    assert found is not None and abs(found.metres - NEEDLE_RADIUS) < 2 * found.deviation < 0.2 * NEEDLE_RADIUS
 
 
 def test_nothing_is_fitted_to_nothing() -> None:

@@ -11,14 +11,17 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.stitch.segmentation_samples import CROP, Views, masks_of, sample
+from benchmarks.stitch import segmentation_samples
+from benchmarks.stitch.segmentation_samples import CROP, Views, _cluttered, masks_of, sample
 from benchmarks.stitch.segmentation_train import Plan, Run, loss_of
 from schemas.errors import BadInput
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 from stages.suture.segmentation.checkpoint import BUNDLED, load_network, save_network
 from stages.suture.segmentation.infer import Segmenter, without_specks
 from stages.suture.segmentation.model import SutureNetwork
-from stages.suture.world.tubes import NEEDLE, THREAD
+from stages.suture.world.render import render
+from stages.suture.world.sampling import seen_scene
+from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
 SMALL = (4, 4, 8, 8, 8)
 
@@ -119,12 +122,19 @@ def test_the_bundled_network_is_the_one_described_and_finds_needle_and_thread():
     facts = tomllib.loads(BUNDLED.with_suffix(".toml").read_text())
     assert hashlib.sha256(BUNDLED.read_bytes()).hexdigest() == facts["sha256"]
     assert BUNDLED.stat().st_size < 3_000_000
-    image, bodies = picture()
-    found = Segmenter.load().masks(image)
+    eye = render(seen_scene(461)[0]).left
+    assert eye.image is not None
+    found = Segmenter.load().masks(eye.image)
     for mask, body in ((found.needle, NEEDLE), (found.thread, THREAD)):
-        true = bodies == body
+        true = eye.bodies == body
         assert (mask & true).sum() > 0.6 * true.sum()
         assert (mask & true).sum() > 0.4 * (mask | true).sum()
+
+
+def test_to_the_bundled_network_an_evenly_bright_arc_is_a_highlight():
+    image, bodies = picture()
+    found = Segmenter.load().masks(image)
+    assert (found.needle & (bodies == NEEDLE)).sum() < 0.3 * (bodies == NEEDLE).sum()
     assert not found.driver.any()
 
 
@@ -145,6 +155,31 @@ def test_samples_repeat_themselves_and_keep_masks_and_picture_together():
             grey = crop.astype(float).mean(axis=2)
             differences.append(abs(grey[targets[1] > 0.9].mean() - grey[targets.max(axis=0) == 0].mean()))
     assert np.median(differences) > 8.0
+
+
+def test_highlights_are_no_needle_and_what_they_hide_is_none(monkeypatch):
+    """A bright arc over everything brings no mask, and takes the mask of what lies under it."""
+    image, masks = np.full((CROP, CROP, 3), 0.4, np.float32), np.zeros((3, CROP, CROP), np.float32)
+    masks[0, 90:100] = 1.0
+    random = np.random.default_rng(3)
+    changed, kept = _cluttered(image, masks, random)
+    assert (kept[1:] == 0.0).all() and (kept[0] <= masks[0]).all() and changed.max() > image.max() + 0.1
+    monkeypatch.setattr(segmentation_samples, "_highlight", lambda _: np.ones((CROP, CROP)))
+    hidden = min(_cluttered(image, masks, np.random.default_rng(seed))[1].sum() for seed in range(4))
+    assert hidden == 0.0
+
+
+def test_a_share_of_the_crops_is_about_needles_before_jaws():
+    """Of two stretches of needle, far from each other, one touches a driver."""
+    image, bodies = np.full((800, 800, 3), 128, np.uint8), np.zeros((800, 800), np.uint8)
+    bodies[100:140, 100:104] = bodies[700:740, 700:704] = NEEDLE
+    bodies[100:140, 104:120] = LEFT_DRIVER
+
+    def held(before_jaws: float) -> int:
+        crops = (sample(image, bodies, np.random.default_rng(seed), 0.75, before_jaws)[1] for seed in range(16))
+        return sum(bool((masks[2] > 0.5).any()) for masks in crops)
+
+    assert held(1.0) > held(0.0) + 2
 
 
 def test_the_loss_is_small_for_the_truth_only():
