@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema
 
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import LARGEST_DOCUMENT, LARGEST_INTEGER, check_integers, file_content
 
 
@@ -120,9 +120,7 @@ class Model(BaseModel):
             model.check_read()
             return model
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"]) or "document"
-            raise BadInput(f"{path}: {where:.200}: {first['msg']}", hint=hint) from None
+            raise BadInput(f"{path}: {first_problem(error)}", hint=hint) from None
         except ValueError as error:
             raise BadInput(f"{path}: {error}", hint=hint) from None
 

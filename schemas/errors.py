@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from pydantic import ValidationError
+
 from schemas.plain_text import cleaned
+
+LONGEST_PART = 200
+"""Characters of a place and of a message that are said."""
 
 
 class ScenewrightError(Exception):
@@ -44,3 +49,10 @@ class MachineFailure(ScenewrightError):
     """Disk full, read-only file system, lock held, out of memory or time."""
 
     exit_code = 6
+
+
+def first_problem(error: ValidationError, whole: str = "document") -> str:
+    """Return `place: message` of the first wrong one of values from outside; `whole`: what they are together."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"]) or whole
+    return f"{place:.{LONGEST_PART}}: {str(first['msg']).removeprefix('Value error, '):.{LONGEST_PART}}"

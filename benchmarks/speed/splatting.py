@@ -27,6 +27,7 @@ from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import Picture, Rasterizer, View
 from stages.kit.rendering.splatting.reference import ReferenceRasterizer
 from stages.splat.build_stage import method_of
+from stages.splat.seeding import Seeds
 from stages.splat.training import Trainer
 from stages.splat.views import PosedView
 
@@ -95,7 +96,8 @@ def training_peak(count: int) -> float:
     width, height = MIDDLE[0]
     color, depth = np.full((height, width, 3), 0.5, np.float32), np.full((height, width), 3.0, np.float32)
     flat = replace(gaussians_of(count), harmonics=np.zeros((count, 1, 3), np.float32))
-    method = replace(method_of("ours"), seed=lambda *_: flat, degree_every=1)
+    seeds = Seeds(flat, np.zeros(count, bool))
+    method = replace(method_of("ours"), seed=lambda *_: seeds, degree_every=1)
     trainer = Trainer(method, CompiledRasterizer(), np.random.default_rng(0))
     trainer.add_view(PosedView(0, 0.0, "camera", camera_of(MIDDLE[0]), color, depth, np.eye(4)))
     for _ in range(5):

@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from schemas.edits import FORMAT, AnyEdit, EditsFile
-from schemas.errors import BadInput, MachineFailure
+from schemas.errors import BadInput, MachineFailure, first_problem
 from schemas.outside import LARGEST_SETTINGS, file_text, file_toml
 from schemas.plain_text import UNPRINTABLE
 from stages.kit.digests import sha256_of_file
@@ -31,9 +31,7 @@ def read_edits(path: Path) -> EditsFile:
     try:
         return EditsFile.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        raise BadInput(f"{path}: {where:.200}: {first['msg']:.200}", hint=HINT) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=HINT) from None
 
 
 class Changed(BadInput):

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from schemas.errors import UsageError
+from schemas.errors import UsageError, first_problem
 from stages.engine.discovery import all_stages, stage_by_name
 from stages.kit.configuration import read_toml
 from stages.kit.stage import Stage
@@ -78,8 +78,7 @@ def read_pipeline(path: Path) -> Pipeline:
     try:
         pipeline = Pipeline.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        raise UsageError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}", hint="see docs") from None
+        raise UsageError(f"{path}: {first_problem(error)}", hint="see docs") from None
     done: dict[str, Stage] = {}
     for step in pipeline.step:
         if not _NAME.match(step.name):

@@ -16,7 +16,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from schemas.base import Model
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import file_text, file_toml
 from schemas.vocabulary import Vocabulary, load_vocabulary
 
@@ -148,8 +148,7 @@ def read_label_table(path: Path) -> LabelSet:
     except (KeyError, AttributeError, TypeError, RecursionError) as error:
         raise BadInput(f"{path}: no table of labels ({type(error).__name__}: {error})", hint=hint) from None
     except ValidationError as error:
-        first = error.errors()[0]
-        raise BadInput(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}", hint=hint) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=hint) from None
     except tomllib.TOMLDecodeError as error:
         raise BadInput(f"{path}: {error}", hint=hint) from None
     _check(labels, str(path))

@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import Field, ValidationError, field_validator
 
 from schemas.base import Model
-from schemas.errors import BadInput, ScenewrightError
+from schemas.errors import BadInput, ScenewrightError, first_problem
 from schemas.outside import LARGEST_SETTINGS, file_toml
 from schemas.scene_parts import Box
 from stages.kit.open_words.encoder import checked_text
@@ -57,10 +57,7 @@ def read_asked(path: Path) -> Asked:
     try:
         asked = Asked.model_validate_json(json.dumps(values, default=str))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        message = str(first["msg"]).removeprefix("Value error, ")
-        raise BadInput(f"{path}: {where:.100}: {message:.200}", hint=HINT) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=HINT) from None
     if not asked.there and not asked.absent:
         raise BadInput(f"{path}: nothing is asked", hint=HINT)
     return asked

@@ -16,6 +16,10 @@ from stages.splat.views import PosedView
 DEPTH_ERROR = 0.08
 """Farther apart, over the depth, what is shown and what was measured are two things."""
 
+DENSE = 0.1
+"""Share of a picture with depth from which on it sees through what lies before: a depth camera's. Triangulated points
+are corners, few of them, and each says little of its surroundings."""
+
 
 class Seeds(NamedTuple):
     """Gaussians to add."""
@@ -64,8 +68,11 @@ def filled(depth: np.ndarray) -> np.ndarray:
 
 
 def seen_through(points: np.ndarray, view: PosedView, camera_from_world: np.ndarray) -> np.ndarray:
-    """Return which points (N, 3) [m], in the world, lie before the depth that a view measured there, as (N,) bool."""
-    if view.depth is None:
+    """Return which points (N, 3) [m], in the world, lie before the depth that a view measured there, as (N,) bool.
+
+    None of them do where the view is not DENSE.
+    """
+    if view.depth is None or (view.depth > 0).mean() < DENSE:
         return np.zeros(len(points), bool)
     pixels, depth = project(apply(camera_from_world, points.astype(float)), view.camera)
     height, width = view.depth.shape

@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import Field, ValidationError
 
 from schemas.base import Model
-from schemas.errors import BadInput, UsageError
+from schemas.errors import BadInput, UsageError, first_problem
 
 RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "recipes"
 CLUTTER_FACTOR = {"none": 0.0, "low": 0.5, "medium": 1.0, "high": 2.0}
@@ -119,8 +119,6 @@ def load_recipe(name: str) -> Recipe:
         with file.open("rb") as stream:
             return Recipe(**tomllib.load(stream))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise BadInput(f"{file.name}: {where}: {first['msg']}") from None
+        raise BadInput(f"{file.name}: {first_problem(error)}") from None
     except (ValueError, RecursionError) as error:
         raise BadInput(f"{file.name}: {error}") from None

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import LARGEST_SETTINGS, file_toml
 from schemas.tableware_dishes import DishSize, TablewareDishes, UtensilSize
 from stages.tableware.vision.detections import Detection
@@ -26,10 +26,7 @@ def read_dishes(path: Path) -> TablewareDishes:
     try:
         return TablewareDishes.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        message = str(first["msg"]).removeprefix("Value error, ")
-        raise BadInput(f"{path}: {where:.100}: {message:.200}", hint=HINT) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=HINT) from None
 
 
 def setting_of(dishes: TablewareDishes | None) -> Setting:

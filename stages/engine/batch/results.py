@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from schemas.base import Count, Model, Seed, canonical_json
-from schemas.errors import BadInput, MachineFailure
+from schemas.errors import BadInput, MachineFailure, first_problem
 from schemas.outside import file_content
 from stages.engine.batch.outcomes import Outcome
 
@@ -67,9 +67,8 @@ def parse_line(line: bytes, where: str) -> SceneResult:
     try:
         return SceneResult.model_validate_json(line)
     except ValidationError as error:
-        first = error.errors()[0]
-        part = ".".join(map(str, first["loc"])) or "line"
-        raise BadInput(f"{where}: {part}: {first['msg']}", hint="remove that line; its scene then runs again") from None
+        hint = "remove that line; its scene then runs again"
+        raise BadInput(f"{where}: {first_problem(error, 'line')}", hint=hint) from None
 
 
 def read_results(path: Path) -> list[SceneResult]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from schemas.errors import UsageError
+from schemas.errors import UsageError, first_problem
 from stages.engine.batch.quantities import parse_bytes, parse_seconds, parse_seed_range
 from stages.kit.configuration import read_toml
 
@@ -180,7 +180,4 @@ def check_spec(values: dict[str, Any], path: str) -> BatchSpec:
     try:
         return BatchSpec.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "document"
-        message = first["msg"].removeprefix("Value error, ")
-        raise UsageError(f"{path}: {where}: {message}", hint=HINT) from None
+        raise UsageError(f"{path}: {first_problem(error)}", hint=HINT) from None

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from pydantic import ValidationError
 
 from schemas.base import Model
-from schemas.errors import BadInput, MachineFailure
+from schemas.errors import BadInput, MachineFailure, first_problem
 from schemas.outside import check_integers, file_content
 from stages.kit.language.backend import RawReply, Request, Usage, request_digest
 from stages.kit.language.messages import described
@@ -116,9 +116,7 @@ def _exchange(line: bytes, where: str, hint: str) -> Exchange:
     try:
         exchange = Exchange.model_validate_json(line)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"])) or "line"
-        raise BadInput(f"{where}: {place}: {first['msg']}", hint=hint) from None
+        raise BadInput(f"{where}: {first_problem(error, 'line')}", hint=hint) from None
     try:
         digest = request_digest(list(exchange.messages), exchange.schema_document, exchange.model, exchange.temperature)
     except (ValueError, RecursionError):  # NaN, or a number of thousands of digits, within the schema or a message

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from schemas.errors import BadInput, MissingDependency, UsageError
+from schemas.errors import BadInput, MissingDependency, UsageError, first_problem
 from schemas.outside import file_toml
 from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
 
@@ -159,9 +159,7 @@ def load_robot(robot: str) -> RobotDescription:
     try:
         described = _RobotFile(**values).model_dump()
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise BadInput(f"{path}: {place}: {first['msg']}", hint=HINT) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=HINT) from None
     urdf = folder / described["urdf"]
     if not urdf.is_file():
         urdf = _installed(Path(described["urdf"]))

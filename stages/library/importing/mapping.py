@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from schemas.base import Model
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import file_toml
 from schemas.vocabulary import load_vocabulary
 from stages.library.importing.source_model import SourceModel
@@ -72,9 +72,7 @@ def read_mapping(path: Path) -> Mapping:
     try:
         mapping = Mapping.model_validate(file_toml(path, LARGEST_FILE, hint="see docs/LIBRARY.md"))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise BadInput(f"{path}: {where}: {first['msg']}", hint="see docs/LIBRARY.md") from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint="see docs/LIBRARY.md") from None
     if len(mapping.patterns) > MOST_PATTERNS:
         raise BadInput(f"{path}: more than {MOST_PATTERNS} patterns with * or ?", hint="see docs/LIBRARY.md")
     names = {entry.name for entry in load_vocabulary().classes} | {SKIP, ""}

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from schemas.base import Model, Transform
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import file_json
 from schemas.scene_parts import Camera
 from schemas.tableware_dishes import TablewareDishes
@@ -87,9 +87,7 @@ def read_camera(path: Path) -> CameraFile:
     try:
         return CameraFile.model_validate({key: document[key] for key in CameraFile.model_fields if key in document})
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        raise BadInput(f"{path}: {where}: {first['msg']}", hint=hint) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=hint) from None
 
 
 def _one_of(folder: Path, names: tuple[str, ...]) -> Path | None:

@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from schemas.base import Model
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import file_toml
 
 Layout = Literal["yolo-seg", "instances", "panoptic"]
@@ -67,8 +67,7 @@ def read_sidecar(path: Path) -> Sidecar:
         values = file_toml(path, LARGEST_FILE, hint=hint)
         sidecar = Sidecar.model_validate({k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
     except ValidationError as error:
-        first = error.errors()[0]
-        raise BadInput(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}", hint=hint) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=hint) from None
     except (ValueError, TypeError, RecursionError) as error:
         raise BadInput(f"{path}: {str(error).splitlines()[0]:.120}", hint=hint) from None
     roles = OUTPUTS[sidecar.layout]
