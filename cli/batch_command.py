@@ -5,14 +5,18 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli import output
 from cli.output import say as _say
 from schemas.errors import UsageError
+
+if TYPE_CHECKING:
+    from stages.engine.batch.session import BatchEnd
 
 
 def batch(
@@ -57,6 +61,9 @@ def batch(
         end = session.collect_tasks(read, out)
     elif read.spec.executor.kind == "slurm":
         scripts = session.write_array(read, out, jobs=jobs, force=force, retry=retry)
+        if scripts is None:
+            say("no scene has to run; --retry all runs them again")
+            return _ended(session.collect_tasks(read, out), out, say, json_output)
         say(f"{scripts.scenes} scenes in {scripts.tasks} array tasks; submit them with: {scripts.submit}")
         return _report({"batch": str(out), "submit": str(scripts.submit)}, json_output, 0)
     else:
@@ -64,6 +71,11 @@ def batch(
             end = session.run_batch(
                 read, out, jobs=jobs, force=force, retry=retry, say=say, terminal=sys.stderr.isatty(), quiet=silent
             )
+    return _ended(end, out, say, json_output)
+
+
+def _ended(end: BatchEnd, out: Path, say: Callable[[str], None], json_output: bool) -> int:
+    """Say what became of every scene, and return the exit code of the worst."""
     say(", ".join(f"{count} {name}" for name, count in end.counts().items()))
     scenes = {job.name: end.latest[job.name].model_dump(mode="json") for job in end.jobs if job.name in end.latest}
     return _report({"batch": str(out), "counts": end.counts(), "scenes": scenes}, json_output, end.exit_code)

@@ -6,14 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.experiments.come_robot import MEASURES, Record, of_groups, record_of
+from benchmarks.reporting_seeds import Method, newest
 from benchmarks.tabulation import Figure
 from stages.agent.judging import score
 from stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
 from stages.agent.trials import Setting, run_trial
 from stages.agent.world.failures import Rates
 
-TUNING, REPORTING = (*range(60), 3000, 3001), range(3002, 3102)
-"""Versions 2 and 4 were reported on seeds 3000 and 3001."""
+GROUP = "apartments"
+TUNING = (*range(60), 3000, 3001, 3002)
+"""Versions 2, 4 and 5 were reported on seeds 3000, 3001 and 3002."""
 ARMS = ("open_loop", "thesis", "ours", "oracle")
 IMPOSSIBLE = ("absent_teapot", "high_shelf")
 CASES = tuple(f"{task}/physics" for task in (*THESIS_TASKS, *IMPOSSIBLE))
@@ -50,7 +52,9 @@ EXPERIMENT = Experiment(
     arms={arm: arm for arm in ARMS},
     cases=CASES,
     tuning=tuple(map(str, TUNING)),
-    reporting=tuple(map(str, REPORTING)),
+    reporting=newest(GROUP).seeds,
+    seed_group=GROUP,
+    method=Method(("agent run",), {arm: {} for arm in ARMS}),
     together=lambda trial: (trial.case, trial.seed),
     measure=measure,
     record=Record,

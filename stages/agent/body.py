@@ -48,6 +48,8 @@ class Detection:
     """None: cannot be told from here."""
     radius: float
     """Of its extent over the ground [m]."""
+    whole: bool = True
+    """False where the edge of the picture cuts it: its middle is not known."""
 
 
 @dataclass(frozen=True)

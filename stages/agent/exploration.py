@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from stages.agent.body import Base, Body
@@ -13,11 +15,13 @@ NEAR = 0.5
 """Frontiers this near to where the robot has looked around already, or could not get, are left alone [m]."""
 
 
-def explore(body: Body, scene: SceneMap) -> int:
-    """Drive through everything that can be reached; return the number of stops."""
+def explore(body: Body, scene: SceneMap, until: Callable[[], bool] = lambda: False) -> int:
+    """Drive through everything that can be reached, or until enough is known; return the number of stops."""
     scene.sweep(body)
     left = [(body.base.x, body.base.y)]
     for stop in range(MOST_STOPS):
+        if until():
+            return stop
         goal = _nearest_frontier(body.base, scene, np.array(left))
         if goal is None:
             return stop

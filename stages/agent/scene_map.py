@@ -125,8 +125,12 @@ class SceneMap:
         return self.obstacles.add(sweep)
 
     def _enter(self, seen: SeenFurniture) -> str:
-        known = next((k for k, f in self.furniture.items() if _same_piece(f, seen)), None)
-        key = known or self._name(seen.label)
+        known = [key for key, piece in self.furniture.items() if _same_piece(piece, seen)] or [self._name(seen.label)]
+        key = known[0]
+        for other in known[1:]:  # two ends of one piece, which were seen before its middle
+            del self.furniture[other]
+            for item in self.items.values():
+                item.place = key if item.place == other else item.place
         self.furniture[key] = seen
         return key
 
@@ -159,7 +163,8 @@ class SceneMap:
         no_class_of_its_width = CARRIERS if detection.radius < CARRIES else SMALL
         if not self.careful or detection.label not in no_class_of_its_width:
             item.votes[region] = detection.label
-        item.position = detection.position
+        if detection.whole:
+            item.position = detection.position
         if detection.used is not None:
             item.used_votes[region] = detection.used
         return item
@@ -231,7 +236,9 @@ def _faces(base: Base, piece: SeenFurniture) -> bool:
 
 
 def _one_carries_the_other(item: Item, seen: Detection) -> bool:
-    """Whether one of two is a carrier and the other too narrow to be that."""
+    """Whether one of two is a carrier and the other too narrow to be that, as far as the picture shows all of it."""
+    if not seen.whole and seen.label == item.label:
+        return False
     narrow, wide = sorted((item.radius, seen.radius))
     wider = item.label if item.radius >= seen.radius else seen.label
     return wider in CARRIERS and narrow < UNLIKE * wide

@@ -19,7 +19,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 from pydantic import ValidationError
 
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import file_content, file_json
 from schemas.suture_scene import RigFile
 from stages.suture.masks import EyeMasks, MaskMaker
@@ -73,9 +73,7 @@ def read_rig(path: Path) -> tuple[StereoRig, float]:
     try:
         record = RigFile.model_validate(file_json(path, LARGEST_PICTURE, hint=RIG_HINT), strict=False)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        raise BadInput(f"{path}: {where:.100}: {first['msg']:.200}", hint=RIG_HINT) from None
+        raise BadInput(f"{path}: {first_problem(error)}", hint=RIG_HINT) from None
     camera = record.camera
     if min(camera.fx, camera.fy) <= 0 or abs(camera.fx / camera.fy - 1.0) > SQUARE:
         raise BadInput(

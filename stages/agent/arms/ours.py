@@ -205,26 +205,27 @@ class OwnSkills(CommonSkills):
         return Outcome(False, "no_way", f"no way to {place} was found", {"base_poses": len(poses)})
 
     def _stations(self, place: str, at: Position) -> Iterator[Base]:
-        """Yield base poses that reach a position on furniture, first where the robot stands if that will do."""
+        """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short
+        arm explores until one is known."""
         tried: list[Base] = []
         while len(tried) < TRIES:
-            poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
-            poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off))
-            known = tried + self._remembered(place, at)
-            fresh = [
-                base
-                for _, base in poses
-                if not any(hypot(base.x - b.x, base.y - b.y) < 0.3 for b in known)
-                and (not self._use.reachability or self._body.reaches(base, at))
-            ]
-            if not fresh:
+            fresh = self._fresh(place, at, tried)
+            if fresh is None:
                 if not self._body.short_armed or self._explored:
                     return
-                self._explored = True
-                explore(self._body, self.scene)
+                explore(self._body, self.scene, lambda: self._fresh(place, at, tried) is not None)
+                self._explored = self._fresh(place, at, tried) is None
                 continue
-            tried.append(fresh[0])
-            yield fresh[0]
+            tried.append(fresh)
+            yield fresh
+
+    def _fresh(self, place: str, at: Position, tried: list[Base]) -> Base | None:
+        """Return the nearest base pose that reaches a position and was not tried, nor failed, for it."""
+        poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
+        poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off))
+        known = tried + self._remembered(place, at)
+        apart = (base for _, base in poses if not any(hypot(base.x - b.x, base.y - b.y) < 0.3 for b in known))
+        return next((b for b in apart if not self._use.reachability or self._body.reaches(b, at)), None)
 
     def _there(self, base: Base, place: str) -> bool:
         return base == self._body.base or self.drive(base, place)

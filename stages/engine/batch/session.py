@@ -154,8 +154,8 @@ def run_batch(
 
 def write_array(
     batch: Batch, out: Path, *, jobs: int | None = None, force: bool = False, retry: Retry = "failed"
-) -> Scripts:
-    """Write the scripts of a Slurm job array for what is missing. Raises UsageError when nothing is."""
+) -> Scripts | None:
+    """Write the scripts of a Slurm job array for what is missing; None where nothing is."""
     out, options = absolute(out), batch.spec.executor
     if not isinstance(options, SlurmOptions):
         raise UsageError(f"{batch.path}: executor {options.kind!r} writes no scripts", hint='kind = "slurm"')
@@ -166,7 +166,7 @@ def write_array(
         planned = plan_batch(batch, out, retry=retry, force=force)
         todo = [job for job, reason in planned if reason is not None]
         extra = ["--force"] if force else [] if retry == "failed" else ["--retry", retry]
-        return write_scripts(batch.path, out, todo, options, extra)
+        return write_scripts(batch.path, out, todo, options, extra) if todo else None
 
 
 def run_task(

@@ -113,12 +113,8 @@ def _script(directives: Sequence[str], options: SlurmOptions, command: str) -> s
 def write_scripts(
     spec_path: Path, out: Path, jobs: Sequence[Job], options: SlurmOptions, extra: Sequence[str] = ()
 ) -> Scripts:
-    """Write the job list and the scripts of an array into `out`/slurm; `extra` words go to every task.
-
-    Raises UsageError when there is nothing to run, MachineFailure when the folder cannot be written.
-    """
-    if not jobs:
-        raise UsageError("no scene has to run", hint="--retry all runs them again")
+    """Write the job list and the scripts of an array of at least one job into `out`/slurm; `extra` words go to every
+    task. Raises MachineFailure when the folder cannot be written."""
     folder, tasks = out / FOLDER_NAME, task_count(len(jobs), options)
     words = [sys.executable, "-m", "cli", "batch", str(spec_path), "--out", str(out)]
     base = shlex.join(words)

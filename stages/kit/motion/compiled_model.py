@@ -41,7 +41,7 @@ class CompiledModel:
         """Names of the scene's links, by index of the group."""
         self._group_body: list[str] = []
         self._group_range: dict[str, range] = {}
-        self._bodies: dict[str, int] = {}
+        self._bodies: dict[str, int] | None = None
         self._seen: tuple[int, str | None] = (-1, None)
         self._seen_body: dict[str, int] = {}
         self._rules: tuple[object, ...] | None = None

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from schemas.base import Model
-from schemas.errors import BadInput
+from schemas.errors import BadInput, first_problem
 from schemas.outside import file_toml
 from stages.suture.motion.needle import SWAGE, TIP, from_ends
 
@@ -68,8 +68,7 @@ def perception_model(path: Path) -> PerceptionModel:
     except (BadInput, ValidationError) as error:
         reason = " ".join(str(error).split())[:200]
         if isinstance(error, ValidationError):
-            first = error.errors()[0]
-            reason = f"{'.'.join(str(part) for part in first['loc']) or 'document'}: {first['msg']}"
+            reason = first_problem(error)
         raise BadInput(f"{path}: no perception model ({reason}); see data/stitch/perception_thesis.toml") from error
 
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
 import pytest
 
 from schemas.apartment import Apartment, Furniture, Room, Thing
 from schemas.errors import UsageError
-from stages.agent.body import Base, Sweep
+from stages.agent.body import Base, Body, Detection, SeenFurniture, Sweep
 from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.scene_map import SceneMap
 from stages.agent.tasks import TASKS, make_apartment
 from stages.agent.trials import Setting, open_world
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
+from stages.agent.world.physics.eyes import Surface, fuse
 from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
-from stages.agent.world.physics.head import SeenPiece, steady
+from stages.agent.world.physics.head import SeenPiece, enter, steady
 from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 
 NO_ERRORS = Rates().with_true_eyes()
@@ -33,6 +36,16 @@ APARTMENT = Apartment(
     start=(2.0, 1.575, np.pi / 2),
 )
 ABOVE = (2.0, 2.4, 0.74)
+
+
+class PhysicsBodyStub:
+    """As much of a body as a map asks for."""
+
+    base, clearance, same_thing, enough = Base(0.0, -1.0, 0.0), 2.9, 0.07, 2
+
+
+def table(x: float, width: float) -> SeenFurniture:
+    return SeenFurniture("table", (x, 0.4), (width, 0.75), 0.74, False, False)
 
 
 @pytest.fixture
@@ -173,3 +186,59 @@ def test_what_is_put_into_a_box_does_not_drag_it_along() -> None:
     assert body.bodies["apple_0"].on == "fruit-box_0"
     assert np.hypot(*np.subtract(body.bodies["fruit-box_0"].at, box.at)) < 0.02
     body.close()
+
+
+def test_what_the_hand_holds_is_no_obstacle(body: PhysicsBody) -> None:
+    body.sweep()
+    apple = next(d for d in body.look(ABOVE, close=False).detections if d.label == "apple")
+    assert body.grasp(apple.position, "apple", 0).ok
+    assert body.drive(Base(2.0, 0.8, -np.pi / 2), 1.0, "").ok
+    cells = 0.1 * body.sweep().occupied
+    assert len(cells) and np.hypot(*(cells - (2.0, 0.8)).T).min() > 0.6
+
+
+def test_what_came_apart_is_one_piece_of_furniture() -> None:
+    random = np.random.default_rng(2)
+    top = np.column_stack([random.uniform(0, 1.4, 4000), random.uniform(0, 0.75, 4000), np.full(4000, 0.74)])
+    pieces: list[SeenPiece] = []
+    for part in (top[top[:, 0] < 0.4], top[top[:, 0] > 1.0]):
+        enter(pieces, "table", part)
+    assert len(pieces) == 2
+    enter(pieces, "table", top)
+    enter(pieces, "table", top + (3.0, 0.0, 0.0))
+    assert len(pieces) == 2 and np.allclose(pieces[0].box[1][:2], (1.4, 0.75), atol=0.06)
+
+
+def test_two_ends_of_furniture_become_one_with_the_things_on_it() -> None:
+    scene = SceneMap(cast(Body, PhysicsBodyStub()))
+    for x in (0.2, 1.2):
+        scene.add(Detection("cup", (x, 0.4, 0.76), "blue", None, 0.04), scene._enter(table(x, 0.3)), (0, False))
+    assert len(scene.furniture) == 2
+    assert scene._enter(table(0.7, 1.4)) == "table_0" and list(scene.furniture) == ["table_0"]
+    assert {item.place for item in scene.items.values()} == {"table_0"}
+
+
+def test_what_the_picture_cuts_says_what_it_is_and_not_where() -> None:
+    scene = SceneMap(cast(Body, PhysicsBodyStub()))
+    place = scene._enter(table(0.7, 1.4))
+    box = Detection("toy box", (0.7, 0.4, 0.76), "", None, 0.13)
+    item = scene.add(box, place, (0, False))
+    scene.enter((Detection("toy box", (0.74, 0.42, 0.76), "", None, 0.1, whole=False),), place, lambda _: (1, True))
+    assert item.position == box.position and item.votes[1, True] == "toy box"
+    cut, whole = (
+        Surface("cup", np.random.default_rng(0).uniform(0, 0.05, (50, 3)), np.zeros((50, 3)), "", 0.0, 1, c)
+        for c in (True, False)
+    )
+    assert fuse([cut])[0].cut and not fuse([cut, whole])[0].cut
+
+
+def test_a_thing_with_a_head_is_held_where_it_is() -> None:
+    """A body of which no back was seen, with a smaller ball on one end: over the ball the hand closes on the ball."""
+    random = np.random.default_rng(3)
+    top = np.column_stack([random.uniform((-0.04, -0.025), (0.04, 0.025), (3000, 2)), np.full(3000, 0.045)])
+    away = random.normal(size=(3000, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    ball = np.array([0.02, 0.0, 0.06]) + 0.022 * away
+    points, normals = np.concatenate([top, ball]), np.concatenate([np.tile([0.0, 0.0, 1.0], (3000, 1)), away])
+    first = antipodal_grasps(points, normals, opening=0.08, floor=0.0)[0]
+    assert first[2, 2] < -0.99 and np.hypot(*(first[:2, 3] - (0.02, 0.0))) < 0.01 and first[2, 3] > 0.045

@@ -56,6 +56,13 @@ def test_exploration_finds_all_furniture_without_being_told() -> None:
     assert sorted(f.label for f in scene.furniture.values()) == sorted(f.label for f in apartment.furniture)
 
 
+def test_exploration_ends_when_enough_is_known() -> None:
+    world = FastWorld(make_apartment(TASKS["move_toy"], 3), (), NOTHING_FAILS, 3)
+    scene = SceneMap(world)
+    assert explore(world, scene, lambda: True) == 0 and world.metres == 0
+    assert 0 < explore(world, scene, lambda: len(scene.furniture) >= 3) < explore(world, scene)
+
+
 def test_distances_are_those_of_the_plane_and_go_around_walls() -> None:
     free = np.ones((41, 41), bool)
     found = distances(free, np.ones(free.shape), 20, 20)

@@ -67,9 +67,7 @@ def test_the_command_line_in_the_script_is_quoted(tmp_path: Path) -> None:
     assert not (tmp_path / "x").exists()
 
 
-def test_nothing_to_run_and_wrong_tasks(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no scene has to run"):
-        write_scripts(tmp_path / "spec.toml", tmp_path, [], SlurmOptions(kind="slurm"))
+def test_wrong_tasks(tmp_path: Path) -> None:
     assert parse_task("3/20") == (3, 20)
     for text in ("3", "20/20", "-1/3", "a/b", "1/2/3", ""):
         with pytest.raises(UsageError, match="INDEX/COUNT"):

@@ -10,7 +10,9 @@ from stages.kit.motion.compiled_check import FREE, HIT, find_collision
 from stages.kit.motion.convex_distance import Hull, convex_distance
 from stages.kit.motion.convex_pieces import link_pieces
 from stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
+from stages.kit.simulation.robot import Robot
 from stages.kit.simulation.robot_description import load_robot, mobile_robot_urdf
+from stages.kit.simulation.world import PhysicsWorld
 
 PANDA = load_robot("panda")
 UNIT = np.eye(4)[:3]
@@ -138,3 +140,9 @@ def test_what_may_be_touched_is_not_in_the_way(checker: CollisionChecker) -> Non
     checker.allow()
     _, scene = checker.arrays()
     assert scene.allowed[hand, bottle] == scene.allowed[arm, bottle]
+
+
+def test_in_an_empty_world_all_is_free() -> None:
+    with PhysicsWorld() as world:
+        checker = CollisionChecker(world, Robot(world, PANDA))
+        assert checker.check(np.concatenate([np.zeros(3), PANDA.carry])) is None

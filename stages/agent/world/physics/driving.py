@@ -42,8 +42,8 @@ class Driving:
             if way is None:
                 failed = failed or MotionFailed("no_way", "the obstacle map shows no way there")
                 break
-            if not np.allclose(self._robot.arm, self._robot.description.carry):
-                self._robot.arm_to(self._robot.description.carry)
+            if not np.allclose(self._robot.arm, self._robot.home):
+                self._robot.arm_to(self._robot.home)
             points = [np.array([*point, 0.0]) - self._robot.error for point in way[1:-1]]
             ease = [self._seen.obstacles.at_ease(*point) for point in way[1:-1]]
             turns = (ease, [False] * len(ease), [True] * len(ease))[number % 3]

@@ -62,6 +62,8 @@ class Surface:
     color: str
     stain: float
     views: int
+    cut: bool = False
+    """Whether the edge of the picture cuts it in every view: it may be larger and its middle elsewhere."""
 
     @cached_property
     def low(self) -> np.ndarray:
@@ -93,8 +95,13 @@ def seen_in(picture: Picture, masks: list[Mask], map_from_camera: np.ndarray, ey
         if len(points) < LEAST_POINTS:
             continue
         pixels = picture.color[entry.mask].astype(float) / 255
-        found.append(Surface(entry.label, points, outward(points, eye), color_name(pixels), stain_share(pixels), 1))
+        normals, cut = outward(points, eye), _at_an_edge(entry.mask)
+        found.append(Surface(entry.label, points, normals, color_name(pixels), stain_share(pixels), 1, cut))
     return found
+
+
+def _at_an_edge(mask: np.ndarray) -> bool:
+    return bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
 
 
 def outward(points: np.ndarray, eye: np.ndarray) -> np.ndarray:
@@ -113,8 +120,8 @@ def fuse(pieces: list[Surface]) -> list[Surface]:
     """Return one object for all pieces of a class that overlap, as ConceptGraphs joins what several views show."""
     objects: list[Surface] = []
     for piece in pieces:
-        best = max(range(len(objects)), key=lambda k: _overlap(piece, objects[k]), default=None)
-        if best is None or _overlap(piece, objects[best]) < OVERLAP:
+        best = max(range(len(objects)), key=lambda k: overlap(piece, objects[k]), default=None)
+        if best is None or overlap(piece, objects[best]) < OVERLAP:
             objects.append(piece)
             continue
         other = objects[best]
@@ -125,11 +132,13 @@ def fuse(pieces: list[Surface]) -> list[Surface]:
             other.color,
             max(other.stain, piece.stain),
             other.views + 1,
+            other.cut and piece.cut,
         )
     return objects
 
 
-def _overlap(a: Surface, b: Surface) -> float:
+def overlap(a: Surface, b: Surface) -> float:
+    """Return the share of the smaller cloud that lies within a cell of the other one; 0 for different classes."""
     if a.label != b.label or np.any(a.low > b.high + VOXEL) or np.any(b.low > a.high + VOXEL):
         return 0.0
     small, large = (a, b) if len(a.points) < len(b.points) else (b, a)

@@ -11,20 +11,27 @@ import numpy as np
 FINGER_DEPTH = 0.032
 """How far the tool point goes in behind the front of a thing [m]."""
 FINGER_BAND = 0.011
-"""Half the breadth of a finger tip [m]."""
+"""Half the breadth of a finger tip [m], and how far before and behind the tool point the fingers press."""
+PALM = (0.105, 0.033)
+"""Half the palm's extent along which the fingers close, and across [m]: it comes no nearer than fingers are long."""
 MARGIN = 0.012
 """Room between the open fingers and the thing, both sides together [m]."""
 ENDS = 0.008
 """Points this near to the outermost are where a finger touches [m]."""
-FACES = 0.25
-"""Least mean cosine between normals there and the closing direction on the side that was seen better."""
+FACES = 0.5
+"""Least mean cosine between normals there and the closing direction on the side that was seen better; grasps of which
+neither side was seen come last, across the narrow side first."""
+ALIKE, ALIKE_WIDE = 0.1, 0.006
+"""Cosines, and widths [m], that differ by less are as good as each other."""
 LEAST = 10
 """Points between the fingers."""
 HEADINGS = 16
 PITCHES = (np.pi / 2, 1.1, 0.7)
 """How steeply the hand comes, from above first [rad]."""
-ALIKE = 0.006
-"""Widths that differ by less are as good as each other [m]."""
+HEIGHTS = (0.5, 0.65, 0.8, 0.35)
+"""Shares of the thing's height at which an aslant hand grips it, that of its middle first."""
+OFF = 0.012
+"""Distances from the middle that differ by less are as good as each other [m]."""
 OF_ONE_PITCH = 8
 """Grasps that come equally steeply, at most: where the arm cannot come from above, the others have their turn."""
 ASIDE = 0.3
@@ -34,43 +41,64 @@ TIP_BEFORE = 0.008
 
 
 def antipodal_grasps(points: np.ndarray, normals: np.ndarray, opening: float, floor: float) -> list[np.ndarray]:
-    """Return map_from_tool (4, 4) of grasps of points (N, 3) with normals, from above and narrow ones first.
+    """Return map_from_tool (4, 4) of grasps of points (N, 3) with normals, from above first, where the fingers meet the
+    surface squarely and near the middle of the thing before others: what is held by its end turns.
 
     `opening` of the gripper [m]; `floor` [m]: height of what the thing stands on, over which the finger tips stay.
     """
     low, high = np.percentile(points, 2, axis=0), np.percentile(points, 98, axis=0)
-    middle = (low + high) / 2
     made = []
     for rank, pitch in enumerate(PITCHES):
-        for number in range(HEADINGS):
-            heading = 2 * np.pi * number / HEADINGS
-            approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
-            closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
-            across = np.cross(closing, approach)
-            relative = points - middle
-            between = np.abs(relative @ across) < FINGER_BAND
-            if between.sum() < LEAST:
-                continue
-            along, inward = relative[between] @ closing, normals[between] @ closing
-            first, last = np.percentile(along, [3, 97])
-            width = float(last - first)
-            if width > opening - MARGIN:
-                continue
-            faces = [np.abs(inward[end]).mean() for end in (along < first + ENDS, along > last - ENDS) if end.any()]
-            if max(faces, default=0.0) < FACES:
-                continue
-            depth = relative[between] @ approach
-            front, back = np.percentile(depth, [3, 97])
-            at = middle + min(front + FINGER_DEPTH, (front + back) / 2 + 0.005) * approach
-            at += (first + last) / 2 * closing
-            lowest = floor + 0.004 + TIP_BEFORE * np.sin(pitch)
-            at[2] = max(at[2], lowest)
-            pose = np.eye(4)
-            pose[:3, :3] = np.column_stack([across, closing, approach])
-            pose[:3, 3] = at
-            made.append((rank, round(width / ALIKE), number * 7 % HEADINGS, pose))
-    made.sort(key=lambda entry: entry[:3])
+        deepest = max(high[2] - FINGER_DEPTH, (low[2] + high[2]) / 2 - 0.005)
+        heights = [deepest] if rank == 0 else [low[2] + share * (high[2] - low[2]) for share in HEIGHTS]
+        for height in heights:
+            at = np.array([*_middle_above(points, height), max(height, floor + 0.004 + TIP_BEFORE * np.sin(pitch))])
+            for number in range(HEADINGS):
+                found = _grasp_at(points, normals, at, 2 * np.pi * number / HEADINGS, pitch, opening)
+                if found is not None:
+                    pose, square, width = found
+                    off = round(abs(height - (low[2] + high[2]) / 2) / OFF)
+                    kind = (square < FACES, rank, -round(square / ALIKE), off, round(width / ALIKE_WIDE))
+                    made.append((kind, number * 7 % HEADINGS, pose))
+    made.sort(key=lambda entry: entry[:2])
     return [pose for *_, pose in made]
+
+
+def _middle_above(points: np.ndarray, height: float) -> np.ndarray:
+    """Return the middle (2,) of what was seen of a thing from a height upwards: with its top, since the far one of its
+    sides was not seen, and without what is wider below."""
+    above = points[:, 2] > height - OFF
+    own = points[above, :2] if above.sum() >= LEAST else points[:, :2]
+    return np.percentile(own, [2, 98], axis=0).mean(axis=0)
+
+
+def _grasp_at(
+    points: np.ndarray, normals: np.ndarray, at: np.ndarray, heading: float, pitch: float, opening: float
+) -> tuple[np.ndarray, float, float] | None:
+    """Return map_from_tool (4, 4) with the tool at a point, how squarely the fingers meet the surface, and the width
+    [m] there; None where it is too wide or in the way of the palm."""
+    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
+    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
+    axes = np.column_stack([np.cross(closing, approach), closing, approach])
+    aside, along, depth = ((points - at) @ axes).T
+    way_in = (np.abs(aside) < FINGER_BAND) & (depth < TIP_BEFORE)
+    between = way_in & (depth > -FINGER_BAND)
+    if between.sum() < LEAST:
+        return None
+    shift = np.percentile(along[way_in], [3, 97]).mean()
+    along = along - shift
+    first, last = np.percentile(along[between], [3, 97])
+    under_palm = (np.abs(along) < PALM[0]) & (np.abs(aside) < PALM[1])
+    room = (opening - MARGIN) / 2
+    if np.abs(along[way_in]).max() > room or (under_palm & (depth < -FINGER_DEPTH)).sum() > LEAST:
+        return None
+    facing = np.abs(normals @ closing)
+    ends = [between & (along < first + ENDS), between & (along > last - ENDS)]
+    square = max((float(facing[end].mean()) for end in ends if end.any()), default=0.0)
+    pose = np.eye(4)
+    pose[:3, :3] = axes
+    pose[:3, 3] = at + shift * closing
+    return pose, square, float(last - first)
 
 
 def within_reach(grasps: list[np.ndarray], heading: float) -> list[np.ndarray]:

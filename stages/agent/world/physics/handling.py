@@ -63,8 +63,9 @@ class Handling:
         return Felt(True)
 
     def _see_from_here(self, at: Position) -> None:
-        """Look once more at what will be grasped: what was measured from another stop is off by both stops' errors."""
-        if self._looking.looked_from == self._robot.base:
+        """Look once more at what will be grasped, from near by: what was measured from another stop is off by both
+        stops' errors, and a look at all of a table shows little of each thing's back."""
+        if self._looking.looked_near == (self._robot.base, at):
             return
         before = self._seen.surfaces
         self._looking.look(at, close=True)
@@ -83,7 +84,8 @@ class Handling:
         self._robot.beliefs.hold(None)
         self._robot.beliefs.show(self._seen.boxes())
         piece = self._seen.piece_at(at)
-        floor = self._seen.tops.get(piece, float(surface.low[2])) if piece is not None else float(surface.low[2])
+        measured = self._seen.pieces[piece].measured_top if piece is not None else None
+        floor = float(surface.low[2]) if measured is None else measured
         target = Target(surface, f"thing_{number}", candidate, floor)
         motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, self._robot.random)
         self._robot.grasps += 1
@@ -124,7 +126,7 @@ class Handling:
         """Draw the arm in after a motion that could not be planned or was stopped, with what it holds."""
         if self._robot.hold is not None:
             self._robot.arm = self._robot.measured_arm()
-            self._robot.arm_to(self._robot.description.carry)
+            self._robot.arm_to(self._robot.home)
             return
         self._robot.arm = self._robot.description.carry
         start = Configuration(
@@ -141,7 +143,8 @@ class Handling:
             self._robot.log.done("release", step, False, "", "")
             return Felt(True)
         support = self._seen.support(at)
-        here = Spot((at[0], at[1], support), self._seen.rim(at, support), self._seen.boxes(), self._seen.boxes(at))
+        around, beside = self._seen.boxes(), self._seen.boxes(at)
+        here = Spot((at[0], at[1], support), self._seen.rim(at, support), around, beside, self._seen.beside_on(at))
         try:
             self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -41,6 +41,8 @@ TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 
 SLOW = 0.35
 SAMPLES = 500
 """Of one path search."""
+NESTLES = 0.015
+"""Boxes of round things are so much wider than they are [m]: fruit may lie that near to fruit."""
 HELD = "held"
 """Name of the box of what is in the hand."""
 Box = tuple[np.ndarray, np.ndarray]
@@ -56,6 +58,9 @@ class Hold:
     """Height of the tool point over the foot of what is held [m], the hand as it grasped."""
     rotation: np.ndarray
     """Of the hand then, base frame."""
+    home: np.ndarray
+    """Arm (7,) with which it is carried about: folded, and the hand as upright as it grasped, since what is held above
+    its middle swings between the fingers when they turn."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +175,7 @@ def plan_grasp(
     searches = 2
     for grasp in grasps:
         try:
-            motion = _one_grasp(planner, base, arm, surface, name, grasp, tally)
+            motion = _one_grasp(planner, base, arm, surface, name, grasp, target.floor, tally)
         except MotionFailed as failed:
             tally.failed(failed)
             searches -= 1
@@ -192,6 +197,14 @@ def _inside(surface: Surface) -> np.ndarray:
     return np.all((surface.points > surface.low - slack) & (surface.points < surface.high + slack), axis=1)
 
 
+def _whole(surface: Surface, floor: float) -> Box:
+    """Return the box of a thing, down to where it ends if it is as high as it is wide, or to what it stands on: the
+    lower half of what is round was not seen."""
+    low, high = surface.low.copy(), surface.high
+    low[2] = max(min(low[2], high[2] - (high - low)[:2].min()), min(low[2], floor))
+    return low, high
+
+
 def _one_grasp(
     planner: ArmPlanner,
     base: np.ndarray,
@@ -199,6 +212,7 @@ def _one_grasp(
     surface: Surface,
     name: str,
     map_from_tool: np.ndarray,
+    floor: float,
     tally: Tally,
 ) -> Motion | None:
     beliefs = planner.model
@@ -221,14 +235,23 @@ def _one_grasp(
         return None
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
-    low, high = surface.low, surface.high
+    low, high = _whole(surface, floor)
     box = np.eye(4)
     box[:3, 3] = (low + high) / 2
-    hold = Hold(high - low, inverse(map_from_tool) @ box, float(map_from_tool[2, 3] - low[2]), map_from_tool[:3, :3])
+    hold = Hold(
+        high - low,
+        inverse(map_from_tool) @ box,
+        float(map_from_tool[2, 3] - low[2]),
+        map_from_tool[:3, :3],
+        beliefs.description.carry,
+    )
     beliefs.world.set_pose(name, _far())
     beliefs.hold(hold)
     checker.allow(touch=(HELD,))
-    home = planner.path(base, lift[-1], beliefs.description.carry)
+    folded = planner.folded(base, lift[-1], tally)
+    if folded is not None:
+        hold = replace(hold, home=folded)
+    home = planner.path(base, lift[-1], hold.home)
     return Motion(
         (Segment(whole_body(base, reach), opening), Segment(whole_body(base, approach[::-1]), opening, SLOW)),
         (Segment(whole_body(base, lift), 0.0, SLOW), Segment(whole_body(base, home), 0.0, 0.6)),
@@ -254,6 +277,8 @@ class Spot:
     """All that stands there."""
     beside: dict[str, Box]
     """The same without what covers the spot, which the hand comes down into."""
+    nestled: tuple[str, ...]
+    """What lies beside it on the same carrier: what is held may come down against it."""
 
 
 def plan_release(
@@ -274,8 +299,8 @@ def plan_release(
     foot = hold.foot if hold is not None else 0.0
     beliefs.hold(hold)
     beliefs.robot.set(Configuration(base, arm, opening))
-    beliefs.checker.allow(touch=(HELD,) if hold is not None else ())
     beliefs.show(spot.beside)
+    beliefs.checker.allow((HELD,) if hold is not None else (), dict.fromkeys(spot.nestled, NESTLES))
     heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
     try:
         for turn, tilt in TURNS:

@@ -68,12 +68,20 @@ class SeenPiece:
 
     label: str
     cubes: set[tuple[int, ...]] = field(default_factory=set)
+    measured_top: float | None = None
+    """Height of its top as the wrist camera measured it [m]."""
     _box: tuple[np.ndarray, np.ndarray] | None = None
 
     def add(self, points: np.ndarray) -> None:
         """Enter points (N, 3) of one turn."""
         self._box = None
         self.cubes |= set(map(tuple, np.rint(points / GRAIN).astype(int).tolist()))
+
+    def merge(self, other: SeenPiece) -> None:
+        """Take over what was seen of another one."""
+        self._box = None
+        self.cubes |= other.cubes
+        self.measured_top = other.measured_top if self.measured_top is None else self.measured_top
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
@@ -90,15 +98,25 @@ class SeenPiece:
             self._box = low, high
         return self._box
 
+    @property
+    def top(self) -> float:
+        """Height of its top [m], as well as it is known."""
+        return float(self.box[1][2]) if self.measured_top is None else self.measured_top
+
 
 def enter(pieces: list[SeenPiece], label: str, points: np.ndarray) -> None:
-    """Enter the points of a mask: to the piece of its class that its box overlaps, or as a new piece."""
+    """Enter the points of a mask: to the piece of its class that its box overlaps, or as a new piece. Of several that
+    it overlaps it makes one: what was seen of a table from two doors came apart."""
     low, high = np.percentile(points, 2, axis=0) - 0.1, np.percentile(points, 98, axis=0) + 0.1
-    for piece in pieces:
-        other_low, other_high = piece.box
-        if piece.label == label and np.all(low[:2] < other_high[:2]) and np.all(other_low[:2] < high[:2]):
-            piece.add(points)
-            return
-    fresh = SeenPiece(label)
-    fresh.add(points)
-    pieces.append(fresh)
+    overlapped = [piece for piece in pieces if piece.label == label and _overlap(piece.box, (low, high))]
+    if not overlapped:
+        pieces.append(SeenPiece(label))
+    first, *others = overlapped or pieces[-1:]
+    first.add(points)
+    for other in others:
+        first.merge(other)
+    pieces[:] = [piece for piece in pieces if all(piece is not other for other in others)]
+
+
+def _overlap(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> bool:
+    return bool(np.all(a[0][:2] < b[1][:2]) and np.all(b[0][:2] < a[1][:2]))

@@ -10,16 +10,19 @@ from stages.agent.body import Base, Detection, Look, Position, Sweep
 from stages.agent.scene_map import quarter
 from stages.agent.world.physics import head
 from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Segmenter, Surface, fuse, seen_in
-from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
 from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply, inverse, look_at
+from stages.kit.motion.arm_motion import ArmPlanner, Tally
 from stages.kit.rendering.object_views import take
 
 VIEW = np.array([0.0, -0.9, 0.0, -2.2, 0.0, 2.1, 0.785])
 """Arm that holds the wrist camera over a surface in front, looking down by 45 degrees [rad]."""
 SIDEWAYS = (0.0, -0.5, 0.5)
 """Turns of the first joint for the three wrist poses [rad]."""
+STEEP, OVER = (1.5, 1.3, 1.1), 0.45
+"""How far down the wrist camera looks at a thing from above, the steepest first [rad], and from how far [m]."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
 
@@ -29,7 +32,8 @@ class Looking:
 
     def __init__(self, robot: RobotInRoom, seen: Seen, segmenter: Segmenter, sought: tuple[str, ...]) -> None:
         self._robot, self._seen, self._segmenter, self._sought = robot, seen, segmenter, sought
-        self.looked_from: Base | None = None
+        self.looked_near: tuple[Base, Position] | None = None
+        """From where it looked last from near by, and at what."""
         self.pictures: list[tuple[str, np.ndarray]] = []
         """What the wrist camera took last, for people."""
 
@@ -45,7 +49,7 @@ class Looking:
             pose = look_at(eye, eye + away)
             picture = take(renderer, HEAD, pose, self._robot.random)
             points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
-            there = head.steady(picture.depth).reshape(-1)
+            there = head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points)
             clouds.append(points[there])
             for entry in self._segmenter.furniture(picture, map_from_true @ pose):
                 own = there & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
@@ -58,15 +62,15 @@ class Looking:
         return sweep
 
     def look(self, at: Position, *, close: bool) -> Look:
-        """Look at a surface from three wrist poses and fuse what they show, or at a thing at twice the resolution."""
+        """Look at a surface from three wrist poses and fuse what they show, or at a thing at twice the resolution from
+        in front and from above: of what is seen from one side alone, the middle is not known."""
         sector, piece = quarter(self._robot.base, at), self._seen.piece_at(at)
         toward = atan2(at[1] - self._robot.believed[1], at[0] - self._robot.believed[0]) - self._robot.believed[2]
         toward = (toward + pi) % (2 * pi) - pi
         found: list[Surface] = []
         renderer = None
-        for turn in (0.0,) if close else SIDEWAYS:
-            arm = VIEW.copy()
-            arm[0] = np.clip(toward + turn, -2.7, 2.7)
+        arms = [np.array([np.clip(toward + turn, -2.7, 2.7), *VIEW[1:]]) for turn in ((0.0,) if close else SIDEWAYS)]
+        for arm in arms + (self._arms_over(at) if close else []):
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
@@ -76,17 +80,34 @@ class Looking:
                 self._seen.keep_top(picture, camera, piece)
             masks = self._segmenter.masks(picture, camera, (sector, close))
             found += seen_in(picture, masks, camera, camera[:3, 3])
-            self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{turn:+.1f}", picture.color)]
+            self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
         for name in sorted(self._segmenter.missed):
             if self._robot.room.things[name].label in self._sought:
                 self._robot.log.mistaken("missed", f"look {name}")
         self._segmenter.missed.clear()
-        self.looked_from = self._robot.base
+        self.looked_near = (self._robot.base, at) if close else None
+        found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
         near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
-        old = [s for s in self._seen.surfaces if not self._seen.belongs(s, at, piece, close)]
-        self._seen.surfaces = old + near
+        self._seen.keep(near, at, piece, close)
         return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
+
+    def _arms_over(self, at: Position) -> list[np.ndarray]:
+        """Return the arm that holds the wrist camera as steeply over a position as it gets; none where it does not."""
+        if self._robot.hold is not None:
+            return []
+        self._robot.beliefs.hold(None)
+        self._robot.beliefs.show(self._seen.boxes())
+        base, tally = self._robot.believed, Tally()
+        planner = ArmPlanner(self._robot.beliefs, np.random.default_rng(5), 0)
+        heading = atan2(at[1] - base[1], at[0] - base[0])
+        for pitch in STEEP:
+            ahead = np.array([cos(heading) * cos(pitch), sin(heading) * cos(pitch), -sin(pitch)])
+            tool = look_at(np.array(at) - OVER * ahead, np.array(at)) @ inverse(TOOL_FROM_CAMERA)
+            arm = planner.reachable(base, tool, tally, starts=3)
+            if arm is not None and planner.free(base, arm, tally):
+                return [arm]
+        return []
 
     def _aimed(self, pose: np.ndarray, at: Position, close: bool) -> np.ndarray:
         """Return a camera pose, with the crop of a near look turned to the position that it is of."""
@@ -106,7 +127,7 @@ class Looking:
         low, high, middle = surface.low, surface.high, surface.middle
         radius = float(max(high[0] - low[0], high[1] - low[1]) / 2)
         position = (float(middle[0]), float(middle[1]), float(low[2]) + 0.02)
-        return Detection(surface.label, position, surface.color, used, radius)
+        return Detection(surface.label, position, surface.color, used, radius, not surface.cut)
 
     def look_at_hand(self, view: int) -> Detection | None:
         """See from the head what the hand holds; a view of one state may be misjudged for good."""

@@ -16,7 +16,7 @@ from stages.agent.world.events import EventLog
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.hands import Beliefs, Hold
 from stages.agent.world.physics.room import Room
-from stages.kit.geometry.transforms import inverse
+from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward
 from stages.kit.motion.physical_robot import PhysicalRobot
@@ -29,6 +29,8 @@ from stages.kit.simulation.robot_description import load_robot
 TOOL_FROM_CAMERA = np.array([[0, -1, 0, 0.06], [1, 0, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]], float)
 LOOK_SECONDS = 3.0
 """**Assumed**: of a motion of the arm to a view."""
+ROOM_IN_HAND = 0.04
+"""What is held may have turned or slid so far between the fingers [m]."""
 NEARER = 0.1
 """The arm is shorter than the one of the fast world: it starts so much nearer to a table before it [m]."""
 
@@ -82,6 +84,11 @@ class RobotInRoom:
         """Return the transform (4, 4) of localisation's error."""
         return base_pose(self.believed, self.description) @ inverse(base_pose(self.true_base(), self.description))
 
+    @property
+    def home(self) -> np.ndarray:
+        """Arm (7,) with which it drives."""
+        return self.description.carry if self.hold is None else self.hold.home
+
     def arm_to(self, arm: np.ndarray) -> None:
         """Bring the arm to joint values; with empty hands it is put there."""
         base = self.true_base()
@@ -117,6 +124,14 @@ class RobotInRoom:
             rows = whole_body(base, arms + self.joint_error)
             self.carefully(Segment(rows, segment.opening, segment.pace))
             self.arm = arms[-1]
+
+    def in_hand(self, points: np.ndarray) -> np.ndarray:
+        """Return (N,) bool: points (N, 3) of the map that are of what it believes to hold, or next to it."""
+        if self.hold is None:
+            return np.zeros(len(points), bool)
+        map_from_tool = base_pose(self.believed, self.description) @ forward(self.beliefs.chain, self.arm)
+        own = apply(inverse(map_from_tool @ self.hold.tool_from_box), points)
+        return np.all(np.abs(own) < self.hold.size / 2 + ROOM_IN_HAND, axis=1)
 
     def wrist_poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the wrist camera's pose (4, 4) in truth, and in the map by base and encoders."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from stages.agent.body import Position, SeenFurniture
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.world.physics import head
-from stages.agent.world.physics.eyes import Surface
+from stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
 from stages.agent.world.physics.hands import Box
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.kit.geometry.cameras import back_project
@@ -31,8 +32,6 @@ class Seen:
     def __init__(self, robot: RobotInRoom, clearance: float) -> None:
         self._robot = robot
         self.pieces: list[head.SeenPiece] = []
-        self.tops: dict[int, float] = {}
-        """Piece -> height of its top as the wrist camera measured it [m]."""
         self.surfaces: list[Surface] = []
         self.obstacles = ObstacleMap(robot.base, clearance, COMFORT)
 
@@ -67,7 +66,7 @@ class Seen:
         if len(heights) > 200:
             counts, edges = np.histogram(heights, bins=np.arange(high[2] - 0.08, high[2] + 0.081, 0.005))
             top = edges[counts.argmax()] + 0.0025
-            self.tops[piece] = float(np.median(heights[np.abs(heights - top) < 0.006]))
+            self.pieces[piece].measured_top = float(np.median(heights[np.abs(heights - top) < 0.006]))
 
     def piece_at(self, at: Position) -> int | None:
         """Return the number of the piece at a position, with a hand's breadth around it."""
@@ -89,6 +88,14 @@ class Seen:
             np.all((middle[:2] > low[:2] - 0.05) & (middle[:2] < high[:2] + 0.05)) and middle[2] > high[2] - 0.1
         )
 
+    def keep(self, fresh: list[Surface], at: Position, piece: int | None, close: bool) -> None:
+        """Replace what was known of a piece of furniture, or of where a look from near by was at, by what was seen. Of
+        what is only partly in the picture, what was seen before is kept."""
+        known = [s for s in self.surfaces if self.belongs(s, at, piece, close)]
+        better = {id(s): old for s in fresh if s.cut for old in known if overlap(s, old) > OVERLAP}
+        away = [s for s in self.surfaces if not any(s is old for old in known)]
+        self.surfaces = away + [better.get(id(s), s) for s in fresh]
+
     def boxes(self, without: Position | None = None) -> dict[str, Box]:
         """Return what is around the base in the map; what covers a position is left out."""
         boxes: dict[str, Box] = {}
@@ -96,7 +103,7 @@ class Seen:
             low, high = piece.box
             off = np.maximum(0.0, np.maximum(low[:2] - self._robot.believed[:2], self._robot.believed[:2] - high[:2]))
             if len(piece.cubes) >= head.LEAST and np.hypot(*off) < AROUND:
-                top = min(float(high[2]), self.tops.get(number, float(high[2]))) - 0.004
+                top = min(float(high[2]), piece.top) - 0.004
                 inner = 0.02
                 boxes[f"furniture_{number}"] = (
                     np.array([*(low[:2] + inner), 0.0]),
@@ -111,6 +118,12 @@ class Seen:
                 boxes[f"thing_{number}"] = (low, high)
         return boxes
 
+    def beside_on(self, at: Position) -> tuple[str, ...]:
+        """Return the names, as of `boxes`, of what lies on the thing that covers a position."""
+        carriers = [s for s in self.surfaces if _covers(s, at)]
+        lying = (k for k, s in enumerate(self.surfaces) if any(s is not c and _covers(c, s.middle) for c in carriers))
+        return tuple(f"thing_{k}" for k in lying)
+
     def rim(self, at: Position, support: float) -> float:
         """Return the height [m] of the top of what was seen around a position, `support` where that is nothing."""
         return max([support, *(float(s.high[2]) for s in self.surfaces if _covers(s, at))])
@@ -124,10 +137,10 @@ class Seen:
         piece = self.piece_at(at)
         if piece is None:
             return at[2]
-        return self.tops.get(piece, float(self.pieces[piece].box[1][2]))
+        return self.pieces[piece].top
 
 
-def _covers(surface: Surface, at: Position) -> bool:
+def _covers(surface: Surface, at: Sequence[float] | np.ndarray) -> bool:
     """Whether a position is within the outline of a surface, or a finger's breadth from it."""
     low, high, point = surface.low[:2], surface.high[:2], np.array(at[:2])
     return bool(np.all((point > low - 0.03) & (point < high + 0.03)))
