@@ -42,7 +42,7 @@ NEEDLES = "needles"
 TUNING, REPORTING = tuple(map(str, range(300, 400))), newest(NEEDLES).seeds
 RECORDED = "endoscope"
 FRAMES = 10
-VIEWS = {"empty_pictures": 500, "empty_masks": 500, "needle_pictures": 150, "needle_masks": 500}
+VIEWS = {"empty_pictures": 500, "empty_masks": 100, "needle_pictures": 150, "needle_masks": 100}
 CALIBRATION_ERROR = 0.15
 SEED_OF_CLUTTER = 91
 
