@@ -42,7 +42,7 @@ NEEDLES = "needles"
 TUNING, REPORTING = tuple(map(str, range(300, 400))), newest(NEEDLES).seeds
 RECORDED = "endoscope"
 FRAMES = 10
-VIEWS = {"empty_pictures": 500, "empty_masks": 500, "needle_pictures": 150, "needle_masks": 500}
+VIEWS = {"empty_pictures": 500, "empty_masks": 100, "needle_pictures": 150, "needle_masks": 100}
 CALIBRATION_ERROR = 0.15
 SEED_OF_CLUTTER = 91
 
@@ -173,8 +173,10 @@ EXPERIMENT = Experiment(
     simulated="Needle, thread, drivers, pad, highlights and blood are rendered; masks are the network's, or made of "
     "what is no needle; `endoscope` is recorded.",
     knows="The needle's radius; the rig; no disparity is given.",
-    does_not_show="Needles in real pictures: there are none to be had. The test of presence was fitted on the same "
-    "rendered world; ten frames of one recording are few.",
+    does_not_show="Needles in real pictures: there are none to be had. Highlights and blood are of the kind that the "
+    "network was trained with, drawn by other code in the same rendered world, in which the test of presence was "
+    "fitted too. Ten frames of one recording are few. The aim for false needles is met, that nine of ten visible ones "
+    "be found in pictures is missed.",
     arms={"ours": "ours"},
     cases=(*VIEWS, RECORDED),
     seed_group=NEEDLES,

@@ -36,7 +36,7 @@ from stages.suture.world.tubes import NEEDLE, THREAD
 
 NEEDLES = "needles"
 """Group of the reporting seeds."""
-TUNING, REPORTING = range(450, 550), newest(NEEDLES).seeds[:150]
+TUNING, REPORTING = range(450, 550), newest(NEEDLES).seeds[:100]
 VIEWS, NETWORK = "views", "network"
 ESTIMATORS = {"thesis": thesis_estimate, "ours": estimate}
 MASKS = ("spoiled", "learned")

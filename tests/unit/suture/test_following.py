@@ -9,6 +9,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -98,9 +99,14 @@ def test_with_masks_of_ones_own_a_pair_is_read_once_and_its_pictures_are_not_dec
     masks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A second pair that is lost near is looked at whole in the masks that were read already."""
-    read = []
+    read: list[str] = []
     make = masks_in(masks, (960, 1280), name_of)
-    follower = Follower(TWO_CAMERAS, lambda pair: read.append(pair.name) or make(pair), NEEDLE_RADIUS)
+
+    def noted(pair: Any) -> EyeMasks:
+        read.append(pair.name)
+        return make(pair)
+
+    follower = Follower(TWO_CAMERAS, noted, NEEDLE_RADIUS)
     follower.ready()
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("a picture that nothing is made of was decoded"))
     monkeypatch.setattr(following, "AROUND", -1.0)
