@@ -135,7 +135,8 @@ def _cut_anew(
             kept.append(entity)
     class_id = labelled.class_id.copy()
     class_id[changed] = [class_of.get(number, 0) for number in instance[changed].tolist()]
-    return kept, LabelledSurface(labelled.segment, class_id, instance)
+    lost = np.isin(instance, sorted(set(class_of) - {e.instance for e in kept}))
+    return kept, LabelledSurface(labelled.segment, np.where(lost, 0, class_id), np.where(lost, 0, instance))
 
 
 def _with_pieces(

@@ -43,6 +43,7 @@ TOP = 0.75
 """Quantile of a thing's heights that counts as its top: some of what stands on it may have been named with it."""
 SMALLEST, LEAST_HEIGHT = 0.1, 0.06
 """Extents of a piece [m]."""
+NO_PART = -1
 
 
 def unnamed_pieces(
@@ -72,20 +73,14 @@ def unnamed_pieces(
     parts = _components(points, voxel, None if proposed is None else proposed[members])
     whole = set() if proposed is None else set(parts[proposed[members] > 0].tolist())
     parts, standing = _cut_at_tops(points, normals[members], parts, voxel)
-    names, freed = np.where(room, 0, instance), set()
+    names, part_of, freed = np.where(room, 0, instance), np.full(len(vertices), NO_PART), set()
+    part_of[members] = parts
     for table in sorted(tables):
-        loose = _of_named(points, parts, vertices[names == table])
-        around = np.concatenate([np.flatnonzero(names == table), members[loose]])
-        cut, on_top = _cut_at_tops(vertices[around], normals[around], np.zeros(len(around), int), voxel)
-        first = 1 + int(parts.max(initial=0))
-        freed |= set((first + cut[cut > 0]).tolist())
-        standing |= {first + part for part in on_top if part}
-        part_of = np.full(len(vertices), -1)
-        part_of[members] = parts
-        part_of[around[cut > 0]] = first + cut[cut > 0]
-        names[around[cut > 0]] = 0
-        members = np.flatnonzero(part_of >= 0)
-        points, parts = vertices[members], part_of[members]
+        own, on_top = _cut_from_table(vertices, normals, names, part_of, table, voxel)
+        freed |= own
+        standing |= on_top
+    members = np.flatnonzero(part_of != NO_PART)
+    points, parts = vertices[members], part_of[members]
     for _, top in _tops(vertices, normals, names, voxel):
         if names[top[0]] > 0:
             level, footprint = float(np.median(vertices[top, 2])), _Footprint(vertices[top, :2], voxel)
@@ -96,7 +91,7 @@ def unnamed_pieces(
         left = alone & _of_named(points, parts, thing) & ~np.isin(parts, sorted(freed))
         alone &= ~left
         if name not in tables:
-            of_named[members[left & _touching(points, np.where(left, parts, -1), thing, voxel)]] = name
+            of_named[members[_touching(points, np.where(left, parts, NO_PART), thing, voxel)]] = name
     members, points, parts = members[alone], points[alone], parts[alone]
     parts = _joined(points, normals[members], parts, standing, whole, voxel, minimum_area)
     kept = []
@@ -200,6 +195,21 @@ def _cut_at_tops(
     return result, standing
 
 
+def _cut_from_table(
+    vertices: np.ndarray, normals: np.ndarray, names: np.ndarray, part_of: np.ndarray, table: int, voxel: float
+) -> tuple[set[int], set[int]]:
+    """Make parts, in place, of what rises over the top of a named table, whether its mask took it along or nobody named
+    it: `names` (V,) has 0 there then, `part_of` (V,) new parts. Return these, and those of them that stand on the top.
+    """
+    members = np.flatnonzero(part_of != NO_PART)
+    loose = members[_of_named(vertices[members], part_of[members], vertices[names == table])]
+    around = np.concatenate([np.flatnonzero(names == table), loose])
+    cut, on_top = _cut_at_tops(vertices[around], normals[around], np.zeros(len(around), int), voxel)
+    first, rising = 1 + int(part_of.max(initial=0)), around[cut > 0]
+    part_of[rising], names[rising] = first + cut[cut > 0], 0
+    return set(part_of[rising].tolist()), {first + part for part in on_top if part}
+
+
 def _standing_on(level: float, footprint: _Footprint, points: np.ndarray, parts: np.ndarray) -> set[int]:
     """Return the parts that begin on a level top and lie over it."""
     found = set()
@@ -233,8 +243,8 @@ def _of_named(points: np.ndarray, parts: np.ndarray, thing: np.ndarray) -> np.nd
 
 
 def _touching(points: np.ndarray, parts: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
-    """Return which points (N,) are of parts, -1 for none, that touch a thing (M, 3) and are smaller than it."""
-    of_part = np.flatnonzero(parts >= 0)
+    """Return which points (N,) are of parts that touch a thing (M, 3) and are smaller than it."""
+    of_part = np.flatnonzero(parts != NO_PART)
     near = of_part[cKDTree(thing).query(points[of_part], distance_upper_bound=2.0 * voxel)[0] < 2.0 * voxel]
     names, sizes = np.unique(parts[of_part], return_counts=True)
     return np.isin(parts, np.intersect1d(parts[near], names[sizes < len(thing)]))
