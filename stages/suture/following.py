@@ -10,18 +10,17 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any, TextIO
 
 import cv2
 import numpy as np
-from PIL import Image, UnidentifiedImageError
 from pydantic import ValidationError
 
 from schemas.errors import BadInput, first_problem
 from schemas.outside import file_content, file_json
 from schemas.suture_scene import RigFile
+from stages.kit.formats.image_headers import image_size
 from stages.suture.masks import EyeMasks, MaskMaker
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
@@ -272,8 +271,5 @@ def _decoded(content: bytes) -> np.ndarray | None:
 
 
 def _size_alone(content: bytes) -> np.ndarray | None:
-    try:
-        with Image.open(BytesIO(content)) as picture:
-            return np.empty((picture.height, picture.width, 0), np.uint8)
-    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError):
-        return None
+    size = image_size(content)
+    return None if size is None else np.empty((size[1], size[0], 0), np.uint8)
