@@ -75,7 +75,7 @@ def unnamed_pieces(
     parts, standing = _cut_at_tops(points, normals[members], parts, voxel)
     names, part_of, freed = np.where(room, 0, instance), np.full(len(vertices), NO_PART), set()
     part_of[members] = parts
-    for table in sorted(tables):
+    for table in sorted(set(tables) & set(np.unique(names).tolist())):
         own, on_top = _cut_from_table(vertices, normals, names, part_of, table, voxel)
         freed |= own
         standing |= on_top

@@ -64,7 +64,6 @@ def read_checkpoint(folder: Path, trainer: Trainer, arriving: Sequence[Arrival])
                 arriving, arrays["poses"], arrays["pose_moments"], arrays["pose_steps"], strict=False
             )
         ]
-        trainer.random.bit_generator.state = facts["random"]
         edges = [
             Edge(int(target), int(source), motion, information, bool(switchable))
             for (target, source, switchable), motion, information in zip(
@@ -74,6 +73,7 @@ def read_checkpoint(folder: Path, trainer: Trainer, arriving: Sequence[Arrival])
         tried = [(int(target), int(source)) for target, source in arrays["tried"]]
         before = (arrays["moved"], arrays["pull"], arrays["origins"], arrays["guessed"], edges, tried)
         state = TrainerState(moments, *before, **{name: facts[name] for name in FACTS})
+        trainer.random.bit_generator.state = facts["random"]
         trainer.go_on(gaussians, views, state)
         return [float(loss) for loss in arrays["losses"]]
     except (BadInput, OSError, ValueError, KeyError, TypeError):
