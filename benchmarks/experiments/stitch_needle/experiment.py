@@ -1,7 +1,4 @@
-"""The needle's pose by the thesis's estimator and by ours on the same seeded views. Times are CPU times.
-
-Reporting seeds begin at 2600: those from 1000 on were seen with earlier versions.
-"""
+"""The needle's pose by the thesis's estimator and by ours on the same seeded views. Times are CPU times."""
 
 from __future__ import annotations
 
@@ -12,6 +9,7 @@ import numpy as np
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.views import CASES, observe, run
+from benchmarks.reporting_seeds import Method, newest
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.evaluation.needle_figures import MEASURES as FIGURES
 from stages.suture.needle.drawing import draw_eyes
@@ -19,7 +17,7 @@ from stages.suture.needle.estimate import estimate
 from stages.suture.world.render import render
 from stages.suture.world.sampling import seen_scene
 
-TUNING, REPORTING = range(500), range(2600, 3100)
+TUNING, REPORTING = range(500), newest("needles").seeds
 PICTURED = 4
 BOUNDED = ("within_tolerance", "right_guess", "abstained", "wrong_though_answered")
 
@@ -32,7 +30,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Esti
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The views."""
-    return tuple(map(str, (TUNING if bench.tuning else REPORTING)[: CASES[case].views]))
+    return (tuple(map(str, TUNING)) if bench.tuning else REPORTING)[: CASES[case].views]
 
 
 def defined(figure: Callable[[list[Estimate]], float], interval: bool = False) -> Measure:
@@ -110,7 +108,9 @@ EXPERIMENT = Experiment(
     arms={"thesis": "thesis", "ours": "ours"},
     cases=tuple(CASES),
     tuning=tuple(map(str, TUNING)),
-    reporting=tuple(map(str, REPORTING)),
+    reporting=REPORTING,
+    seed_group="needles",
+    method=Method(("suture needle",), {}),
     seeds_of=seeds_of,
     together=lambda trial: (trial.case, trial.seed),
     measure=measure,

@@ -5,6 +5,7 @@ The start is the true swage. Times are CPU times of one thread.
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 
@@ -15,14 +16,16 @@ import torch
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count
 from benchmarks.experiments.stitch_thread.drawing import panel
 from benchmarks.experiments.stitch_thread.judging import ThreadRecord, judged
+from benchmarks.reporting_seeds import Method, newest
 from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
 from stages.suture.rig import TWO_CAMERAS
+from stages.suture.segmentation.checkpoint import BUNDLED
 from stages.suture.segmentation.infer import Segmenter
 from stages.suture.thread.reconstruct import reconstruct_thread
 from stages.suture.world.sampling import seen_scene
 from stages.suture.world.tubes import THREAD
 
-TUNING, REPORTING = range(100), range(1000, 1100)
+TUNING, REPORTING = range(100), newest("needles").seeds[:100]
 VIEWS, ALL = "views", "thread_all"
 PICTURED = 4
 
@@ -84,7 +87,9 @@ EXPERIMENT = Experiment(
     arms={"true": "true masks", "learned": "learned masks"},
     cases=(VIEWS,),
     tuning=tuple(map(str, TUNING)),
-    reporting=tuple(map(str, REPORTING)),
+    reporting=REPORTING,
+    seed_group="needles",
+    method=Method(("suture thread",), {"learned": {"network": hashlib.sha256(BUNDLED.read_bytes()).hexdigest()[:16]}}),
     together=lambda trial: trial.seed,
     measure=measure,
     record=ThreadRecord,

@@ -1,6 +1,6 @@
 """Whole suture trials in the simulator: table 4.1 (Srinivas 2024), the thesis's arms and ours.
 
-Reporting seeds begin at 1400: those from 1000 on were run with perception or policies before this. `ours_thesis_eyes`
+Reporting seeds begin at 1600: those from 1000 on were run with perception or policies before this. `ours_thesis_eyes`
 has our policies and the thesis's error model of perception, `ours_network_eyes` that of ours from the network's masks,
 `ours_one_at_a_time` never moves both drivers at once, `thesis_other_test` is the thesis with the other reading of its
 handover test; `ours_without_...` (run if asked for) are ours without one mechanism.
@@ -28,7 +28,7 @@ from stages.suture.trials.perception import perception_model
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
 
-TUNING, REPORTING = range(200), range(1400, 1600)
+TUNING, REPORTING = range(200), range(1600, 1800)
 CASE = "trials"
 PAIRS = (PAIRS_OF_ARMS[0], ("ours_one_at_a_time", "thesis"), *PAIRS_OF_ARMS[1:])
 FRAMES = 18
