@@ -3,7 +3,8 @@
 Reporting seeds begin at 1600: those from 1000 on were run with perception or policies before this. `ours_thesis_eyes`
 has our policies and the thesis's error model of perception, `ours_network_eyes` that of ours from the network's masks,
 `ours_one_at_a_time` never moves both drivers at once, `thesis_other_test` is the thesis with the other reading of its
-handover test; `ours_without_...` (run if asked for) are ours without one mechanism.
+handover test; run if asked for are `ours_without_...`, ours without one mechanism, and cases in which one figure of
+ours' error model is another.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ from pathlib import Path
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, statistic
-from benchmarks.experiments.stitch_trials.arms import ARMS, NETWORK_EYES, WITHOUT
+from benchmarks.experiments.stitch_trials.arms import ARMS, CHANGES, WITHOUT, eyes_of
 from benchmarks.tabulation import markdown
 from schemas.suture_trial import SutureRun
 from stages.kit.measurement.bootstrap import Interval
 from stages.kit.stage import Parameters
 from stages.suture.evaluation.trial_figures import KINDS, ratios
 from stages.suture.evaluation.trial_figures import PAIRS as PAIRS_OF_ARMS
+from stages.suture.motion.constants import THROWS
 from stages.suture.options import ARM_NAMES
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import perception_model
@@ -48,11 +50,11 @@ class Run(SutureRun):
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]]:
     """Yield trials."""
-    other = bench.parameters.perception
-    model = perception_model(other) if other else None
     for trial in trials:
         started = time.process_time()
-        seen = perception_model(NETWORK_EYES) if trial.arm == "ours_network_eyes" else model
+        seen = perception_model(bench.parameters.perception or eyes_of(trial.arm))
+        if trial.case in CHANGES:
+            seen = CHANGES[trial.case](seen)
         outcome = run_trial((ARMS | WITHOUT)[trial.arm], int(trial.seed), model=seen)
         spent = time.process_time() - started
         yield trial, Run(**run_of(trial.arm, int(trial.seed), outcome).model_dump(), cpu_seconds=spent)
@@ -86,7 +88,7 @@ def more_figures(results: Results) -> dict[str, float | Interval | None]:
 def notes(results: Results) -> str:
     """What ended trials, and what the thesis prints."""
     counted: dict[tuple[str, str, str], int] = {}
-    for arm in results.arms():
+    for arm in results.arms(CASE):
         for run in results.of(arm, CASE):
             for kind, reason in zip(run.errors, run.reasons, strict=True):
                 at = arm, kind, "slack stays in the stitch" if "mm of slack" in reason else reason
@@ -126,6 +128,8 @@ def pictures(results: Results) -> None:
     from stages.suture.evaluation.plots import histogram
     from stages.suture.trials.drawing import draw_strip
 
+    if CASE not in results.cases:
+        return
     out, recorder = results.bench.out, Recorder()
     histogram(out / "sutures.png", [run for arm in ARM_NAMES for run in results.of(arm, CASE)])
     run_trial(ARMS["ours"], int(results.seeds(CASE)[0]), recorder=recorder)
@@ -141,7 +145,9 @@ EXPERIMENT = Experiment(
     does_not_show="A gain on tissue. The time of a network is not in the time that a look of ours takes.",
     arms={arm: arm for arm in (*ARMS, *WITHOUT)},
     default_arms=lambda bench: tuple(ARMS),
-    cases=(CASE,),
+    cases=(CASE, *CHANGES),
+    default_cases=lambda bench: (CASE,),
+    runs=lambda arm, case: case == CASE or arm == "ours",
     tuning=tuple(map(str, TUNING)),
     reporting=tuple(map(str, REPORTING)),
     measure=measure,
@@ -151,7 +157,8 @@ EXPERIMENT = Experiment(
         "sutures_to_failure_neutral": mean("sutures_neutral"),
         "single_suture_rate": over(lambda run: run.sutures, lambda run: run.attempts),
         "three_throw_rate": rate(lambda run: run.sutures >= 3),
-        "full_wound_rate": rate(lambda run: run.sutures >= 6),
+        "full_wound_rate": rate(lambda run: run.sutures >= THROWS),
+        "closed_share": over(lambda run: run.sutures / THROWS, lambda run: 1.0),
         "seconds_per_suture": over(lambda run: run.seconds, lambda run: run.attempts),
         "seconds_per_completed": over(lambda run: run.seconds, lambda run: run.sutures),
         "sutures_to_intervention": over(lambda run: run.sutures, lambda run: run.interventions),
@@ -163,7 +170,7 @@ EXPERIMENT = Experiment(
     more_figures=more_figures,
     parameters=TrialsParameters,
     places=frozenset({"perception"}),
-    inputs=lambda bench, trial: [bench.parameters.perception] if bench.parameters.perception else [],
+    inputs=lambda bench, trial: [bench.parameters.perception or eyes_of(trial.arm)],
     quick_seeds=10,
     notes=notes,
     pictures=pictures,
