@@ -8,10 +8,12 @@ import cv2
 import numpy as np
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
-from benchmarks.experiments.stitch_needle.views import CASES, observe, run
+from benchmarks.experiments.stitch_needle.views import CASES, TWO_CAMERAS_NOISE, observe, run
 from benchmarks.reporting_seeds import Method, newest
+from stages.kit.drawing.plots import STYLE, plt, save
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.evaluation.needle_figures import MEASURES as FIGURES
+from stages.suture.evaluation.plots import COLORS
 from stages.suture.needle.drawing import draw_eyes
 from stages.suture.needle.estimate import estimate
 from stages.suture.world.render import render
@@ -85,9 +87,32 @@ SUBCASES = {
 """Names without an ending are of the rendered form; `_geometry` and `_endoscope` say the other forms."""
 
 
+def noise_curve(results: Results) -> None:
+    """Draw the share of right poses by the disparity's noise, with its intervals, in noise.png."""
+    levels = {TWO_CAMERAS_NOISE: "needle_visible_geometry"}
+    levels |= {CASES[case].disparity_noise: name for name, (case, _) in SUBCASES.items() if "noise" in case}
+    drawn = sorted((noise, name) for noise, name in levels.items() if name in results.cases)
+    if len(drawn) < 2:
+        return
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(5.4, 3.2))
+        for arm in results.arms():
+            found = [(noise, results.interval(arm, name, "within_tolerance")) for noise, name in drawn]
+            known = [(noise, at.low, at.value, at.high) for noise, at in found if at is not None]
+            noises, low, middle, high = np.array(known).T
+            axes.fill_between(noises, low, high, color=COLORS[arm], alpha=0.2, linewidth=0)
+            axes.plot(noises, middle, "o-", color=COLORS[arm], label=arm)
+        axes.set_xlabel("noise of the disparity [px]")
+        axes.set_ylabel("right")
+        axes.set_ylim(0.0, 1.0)
+        axes.legend(fontsize=8)
+        save(figure, results.bench.out / "noise.png")
+
+
 def pictures(results: Results) -> None:
-    """Draw both eyes about the needle in needles.png: truth green, ours yellow (red where it abstained) with the tip
-    ringed and the 95 % ellipses of both ends, the mask's outline white."""
+    """Draw noise.png, and both eyes about the needle in needles.png: truth green, ours yellow (red where it abstained)
+    with the tip ringed and the 95 % ellipses of both ends, the mask's outline white."""
+    noise_curve(results)
     case, rows = CASES["rendered"], []
     for seed in map(int, results.seeds("needle_all")[:PICTURED]):
         view = render(seen_scene(seed, case.rig, calibration_error=case.calibration_error)[0])
