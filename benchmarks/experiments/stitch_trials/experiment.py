@@ -24,7 +24,6 @@ from stages.kit.stage import Parameters
 from stages.suture.evaluation.trial_figures import KINDS, ratios
 from stages.suture.evaluation.trial_figures import PAIRS as PAIRS_OF_ARMS
 from stages.suture.motion.constants import THROWS
-from stages.suture.options import ARM_NAMES
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import perception_model
 from stages.suture.trials.recording import Recorder
@@ -40,6 +39,8 @@ PAIRS = (
     *PAIRS_OF_ARMS[1:],
 )
 FRAMES = 18
+DRAWN = ("sensing_only", "thread_handling", "thesis", "ours_thesis_eyes", "ours_network_eyes", "ours")
+"""Arms of the histogram."""
 PRINTED_TRIALS = 15
 PRINTED_MEASURES = (
     "sutures_to_failure",
@@ -143,7 +144,7 @@ def pictures(results: Results) -> None:
     if CASE not in results.cases:
         return
     out, recorder = results.bench.out, Recorder()
-    histogram(out / "sutures.png", [run for arm in ARM_NAMES for run in results.of(arm, CASE)])
+    histogram(out / "sutures.png", [run for arm in DRAWN for run in results.of(arm, CASE)])
     run_trial(ARMS["ours"], int(results.seeds(CASE)[0]), recorder=recorder)
     recorder.write(out / "frames.npz")
     draw_strip(out / "strip.png", recorder.arrays(), most=FRAMES)
