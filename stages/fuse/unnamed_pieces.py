@@ -33,6 +33,9 @@ SHADOW = 0.15
 """Gaps in a level top this wide are of it: what stands there hides it [m]."""
 STACKED_SHARE, STACKED_GAP = 0.5, 0.35
 """Pieces above each other with this share of the smaller footprint in common, and this gap at most [m], are one."""
+LEAST_RISE = 0.75
+"""What is so many voxels over a level top is of what lies on it; the highest quarter of that is a voxel over it."""
+BENDING_STEPS = 5
 FEWEST = 50
 """Vertices of a part that is looked at, and of a thing on a level top."""
 SCRAP_SHARE, SCRAP_DISTANCE = 0.25, 0.1
@@ -170,11 +173,13 @@ def _cut_at_tops(
         level, footprint = float(np.median(points[top, 2])), _Footprint(points[top, :2], voxel)
         own = np.flatnonzero(result == part)
         over, inside = points[own, 2] - level, footprint.holds(points[own])
-        above = own[inside & ((over > RISE) | ((over > voxel) & (normals[own, 2] < LEVEL)))]
+        rise = _over_top(points[own], points[top], voxel)
+        risen = inside & (rise > LEAST_RISE * voxel)
+        above, rise = own[risen], rise[risen]
         component = _components(points[above], voxel)
         for number in np.flatnonzero(np.bincount(component, minlength=1) >= FEWEST):
             thing = above[component == number]
-            if np.ptp(points[thing, 2]) >= LEAST_HEIGHT - voxel:
+            if np.quantile(rise[component == number], TOP) > voxel:
                 result[thing] = after
                 standing.add(after)
                 after += 1
@@ -193,6 +198,23 @@ def _cut_at_tops(
             after += 1
         standing |= _standing_on(level, footprint, points, result)
     return result, standing
+
+
+def _over_top(points: np.ndarray, top: np.ndarray, voxel: float) -> np.ndarray:
+    """Return how high points (N, 3) are over a level top (M, 3) that may be bent, and may have some of what lies on it
+    among its points [m]: over the quadric of most of them."""
+    middle, level = np.median(top[:, :2], axis=0), float(np.median(top[:, 2]))
+
+    def terms(ground: np.ndarray) -> np.ndarray:
+        x, y = (ground - middle).T
+        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+
+    columns, height = terms(top[:, :2]), top[:, 2] - level
+    kept = np.abs(height) < 2 * voxel
+    for _ in range(BENDING_STEPS):
+        shape = np.linalg.lstsq(columns[kept], height[kept], rcond=None)[0]
+        kept = np.abs(height - columns @ shape) < voxel / 2
+    return points[:, 2] - level - terms(points[:, :2]) @ shape
 
 
 def _cut_from_table(
