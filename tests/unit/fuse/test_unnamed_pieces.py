@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from stages.fuse.unnamed_pieces import FLOOR, unnamed_pieces
+from stages.fuse.unnamed_pieces import FLOOR, TOLD, unnamed_pieces
 from stages.fuse.walls import of_walls
 from stages.kit.geometry.point_clouds import vertex_normals
 
@@ -57,13 +57,14 @@ def of_instances(
     area: float = 0.05,
     proposed: np.ndarray | None = None,
     tables: tuple[int, ...] = (),
+    told: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     vertices, faces, owner = scene
     normals = vertex_normals(vertices, faces)
     walls = of_walls(vertices, normals, (instance == 0) & (vertices[:, 2] > FLOOR), VOXEL)
     room = walls | (owner == 0)
     return unnamed_pieces(
-        vertices, normals, instance, room, voxel=VOXEL, minimum_area=area, proposed=proposed, tables=tables
+        vertices, normals, instance, room, voxel=VOXEL, minimum_area=area, proposed=proposed, tables=tables, told=told
     )
 
 
@@ -156,6 +157,9 @@ def test_what_a_mask_took_with_a_table_is_cut_from_it() -> None:
     assert of_part(piece, owner, 2) == 0 and 0 < chair != thing > 0
     assert of_part(piece, owner, 3) == chair, "the seat goes with the back"
     assert (own[owner == 2] == 7).mean() > 0.9 and not own[piece > 0].any()
+    shelf = np.where(owner == 5, TOLD, 0.0)  # what nearly all views had in the table's mask is a shelf over it
+    piece, own = of_instances(scene, instance, tables=(7,), told=shelf)
+    assert (own[owner == 5] == 7).all() and of_part(piece, owner, 4) > 0
 
 
 def test_a_leaf_that_touches_is_of_the_named_thing() -> None:
