@@ -19,8 +19,9 @@ from stages.cad.candidates import Shortlist, shortlist
 from stages.cad.method import CadMethod
 from stages.cad.target import Target
 
-TRIED, LARGEST_MISFIT = 3, 0.06
-"""Classes whose models are fitted, of those that are less than this off before the fit [m]."""
+TRIED, LARGEST_MISFIT = 2, 0.035
+"""Classes whose models are fitted, of those that are less than this off before the fit [m]; another one, where one of
+these names the thing: rivals have to be worse."""
 LEAST_SIZE, LARGEST_SIZE, ALIKE = 0.6, 1.4, 2
 """Models are looked at of whose extents so many are about as large as those of what was seen, as shares of them: the
 third may be hidden, or added to by an open door."""
@@ -56,17 +57,19 @@ def renamed(graph: ContactGraphFile, shortlists: Mapping[str, Shortlist]) -> Con
 
 
 def by_class(target: Target, models: Iterable[CadModel], method: CadMethod) -> list[Shortlist]:
-    """Return shortlists that are not empty, a class each, the best first: of the `TRIED` classes whose models are least
-    off where their planes put them, the thing's own left out."""
+    """Return shortlists that are not empty, a class each, the best first: of the classes whose models are least off
+    where their planes put them, the thing's own left out."""
     classes: dict[str, list[CadModel]] = {}
     for model in models:
         if model.class_name not in (UNNAMED, target.node.class_name):
             classes.setdefault(model.class_name, []).append(model)
     targets = [of_class(target, name, own) for name, own in sorted(classes.items())]
     misfits = [(method.misfit(each), place) for place, each in enumerate(targets)]
-    promising = [targets[place] for misfit, place in sorted(misfits)[:TRIED] if misfit < LARGEST_MISFIT]
-    found = [entry for entry in (shortlist(each, method) for each in promising) if entry.placements]
-    return sorted(found, key=lambda entry: entry.placements[0].score)
+    promising = [targets[place] for misfit, place in sorted(misfits) if misfit < LARGEST_MISFIT]
+    found = [shortlist(each, method) for each in promising[:TRIED]]
+    if not all(is_doubtful(entry, method) for entry in found):
+        found += [shortlist(each, method) for each in promising[TRIED : TRIED + 1]]
+    return sorted((entry for entry in found if entry.placements), key=lambda entry: entry.placements[0].score)
 
 
 def of_class(target: Target, class_name: str, models: list[CadModel]) -> Target:
