@@ -289,12 +289,9 @@ class RulesBrain:
             if step is not None:
                 return step
         missing = [t for t in self._lost for g in goals if self._is_missed(t, g)]
-        if missing and self._failed["lost", missing[0].key] < MOST_FAILURES:
-            self._failed["lost", missing[0].key] += 1
-            place = missing[0].place
-            if self._at != place and place in self._rooms:
-                return self._step(Step("navigate", place))
-            return self._look(f"Where is {missing[0].key}?")
+        where = self._where_is(missing)
+        if where is not None:
+            return where
         if missing:
             raise _GiveUp(f"{missing[0].key} got lost on the way")
         for goal in goals:
@@ -330,6 +327,16 @@ class RulesBrain:
     def _is_missed(self, thing: SceneObject, goal: Goal) -> bool:
         every = isinstance(goal, Gather) or (isinstance(goal, Move) and goal.every)
         return every and self._moves(goal).fits(thing.label, thing.color, thing.used)
+
+    def _where_is(self, missing: list[SceneObject]) -> Reply | None:
+        """Look once more where the first of some things got lost; None where that was done often enough."""
+        if not missing or self._failed["lost", missing[0].key] >= MOST_FAILURES:
+            return None
+        self._failed["lost", missing[0].key] += 1
+        place = missing[0].place
+        if self._at != place and place in self._rooms:
+            return self._step(Step("navigate", place))
+        return self._look(f"Where is {missing[0].key}?")
 
     @staticmethod
     def _moves(goal: Goal) -> Description:
@@ -452,6 +459,9 @@ class RulesBrain:
         """Look where nobody looked yet, tables first, what has doors last; from other sides after that."""
         if self._held is not None and self._explored:
             raise _GiveUp(f"no {what.text} was found to put it on")
+        where = self._where_is([t for t in self._lost if what.fits(t.label, t.color, t.used)])
+        if where is not None:
+            return where
         for thing in self._things.values():
             doubtful = self._style.skilled and what.clean and thing.label in what.labels and thing.used
             if doubtful and self._failed["picture", thing.key] < MOST_FAILURES - 1:
