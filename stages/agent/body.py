@@ -141,8 +141,9 @@ class Body(Protocol):
         """What the hand holds as seen from one of the wrist's views; None: nothing. The same view says the same."""
         ...
 
-    def reaches(self, base: Base, at: Position) -> bool:
-        """Whether a collision-free arm pose at the position exists in the robot's own map, from a base pose."""
+    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+        """Whether a collision-free arm pose at the position exists in the robot's own map, from a base pose; to `take`
+        what is there a grasp of what was seen of it, where the map holds shapes."""
         ...
 
     def grasp(self, at: Position, label: str, candidate: int) -> Felt:

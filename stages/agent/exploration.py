@@ -15,8 +15,8 @@ NEAR = 0.5
 """Frontiers this near to where the robot has looked around already, or could not get, are left alone [m]."""
 
 
-def explore(body: Body, scene: SceneMap, until: Callable[[], bool] = lambda: False) -> int:
-    """Drive through everything that can be reached, or until enough is known; return the number of stops."""
+def explore(body: Body, scene: SceneMap, until: Callable[[], object] = lambda: None) -> int:
+    """Drive through everything that can be reached, or until something is found; return the number of stops."""
     scene.sweep(body)
     left = [(body.base.x, body.base.y)]
     for stop in range(MOST_STOPS):

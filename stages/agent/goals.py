@@ -9,7 +9,8 @@ TOYS = ("doll", "teddy", "duck", "toy car")
 CATEGORIES = {"fruit": FRUIT, "toy": TOYS}
 """What every child knows: a word for several classes."""
 FURNITURE = ("table", "bed", "sofa", "shelf", "fridge", "dresser", "desk", "cabinet")
-CARRIERS = ("plate", "fruit box", "toy box")
+BOXES = ("fruit box", "toy box")
+CARRIERS = ("plate", *BOXES)
 """Small things on which others are put."""
 SMALL = (*FRUIT, *TOYS, "cup", "bottle", "can", "spoon", "sponge")
 THINGS = (*FRUIT, *TOYS, *CARRIERS, "cup", "bottle", "can", "spoon", "sponge", "book", "teapot", "bowl", "box")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from math import atan2, hypot, pi
 
 from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sweep
-from stages.agent.goals import CARRIERS, SMALL
+from stages.agent.goals import BOXES, CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
 from stages.kit.rendering.segmenter_errors import quarter_turn
@@ -17,14 +17,17 @@ SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
 IN_FRONT = 0.7
 """Furniture whose edge is this near to the base is in front of it [m]."""
-SURE = 0.8
-"""A thing is taken to be on a small carrier within this share of its radius: nearer to the rim it may lean on it."""
+SURE, IN_BOX = 0.8, 0.95
+"""A thing is taken to be on a small carrier within this share of its radius: nearer to the rim it may lean on it. A box
+has corners: in one it is within that share along both sides, and within the second over the diagonal."""
 UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
 TWICE = 0.5
 """Within this share of the distance of one thing a second detection of one look is of it as well."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
+FLOOR, PATCH = "floor", 0.1
+"""What the floor under a thing is called, and its edge [m]."""
 Region = tuple[int | str, bool]
 """Quarter turn (or `hand`, or `map`) from which something was seen, and whether from near by."""
 MAPPED: Region = ("map", False)
@@ -134,9 +137,15 @@ class SceneMap:
         self.furniture[key] = seen
         return key
 
+    def patch(self, at: Position) -> str:
+        """Enter the floor under a thing that lies there, as what a base stands before; return its key."""
+        key = self._name(FLOOR)
+        self.furniture[key] = SeenFurniture(FLOOR, at[:2], (PATCH, PATCH), 0.0, False, False)
+        return key
+
     def in_front(self, base: Base) -> str:
         """Return the key of the furniture before a base pose, rather what it faces; or nothing."""
-        near = [(edge_distance(f, base.x, base.y), key, f) for key, f in self.furniture.items()]
+        near = [(edge_distance(f, base.x, base.y), key, f) for key, f in self.furniture.items() if f.label != FLOOR]
         near = [entry for entry in near if entry[0] <= IN_FRONT]
         return min(((not _faces(base, f), gap, key) for gap, key, f in near), default=(False, 0.0, ""))[2]
 
@@ -160,8 +169,7 @@ class SceneMap:
         return item
 
     def _vote(self, detection: Detection, item: Item, region: Region) -> Item:
-        no_class_of_its_width = CARRIERS if detection.radius < CARRIES else SMALL
-        if not self.careful or detection.label not in no_class_of_its_width:
+        if not self.careful or detection.label not in classes_not_of(detection.radius):
             item.votes[region] = detection.label
         if detection.whole:
             item.position = detection.position
@@ -197,7 +205,7 @@ class SceneMap:
     def at_carrier(self, position: Position, place: str) -> str:
         """Return the key of the small carrier of a place that is at a position, or nothing."""
         carriers = (item for item in self.items.values() if item.label in CARRIERS and item.place == place)
-        return next((c.key for c in carriers if _apart(c.position, position) <= SURE * c.radius), "")
+        return next((c.key for c in carriers if _well_on(c, position)), "")
 
     def scene_object(self, key: str) -> SceneObject:
         """Return a thing or piece of furniture as programs see it."""
@@ -211,7 +219,7 @@ class SceneMap:
 
     def global_map(self) -> ObjectMap:
         """Return the furniture."""
-        return ObjectMap(tuple(map(self.scene_object, self.furniture)))
+        return ObjectMap(tuple(self.scene_object(key) for key, f in self.furniture.items() if f.label != FLOOR))
 
     def local_map(self, place: str) -> ObjectMap:
         """Return the things of a place."""
@@ -225,6 +233,11 @@ class SceneMap:
         name = f"{label.replace(' ', '_')}_{self._named[label]}"
         self._named[label] += 1
         return name
+
+
+def classes_not_of(radius: float) -> tuple[str, ...]:
+    """Return the classes that a thing of a radius [m] is too narrow or too wide for."""
+    return CARRIERS if radius < CARRIES else SMALL
 
 
 def _faces(base: Base, piece: SeenFurniture) -> bool:
@@ -246,6 +259,14 @@ def _one_carries_the_other(item: Item, seen: Detection) -> bool:
 
 def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     return hypot(a[0] - b[0], a[1] - b[1])
+
+
+def _well_on(carrier: Item, at: Position) -> bool:
+    """Whether a position is within a small carrier, away from its rim."""
+    x, y = (abs(p - c) for p, c in zip(at[:2], carrier.position[:2], strict=True))
+    if carrier.label in BOXES:
+        return max(x, y) <= SURE * carrier.radius and hypot(x, y) <= IN_BOX * carrier.radius
+    return hypot(x, y) <= SURE * carrier.radius
 
 
 def _same_piece(a: SeenFurniture, b: SeenFurniture) -> bool:

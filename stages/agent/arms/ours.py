@@ -8,16 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import hypot
 
+import numpy as np
+
 from schemas.plan import Failure
+from stages.agent.arms.next_view import ahead_of, best_floor_view, fallen_where, floor_seen, worth
 from stages.agent.arms.skills import CommonSkills
-from stages.agent.arms.stations import around, drivable, other_sides
-from stages.agent.body import Base, Body, Position
+from stages.agent.arms.stations import around, corners, drivable, other_sides
+from stages.agent.body import Base, Body, Detection, Position
 from stages.agent.exploration import explore
 from stages.agent.goals import CARRIERS
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
-from stages.agent.scene_map import Item, quarter
+from stages.agent.scene_map import Item, Region, classes_not_of, quarter
 
 SURE_OF_USE = 2
 """Regions of views by which a thing has to be ahead in being clean or used."""
@@ -32,9 +36,17 @@ AWAY = 0.1
 """Of what was placed from its spot, at most [m]."""
 OFF_SPOT = 0.05
 """Spots this near to one that something rolled off are not tried again [m]."""
+SAME_POSE = 0.15
+"""Base poses this near to one that could not be driven to are left alone [m]."""
 SAME_TARGET = 0.1
 """A base pose that failed for one position fails for those this near [m]."""
 HAND_VIEWS = 3
+FLOOR_VIEWS, FLOOR_AT = 4, 1.2
+"""Looks at the floor for what fell, and how far before the base they are at [m]."""
+LITTLE = 0.1
+"""No look is taken that shows less of where it may lie."""
+ON_FLOOR = 0.2
+"""Lower things lie on the floor [m]."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +67,21 @@ class Mechanisms:
     """What is not found is looked for from other sides, and `every` counts only after that."""
 
 
+@dataclass(frozen=True)
+class Lost:
+    """A thing that was let go or slipped at a spot of its place and was not seen there after that."""
+
+    item: Item
+    spot: Position
+    known: frozenset[str]
+    """Keys of what was on the map then."""
+
+    @property
+    def classes(self) -> set[str]:
+        """What some view took it for."""
+        return {vote for vote in self.item.votes.values() if vote}
+
+
 class OwnSkills(CommonSkills):
     """Arms `ours` and `oracle`."""
 
@@ -68,6 +95,11 @@ class OwnSkills(CommonSkills):
         """Spots from which something rolled off."""
         self._stood: dict[str, list[Base]] = {}
         """Furniture -> base poses from which it was looked at, as it is now."""
+        self._blocked: list[Base] = []
+        """Base poses that could not be driven to."""
+        self._missing: list[Lost] = []
+        self._patches: dict[str, str] = {}
+        """Floor under what fell -> furniture that it fell from."""
         self._explored = False
         self._told: set[str] = set()
         """Things of which the brain was told that they may be something else: it is done if it asks again."""
@@ -89,7 +121,9 @@ class OwnSkills(CommonSkills):
             for item in [i for i in self.scene.items.values() if i.place == place]:
                 if again or len(set(item.votes.values())) > 1:
                     self._confirm(item)
-        return self.scene.local_map(place)
+        if self._use.repair:
+            self._look_on_floor(place)
+        return ObjectMap(tuple(self.scene.scene_object(i.key) for i in self._lying_at(place)))
 
     def picture_of_hand(self) -> Observation:
         """What two of three views agree on."""
@@ -134,10 +168,8 @@ class OwnSkills(CommonSkills):
     def _see_all_of(self, place: str) -> None:
         """Look from further sides until every corner of furniture was in sight from two regions of views: where an end
         of a long table was looked at from one region alone, nothing there is no evidence."""
-        piece = self.scene.furniture[place]
-        (x, y), (w, d) = piece.centre, piece.size
-        corners = [(x + i * w / 2, y + j * d / 2) for i in (-1, 1) for j in (-1, 1)]
-        while any(len({quarter(base, corner) for base in self._stood[place]}) < SEEN_FROM for corner in corners):
+        ends = corners(self.scene.furniture[place])
+        while any(len({quarter(base, end) for base in self._stood[place]}) < SEEN_FROM for end in ends):
             if not self._go_round(place, self._sides(place)):
                 return
             self._look(place)
@@ -163,7 +195,7 @@ class OwnSkills(CommonSkills):
         here = self._body.base
         poses = [(0.0, here)] if self.scene.in_front(here) == item.place else []
         if self._use.other_sides:
-            poses += drivable(self.scene, here, around(self.scene.furniture[item.place], self._body.stand_off))
+            poses += self._before(item.place)
         fresh = (b for _, b in poses if (quarter(b, item.position), True) not in item.votes)
         return next((base for base in fresh if self._body.reaches(base, item.position)), None)
 
@@ -173,11 +205,24 @@ class OwnSkills(CommonSkills):
         return {quarter(base, centre) for base in self._stood.get(place, [])}
 
     def _go_round(self, place: str, seen: set[int]) -> bool:
-        """Drive to another side of furniture; False where none can be got to."""
-        return any(
-            self.drive(base, place)
-            for _, base in other_sides(self.scene, place, self._body.base, seen, self._body.stand_off)[:2]
-        )
+        """Drive to another side of furniture, the one that tells most; False where none can be got to."""
+        return any(self.drive(base, place) for _, base in self._other_sides(place, seen)[:2])
+
+    def _other_sides(self, place: str, seen: set[int]) -> list[tuple[float, Base]]:
+        """Return base poses before other sides of furniture with the way [m], first those from where a look tells most
+        about its things and about its corners."""
+        poses = self._open(other_sides(self.scene, place, self._body.base, seen, self._body.stand_off))
+        stood = self._stood.get(place, [])
+        questions = [
+            (at, sides, len(sides))
+            for at in corners(self.scene.furniture[place])
+            for sides in [frozenset(quarter(base, at) for base in stood)]
+        ]
+        for item in self.scene.items.values():
+            if item.place == place:
+                sides = frozenset(side for side, close in item.votes if isinstance(side, int) and not close)
+                questions.append((item.position[:2], sides, max(item.margin, 0)))
+        return sorted(poses, key=lambda pose: -worth(pose[1], pose[0], questions))
 
     def _in_hand(self) -> str:
         """Return the class that two views of the hand agree on, empty for an empty hand."""
@@ -192,40 +237,60 @@ class OwnSkills(CommonSkills):
 
     # ---- base and arm ----
 
+    def drive(self, base: Base, toward: str) -> bool:
+        """Drive to a base pose; where that failed is remembered."""
+        arrived = super().drive(base, toward)
+        if not arrived and self._use.memory:
+            self._blocked.append(base)
+        return arrived
+
+    def _open(self, poses: list[tuple[float, Base]]) -> list[tuple[float, Base]]:
+        """Return the poses that are not where driving failed before."""
+        near = ((hypot(p.x - b.x, p.y - b.y) < SAME_POSE for b in self._blocked) for _, p in poses)
+        return [pose for pose, blocked in zip(poses, near, strict=True) if not any(blocked)]
+
+    def _before(self, place: str) -> list[tuple[float, Base]]:
+        """Return the base poses along all sides of furniture that the robot can get to, the nearest first."""
+        poses = around(self.scene.furniture[place], self._body.stand_off)
+        return self._open(drivable(self.scene, self._body.base, poses))
+
     def navigate(self, target: SceneObject) -> Outcome:
         """Drive before furniture, to a side from which it was not looked at yet as long as there is one."""
         place = target.key if target.key in self.scene.furniture else self.scene.items[target.key].place
         seen = self._sides(place) if self._use.other_sides else set()
-        poses = other_sides(self.scene, place, self._body.base, seen, self._body.stand_off) or drivable(
-            self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off)
-        )
+        poses = self._other_sides(place, seen) or self._before(place)
         for _, base in poses[: TRIES if self._use.repair else 1]:
             if self.drive(base, place):
                 return Outcome(True)
         return Outcome(False, "no_way", f"no way to {place} was found", {"base_poses": len(poses)})
 
-    def _stations(self, place: str, at: Position) -> Iterator[Base]:
+    def _stations(self, place: str, at: Position, *, take: bool = False) -> Iterator[Base]:
         """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short
-        arm explores until one is known."""
-        tried: list[Base] = []
+        arm explores until one is known. To `take` what is there a grasp of what was seen so far has to be possible,
+        or, where none is from anywhere, the first pose that reaches shows more."""
+        wanted, tried = take, list[Base]()
         while len(tried) < TRIES:
-            fresh = self._fresh(place, at, tried)
+            fresh = self._fresh(place, at, tried, take)
+            if fresh is None and take and not tried:
+                take = False
+                continue
             if fresh is None:
                 if not self._body.short_armed or self._explored:
                     return
-                explore(self._body, self.scene, lambda: self._fresh(place, at, tried) is not None)
-                self._explored = self._fresh(place, at, tried) is None
+                explore(self._body, self.scene, partial(self._fresh, place, at, tried, take))
+                self._explored = self._fresh(place, at, tried, take) is None
                 continue
             tried.append(fresh)
             yield fresh
+            take = wanted
 
-    def _fresh(self, place: str, at: Position, tried: list[Base]) -> Base | None:
+    def _fresh(self, place: str, at: Position, tried: list[Base], take: bool) -> Base | None:
         """Return the nearest base pose that reaches a position and was not tried, nor failed, for it."""
         poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
-        poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off))
+        poses += self._before(place)
         known = tried + self._remembered(place, at)
         apart = (base for _, base in poses if not any(hypot(base.x - b.x, base.y - b.y) < 0.3 for b in known))
-        return next((b for b in apart if not self._use.reachability or self._body.reaches(b, at)), None)
+        return next((b for b in apart if not self._use.reachability or self._body.reaches(b, at, take=take)), None)
 
     def _there(self, base: Base, place: str) -> bool:
         return base == self._body.base or self.drive(base, place)
@@ -266,9 +331,18 @@ class OwnSkills(CommonSkills):
                 self._told.add(item.key)
                 said = f"{item.key} looks like a {item.label}, but not from everywhere: also like a {item.disputed}"
                 return Outcome(False, "disputed", said, label=item.disputed)
+        place = item.place
+        outcome = self._take(item)
+        if self.holding is not None and place in self._patches:
+            self.scene.furniture.pop(place)
+        return outcome
+
+    def _take(self, item: Item) -> Outcome:
+        """Take a thing, by other grasps and from other base poses where one does not do it, and make sure that it is
+        held."""
         place, candidate, tries = item.place, 0, 0
         last: Failure | None = None
-        for base in self._stations(place, item.position):
+        for base in self._stations(place, item.position, take=True):
             if tries and not self._use.repair:
                 break
             if not self._there(base, place):
@@ -288,14 +362,17 @@ class OwnSkills(CommonSkills):
                 if not self._use.repair:
                     return Outcome(False, "not_held", f"{item.key} slipped out of the hand")
                 if not self._found_again(item):
+                    self._missing.append(Lost(item, item.position, frozenset(self.scene.items)))
                     return Outcome(False, "lost", f"{item.key} slipped and is not seen any more")
         return self._unreachable(place, tries, last)
 
     def _holds(self, item: Item, held: str) -> Outcome:
         """Count what the hand's view says as one more vote: it is of one region, as any other."""
         believed = item.label
-        item.votes["hand", True] = held
         self.took(item)
+        if self._use.agreement and held in classes_not_of(item.radius):
+            return Outcome(True)  # it tells no more than that the hand holds something
+        item.votes["hand", True] = held
         if held == believed:
             return Outcome(True)
         if self._use.agreement and item.label == believed:
@@ -316,6 +393,63 @@ class OwnSkills(CommonSkills):
                 return True
         self._stood[item.place] = [self._body.base]
         return False
+
+    def _look_on_floor(self, place: str) -> None:
+        """Look on the floor for what was lost at a place and is nowhere on it, and enter what is found there into the
+        map; where nothing is, the robot goes back."""
+        missing = [lost for lost in self._missing if lost.item.place == place]
+        self._missing = [lost for lost in self._missing if lost.item.place != place]
+        before = self._body.base
+        for lost in missing:
+            item, classes = lost.item, lost.classes
+            if any(i.label in classes and i.key not in lost.known for i in self._lying_at(place)):
+                continue
+            seen = self._seen_on_floor(lost)
+            if seen is not None:
+                patch = self.scene.patch(seen.position)
+                self._patches[patch] = place
+                found = self.scene.add(seen, patch, (quarter(self._body.base, seen.position), False))
+                found.votes = {**item.votes, **found.votes}
+            elif self._body.base != before:
+                self.drive(before, place)
+
+    def _lying_at(self, place: str) -> list[Item]:
+        """Return the things of a place, with those that fell off it."""
+        return [i for i in self.scene.items.values() if place in (i.place, self._patches.get(i.place))]
+
+    def _seen_on_floor(self, lost: Lost) -> Detection | None:
+        """Return what is seen on the floor around its furniture that looks like a thing, from the views that show most
+        of where it may lie."""
+        piece, spot = self.scene.furniture[lost.item.place], lost.spot
+        cells, likely = fallen_where(self.scene.obstacles, piece.centre, piece.size, spot)
+        for _ in range(FLOOR_VIEWS):
+            view = self._floor_view(cells, likely)
+            if view is None:
+                break
+            here = self._body.base
+            if (view.x, view.y) != (here.x, here.y) and not self.drive(view, lost.item.place):
+                likely = np.where(floor_seen(self.scene.obstacles, view, cells), 0.0, likely)
+                continue
+            look = self._body.look((*ahead_of(view, FLOOR_AT), 0.0), close=False)
+            found = [d for d in look.detections if d.label in lost.classes and d.position[2] < ON_FLOOR]
+            if found:
+                return min(found, key=lambda d: hypot(d.position[0] - spot[0], d.position[1] - spot[1]))
+            likely = np.where(floor_seen(self.scene.obstacles, view, cells), 0.0, likely)
+        return None
+
+    def _floor_view(self, cells: np.ndarray, likely: np.ndarray) -> Base | None:
+        """Return the base pose to look at the floor from next; exploring, where none is known that shows much."""
+
+        def best() -> Base | None:
+            found = best_floor_view(self.scene.obstacles, self._body.base, cells, likely)
+            return found[0] if found is not None and found[1] >= LITTLE else None
+
+        view = best()
+        if view is None and not self._explored:
+            explore(self._body, self.scene, best)
+            view = best()
+            self._explored = view is None
+        return view
 
     def place(self, target: SceneObject) -> Outcome:
         """Put down what is held, on a carrier or on free spots of furniture, and make sure that it lies there."""
@@ -352,11 +486,12 @@ class OwnSkills(CommonSkills):
             return Outcome(True)
         self.scene.items.pop(item.key)
         over = self.scene.at_carrier(at, place)
+        seen_from: set[Region] = set()  # what was seen of it before it was moved says nothing of where it is now
         for close in (True, False):
             look = self._body.look(at, close=close)
             known = self.scene.matched(look.detections, place)
             for d, other in zip(look.detections, known, strict=True):
-                if other is not None and other.label in CARRIERS:
+                if other is not None and other.label in CARRIERS and d.whole:
                     other.position = d.position  # the hand may have pushed it
             new = [
                 d
@@ -367,6 +502,7 @@ class OwnSkills(CommonSkills):
             away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
             if seen is not None and away < BESIDE:
                 item.position, item.place = seen.position, place
+                seen_from.add((quarter(self._body.base, seen.position), close))
                 item.votes[quarter(self._body.base, seen.position), close] = seen.label
                 self.scene.items[item.key] = item
                 if away <= AWAY and self.scene.carrier_of(item) == over:
@@ -374,8 +510,10 @@ class OwnSkills(CommonSkills):
                     return Outcome(True, message=said, label=item.label)
         self._off.append(at)
         if item.key in self.scene.items:
+            item.votes = {region: vote for region, vote in item.votes.items() if region in seen_from}
             return Outcome(False, "not_there", f"{item.key} lies beside {label}, not on it")
         self._stood[place] = [self._body.base]  # what was seen from other sides was before this
+        self._missing.append(Lost(item, at, frozenset(self.scene.items)))
         return Outcome(False, "lost", f"{item.key} is not seen on {label}")
 
     def pull(self, key: str, *, opening: bool) -> Outcome:

@@ -29,9 +29,18 @@ def middles(piece: SeenFurniture, off: float) -> list[Base]:
     return [facing(*p, piece.centre) for p in ((x, y - d), (x, y + d), (x - w, y), (x + w, y))]
 
 
-def around(piece: SeenFurniture, off: float) -> list[Base]:
-    """Return base poses along all four sides, `off` [m] from them."""
+def corners(piece: SeenFurniture) -> list[tuple[float, float]]:
+    """Return the four corners of furniture [m]."""
     (x, y), (w, d) = piece.centre, piece.size
+    return [(x + i * w / 2, y + j * d / 2) for i in (-1, 1) for j in (-1, 1)]
+
+
+def around(piece: SeenFurniture, off: float) -> list[Base]:
+    """Return base poses along all four sides, `off` [m] from them; around what is small from eight sides."""
+    (x, y), (w, d) = piece.centre, piece.size
+    if max(w, d) < APART:
+        far = max(w, d) / 2 + off
+        return [facing(x + far * cos(k * pi / 4), y + far * sin(k * pi / 4), (x, y)) for k in range(8)]
     poses = []
     for length, across, turned in ((w, d, False), (d, w, True)):
         count = max(1, ceil(length / APART))

@@ -192,7 +192,7 @@ class RulesBrain:
         elif outcome.kind == "doubtful_in_hand":
             self._held = replace(self._things.pop(thing.key), doubt=outcome.label)
             self._doubted[thing.key] = outcome.label
-            self._put_back = not any(self._anyway(self._held, goal) for goal in self._goals)
+            self._put_back = not any(self._either_way(self._held, goal) for goal in self._goals)
         elif outcome.kind == "doubtful":
             self._things[thing.key] = replace(thing, doubt=outcome.label)
         elif outcome.kind == "unreachable" or tries >= MOST_FAILURES:
@@ -224,7 +224,7 @@ class RulesBrain:
             return
         tries = self._trouble("place", target.key)
         if outcome.kind == "lost":
-            self._lost.append(thing)
+            self._lost.append(replace(thing, place=place))
         if outcome.kind in ("not_there", "lost"):
             self._held, self._at, self._look_again = None, place, True
         elif outcome.kind == "unreachable" or tries >= MOST_FAILURES:
@@ -289,9 +289,9 @@ class RulesBrain:
             if step is not None:
                 return step
         missing = [t for t in self._lost for g in goals if self._is_missed(t, g)]
-        if missing and self._failed["lost", missing[0].key] < MOST_FAILURES:
-            self._failed["lost", missing[0].key] += 1
-            return self._look(f"Where is {missing[0].key}?")
+        where = self._where_is(missing)
+        if where is not None:
+            return where
         if missing:
             raise _GiveUp(f"{missing[0].key} got lost on the way")
         for goal in goals:
@@ -327,6 +327,16 @@ class RulesBrain:
     def _is_missed(self, thing: SceneObject, goal: Goal) -> bool:
         every = isinstance(goal, Gather) or (isinstance(goal, Move) and goal.every)
         return every and self._moves(goal).fits(thing.label, thing.color, thing.used)
+
+    def _where_is(self, missing: list[SceneObject]) -> Reply | None:
+        """Look once more where the first of some things got lost; None where that was done often enough."""
+        if not missing or self._failed["lost", missing[0].key] >= MOST_FAILURES:
+            return None
+        self._failed["lost", missing[0].key] += 1
+        place = missing[0].place
+        if self._at != place and place in self._rooms:
+            return self._step(Step("navigate", place))
+        return self._look(f"Where is {missing[0].key}?")
 
     @staticmethod
     def _moves(goal: Goal) -> Description:
@@ -449,6 +459,9 @@ class RulesBrain:
         """Look where nobody looked yet, tables first, what has doors last; from other sides after that."""
         if self._held is not None and self._explored:
             raise _GiveUp(f"no {what.text} was found to put it on")
+        where = self._where_is([t for t in self._lost if what.fits(t.label, t.color, t.used)])
+        if where is not None:
+            return where
         for thing in self._things.values():
             doubtful = self._style.skilled and what.clean and thing.label in what.labels and thing.used
             if doubtful and self._failed["picture", thing.key] < MOST_FAILURES - 1:
@@ -534,6 +547,12 @@ class RulesBrain:
         classes = {thing.label, thing.doubt}
         others = {label for g in self._goals if g is not goal for label in self._moves(g).labels}
         return bool(classes & set(goal.what.labels)) and not classes & others
+
+    def _either_way(self, thing: SceneObject, goal: Goal) -> bool:
+        """Whether a goal has something brought that may be of one class or of another: it moves both, or all there are
+        of the one."""
+        labels = self._moves(goal).labels
+        return (thing.label in labels and thing.doubt in labels) or self._anyway(thing, goal)
 
     def _is_on(self, thing: SceneObject, onto: Description, how: str) -> bool:
         if how == "place_among":

@@ -141,8 +141,9 @@ class FastWorld:
         label = self._label(held, "hand", False)
         return self._named(label, self._hand_position(), held.thing.color, held.thing.radius, held.thing.used)
 
-    def reaches(self, base: Base, at: Position) -> bool:
-        """Whether the arm gets there: by distance and height, and as far as a bad base pose can be foreseen."""
+    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+        """Whether the arm gets there: by distance and height, and as far as a bad base pose can be foreseen; nothing
+        here has a shape to `take` it by."""
         if not self._in_reach(base, at):
             return False
         piece = self._under(at)

@@ -12,7 +12,7 @@ from schemas.apartment import Apartment, Furniture, Room, Thing
 from schemas.errors import UsageError
 from stages.agent.body import Base, Body, Detection, SeenFurniture, Sweep
 from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.scene_map import SceneMap
+from stages.agent.scene_map import SceneMap, classes_not_of
 from stages.agent.tasks import TASKS, make_apartment
 from stages.agent.trials import Setting, open_world
 from stages.agent.world.failures import Rates
@@ -260,3 +260,46 @@ def test_a_thing_with_a_head_is_held_where_it_is() -> None:
     points, normals = np.concatenate([top, ball]), np.concatenate([np.tile([0.0, 0.0, 1.0], (3000, 1)), away])
     first = antipodal_grasps(points, normals, opening=0.08, floor=0.0)[0]
     assert first[2, 2] < -0.99 and np.hypot(*(first[:2, 3] - (0.02, 0.0))) < 0.01 and first[2, 3] > 0.045
+
+
+def test_what_fell_is_seen_on_the_floor_and_taken_from_there(body: PhysicsBody) -> None:
+    body.sweep()
+    fallen = np.eye(4)
+    fallen[:3, 3] = (2.0, 0.4, 0.001)
+    body._room.world.set_pose("cup_0", fallen)
+    (cup,) = body.look((2.0, 0.4, 0.0), close=False).detections
+    assert cup.label == "cup" and np.allclose(cup.position, (2.0, 0.4, 0.02), atol=0.03)
+    far, near = Base(2.0, 1.5, -np.pi / 2), Base(2.0, 0.85, -np.pi / 2)
+    assert body.reaches(near, cup.position, take=True) and not body.reaches(far, cup.position, take=True)
+    assert body.drive(near, 0.7, "floor_0").ok
+    assert body.grasp(cup.position, "cup", 7).ok, "where few grasps are possible the first have their turn again"
+    assert body.bodies["cup_0"].on == ""
+
+
+def test_a_base_pose_is_for_the_grasps_that_are_possible(body: PhysicsBody) -> None:
+    body.sweep()
+    seen = {d.label: d for d in body.look(ABOVE, close=False).detections}
+    before = Base(2.1, 1.65, np.pi / 2)
+    for label, possible in (("apple", True), ("plate", False)):
+        assert body.reaches(before, seen[label].position)
+        assert body.reaches(before, seen[label].position, take=True) == possible
+
+
+def test_a_box_has_corners_and_a_plate_has_none() -> None:
+    scene = SceneMap(cast(Body, PhysicsBodyStub()))
+    place = scene._enter(table(0.7, 1.4))
+    for label, x in (("toy box", 0.3), ("plate", 1.1)):
+        scene.add(Detection(label, (x, 0.4, 0.76), "", None, 0.13), place, (0, False))
+    assert scene.at_carrier((0.3 + 0.083, 0.4 + 0.083, 0.8), place) == "toy_box_0"
+    assert scene.at_carrier((0.3 + 0.1, 0.4 + 0.1, 0.8), place) == ""
+    assert scene.at_carrier((0.3 + 0.11, 0.4, 0.8), place) == ""
+    assert scene.at_carrier((1.1 + 0.083, 0.4 + 0.083, 0.8), place) == ""
+    assert "plate" in classes_not_of(0.04) and "doll" not in classes_not_of(0.04) and "doll" in classes_not_of(0.13)
+
+
+def test_floor_under_what_fell_is_no_furniture_to_go_to() -> None:
+    scene = SceneMap(cast(Body, PhysicsBodyStub()))
+    scene._enter(table(0.7, 1.4))
+    key = scene.patch((0.0, -0.9, 0.0))
+    assert key in scene.furniture and scene.in_front(Base(0.0, -0.4, -np.pi / 2)) != key
+    assert [piece.key for piece in scene.global_map()] == ["table_0"]

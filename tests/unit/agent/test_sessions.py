@@ -18,10 +18,13 @@ from stages.agent.body import Detection
 from stages.agent.brains.brain import Reply
 from stages.agent.brains.language import LanguageBrain
 from stages.agent.brains.prompt import feedback_text
+from stages.agent.brains.rules import RulesBrain, Style
+from stages.agent.brains.slips import Slips
 from stages.agent.episodes import write_episode
 from stages.agent.evaluate_stage import run as evaluate
 from stages.agent.judging import score
 from stages.agent.language.interpreter import Ran
+from stages.agent.language.values import SceneObject
 from stages.agent.parameters import EvaluateParameters, ReplayParameters, RunParameters, check_run
 from stages.agent.replay_stage import run as replay
 from stages.agent.run_stage import run as run_step
@@ -359,3 +362,25 @@ def test_evaluation_counts_and_options_are_checked(tmp_path: Path) -> None:
     for given in ({"scene": 1}, {"truth": 1}, {"scene": 1, "truth": 1, "world": 1}):
         with pytest.raises(UsageError):
             check_run(RunParameters(), given)
+
+
+def test_what_may_be_of_either_class_is_brought_where_both_are_wanted() -> None:
+    task = TASKS["fruit_among_cups"]
+    brain, goal = RulesBrain(task.words, Style(skilled=True), Slips(lambda _: None)), task.goals[0]
+    held = SceneObject("banana_0", "banana", "table_0")
+    assert brain._either_way(replace(held, doubt="orange"), goal)
+    assert not brain._either_way(replace(held, doubt="sponge"), goal)
+
+
+def test_what_got_lost_is_sought_where_that_was_so_often_and_not_for_ever() -> None:
+    task = TASKS["tidy_table"]
+    brain = RulesBrain(task.words, Style(skilled=True), Slips(lambda _: None))
+    brain._rooms = {key: SceneObject(key, "table") for key in ("table_0", "table_1")}
+    brain._at = "table_1"
+    lost = [SceneObject("duck_0", "duck", "table_0")]
+    said = []
+    for _ in range(4):
+        reply = brain._where_is(lost)
+        said.append(reply.code if reply else "")
+        brain._at = "table_0"
+    assert said == ["navigate(rooms['table_0'])", *["on_table_0 = explore_local()"] * 2, ""]

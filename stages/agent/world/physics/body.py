@@ -86,9 +86,9 @@ class PhysicsBody:
         """See what the hand holds."""
         return self._looking.look_at_hand(view)
 
-    def reaches(self, base: Base, at: Position) -> bool:
-        """Whether a free arm pose over a position exists in the robot's own map."""
-        return self._handling.reaches(base, at)
+    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+        """Whether a free arm pose over a position exists in the robot's own map, or a grasp of what was seen there."""
+        return self._handling.reaches(base, at, take=take)
 
     def grasp(self, at: Position, label: str, candidate: int) -> Felt:
         """Take what was seen at a position."""

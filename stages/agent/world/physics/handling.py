@@ -14,13 +14,14 @@ from stages.agent.world.physics.hands import (
     Motion,
     Spot,
     Target,
+    graspable,
     plan_grasp,
     plan_release,
     reachable,
 )
 from stages.agent.world.physics.looking import Looking
 from stages.agent.world.physics.robot_in_room import RobotInRoom
-from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
+from stages.agent.world.physics.seen import FLOOR, FOUND_WITHIN, Seen
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.segments import Segment, whole_body
@@ -36,9 +37,14 @@ class Handling:
     def __init__(self, robot: RobotInRoom, seen: Seen, looking: Looking) -> None:
         self._robot, self._seen, self._looking = robot, seen, looking
 
-    def reaches(self, base: Base, at: Position) -> bool:
-        """Whether a free arm pose over a position exists in the robot's own map, from a base pose."""
+    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+        """Whether a free arm pose over a position exists in the robot's own map, from a base pose; to `take` what was
+        seen there a grasp of it."""
         self._robot.beliefs.hold(None)
+        target = self._target(at, 0) if take else None
+        if target is not None:
+            pose = np.array([base.x, base.y, base.yaw])
+            return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
         self._robot.beliefs.show(self._seen.boxes(at))
         return reachable(self._robot.beliefs, np.array([base.x, base.y, base.yaw]), at, np.random.default_rng(5))
 
@@ -74,24 +80,15 @@ class Handling:
 
     def _take(self, at: Position, candidate: int) -> None:
         self._see_from_here(at)
-        away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._seen.surfaces]
-        number = int(np.argmin(away)) if away else -1
-        if number < 0 or away[number] > FOUND_WITHIN:
-            raise MotionFailed("no_grasp", "no surface was seen there", (), {"distance": min(away, default=9.0)})
-        surface = self._seen.surfaces[number]
-        self._seen.surfaces = [s for s in self._seen.surfaces if s is surface or not s.same_as(surface)]
-        number = next(k for k, s in enumerate(self._seen.surfaces) if s is surface)
         self._robot.beliefs.hold(None)
-        self._robot.beliefs.show(self._seen.boxes())
-        piece = self._seen.piece_at(at)
-        measured = self._seen.pieces[piece].measured_top if piece is not None else None
-        floor = float(surface.low[2]) if measured is None else measured
-        target = Target(surface, f"thing_{number}", candidate, floor)
+        target = self._target(at, candidate)
+        if target is None:
+            raise MotionFailed("no_grasp", "no surface was seen there")
         motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, self._robot.random)
         self._robot.grasps += 1
         self._robot.carry_out(motion.there)
         self._close_hand()
-        self._seen.surfaces.pop(number)
+        self._seen.surfaces = [s for s in self._seen.surfaces if s is not target.surface]
         self._robot.hold = motion.hold
         try:
             self._robot.carry_out(motion.away)
@@ -102,6 +99,20 @@ class Handling:
         if self._robot.driver.robot.configuration().opening < CLOSED_ON_NOTHING:
             self._robot.hold = None
             self._robot.driver.held = None
+
+    def _target(self, at: Position, rank: int) -> Target | None:
+        """Return what was seen nearest to a position, and show the arm what is around; None where nothing was seen."""
+        away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._seen.surfaces]
+        if not away or min(away) > FOUND_WITHIN:
+            return None
+        surface = self._seen.surfaces[int(np.argmin(away))]
+        self._seen.surfaces = [s for s in self._seen.surfaces if s is surface or not s.same_as(surface)]
+        number = next(k for k, s in enumerate(self._seen.surfaces) if s is surface)
+        self._robot.beliefs.show(self._seen.boxes())
+        piece = self._seen.piece_at(at)
+        measured = self._seen.pieces[piece].measured_top if piece is not None else None
+        floor = 0.0 if at[2] < FLOOR else float(surface.low[2]) if measured is None else measured
+        return Target(surface, f"thing_{number}", rank, floor)
 
     def _close_hand(self) -> None:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]

@@ -25,7 +25,7 @@ from stages.kit.simulation.world import PhysicsWorld
 CANDIDATES = 20
 """Grasps that are tried, those from above first (Han 2024, 3.3.3)."""
 NEXT = 3
-"""Grasps that are left out after one slipped."""
+"""Grasps that have their turn last after one slipped."""
 APPROACH, LIFT = 0.08, 0.10
 """Of the hand before and after it closes [m]."""
 DROP = 0.15
@@ -157,20 +157,18 @@ def plan_grasp(
     beliefs: Beliefs, base: np.ndarray, arm: np.ndarray, target: Target, random: np.random.Generator
 ) -> Motion:
     """Return the motion that takes a fused surface. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
-    opening = beliefs.description.opening
-    surface, name, rank = target.surface, target.name, target.rank
-    keep = _inside(surface)
-    points, normals = surface.points[keep], surface.normals[keep]
-    heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    grasps = within_reach(antipodal_grasps(points, normals, opening, target.floor), heading)[rank * NEXT :][:CANDIDATES]
-    if not grasps:
-        width = narrowest_width(points)
+    surface, name = target.surface, target.name
+    possible = _grasps_of(target, base, beliefs.description.opening)
+    if not possible:
+        opening, width = beliefs.description.opening, narrowest_width(surface.points[_inside(surface)])
         raise MotionFailed(
             "no_grasp",
-            f"no grasp left on {name}, seen {width:.3f} m wide at its narrowest; the gripper opens {opening:.3f} m",
+            f"no grasp of {name}, seen {width:.3f} m wide at its narrowest; the gripper opens {opening:.3f} m",
             (name,),
-            {"width": width, "opening": opening, "left_out": NEXT * rank},
+            {"width": width, "opening": opening},
         )
+    left_out = target.rank * NEXT % len(possible)  # where few are possible, the first has its turn again
+    grasps = (possible[left_out:] + possible[:left_out])[:CANDIDATES]
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     searches = 2
     for grasp in grasps:
@@ -189,6 +187,25 @@ def plan_grasp(
             return motion
     tally.raise_for(f"grasp({name})", (name,))
     raise AssertionError("unreachable")
+
+
+def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.random.Generator) -> bool:
+    """Whether the hand gets straight to some grasp of a fused surface from a base pose (3,) and up again, free of all
+    that is in the map."""
+    planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
+    carry, grasps = beliefs.description.carry, _grasps_of(target, base, beliefs.description.opening)[:CANDIDATES]
+    try:
+        return any(_way_in(planner, base, carry, target.name, grasp, tally) is not None for grasp in grasps)
+    finally:
+        beliefs.checker.allow()
+
+
+def _grasps_of(target: Target, base: np.ndarray, opening: float) -> list[np.ndarray]:
+    """Return the grasps of what was seen, map_from_tool (4, 4), that an arm on a base pose (3,) may get at."""
+    surface = target.surface
+    keep = _inside(surface)
+    heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
+    return within_reach(antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor), heading)
 
 
 def _inside(surface: Surface) -> np.ndarray:
@@ -218,21 +235,10 @@ def _one_grasp(
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     checker, opening = beliefs.checker, beliefs.description.opening
-    beliefs.robot.set(Configuration(base, arm, opening))
-    checker.allow(touch=(name,))
-    at = planner.reachable(base, map_from_tool, tally, starts=3)
-    if at is None or not planner.free(base, at, tally):
+    way = _way_in(planner, base, arm, name, map_from_tool, tally)
+    if way is None:
         return None
-    before = map_from_tool.copy()
-    before[:3, 3] -= APPROACH * before[:3, 2]
-    approach = planner.line(base, at, before, tally)
-    if approach is None:
-        return None
-    above = map_from_tool.copy()
-    above[2, 3] += LIFT
-    lift = planner.line(base, at, above, tally)
-    if lift is None:
-        return None
+    approach, lift = way
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
     low, high = whole_box(surface, floor)
@@ -257,6 +263,29 @@ def _one_grasp(
         (Segment(whole_body(base, lift), 0.0, SLOW), Segment(whole_body(base, home), 0.0, 0.6)),
         hold,
     )
+
+
+def _way_in(
+    planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, name: str, map_from_tool: np.ndarray, tally: Tally
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return arm values (N, 7) from a grasp back to before it, and (M, 7) from it to above; None where one is not
+    free."""
+    beliefs = planner.model
+    assert isinstance(beliefs, Beliefs)
+    beliefs.robot.set(Configuration(base, arm, beliefs.description.opening))
+    beliefs.checker.allow(touch=(name,))
+    at = planner.reachable(base, map_from_tool, tally, starts=3)
+    if at is None or not planner.free(base, at, tally):
+        return None
+    before = map_from_tool.copy()
+    before[:3, 3] -= APPROACH * before[:3, 2]
+    approach = planner.line(base, at, before, tally)
+    if approach is None:
+        return None
+    above = map_from_tool.copy()
+    above[2, 3] += LIFT
+    lift = planner.line(base, at, above, tally)
+    return None if lift is None else (approach, lift)
 
 
 def _far() -> np.ndarray:

@@ -19,7 +19,10 @@ from stages.kit.rendering.object_views import Picture
 
 FOUND_WITHIN = 0.12
 """A surface this near to a position is meant by it [m]."""
+FLOOR, FLOOR_AROUND = 0.05, 1.6
+"""What begins lower lies on the floor [m], and how far around its middle a look at the floor tells of it [m]."""
 DOORS = ("fridge", "dresser")
+"""Furniture with doors, which are closed for ever here."""
 AROUND = 1.4
 """What is farther from the base does not matter to the arm [m]."""
 COMFORT = 4.5
@@ -49,7 +52,7 @@ class Seen:
                     (float(centre[0]), float(centre[1])),
                     (float(size[0]), float(size[1])),
                     float(high[2]),
-                    piece.label in DOORS,
+                    False,  # closed boxes: their doors cannot be told from the rest, nor moved
                     False,
                 )
             )
@@ -69,7 +72,9 @@ class Seen:
             self.pieces[piece].measured_top = float(np.median(heights[np.abs(heights - top) < 0.006]))
 
     def piece_at(self, at: Position) -> int | None:
-        """Return the number of the piece at a position, with a hand's breadth around it."""
+        """Return the number of the piece at a position, with a hand's breadth around it; None for the floor."""
+        if at[2] < FLOOR:
+            return None
         for number, piece in enumerate(self.pieces):
             low, high = piece.box
             if len(piece.cubes) >= head.LEAST and np.all((at[:2] > low[:2] - 0.1) & (at[:2] < high[:2] + 0.1)):
@@ -79,10 +84,11 @@ class Seen:
     def belongs(self, surface: Surface, at: Position, piece: int | None, close: bool) -> bool:
         """Whether a surface is of a piece of furniture, or lies where a look from near by was at."""
         middle = surface.middle
+        away = hypot(middle[0] - at[0], middle[1] - at[1])
         if close:
-            return hypot(middle[0] - at[0], middle[1] - at[1]) <= FOUND_WITHIN
+            return away <= FOUND_WITHIN
         if piece is None:
-            return False
+            return at[2] < FLOOR and float(surface.low[2]) < FLOOR and away <= FLOOR_AROUND
         low, high = self.pieces[piece].box
         return bool(
             np.all((middle[:2] > low[:2] - 0.05) & (middle[:2] < high[:2] + 0.05)) and middle[2] > high[2] - 0.1
