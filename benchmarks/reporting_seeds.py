@@ -88,9 +88,17 @@ def read_sets(file: Path = FILE) -> tuple[SeedSet, ...]:
             raise ValueError(f"{file}: no set {entry['set']!r}")
         met[entry["set"]].append(Met(entry["experiment"], entry["method"], entry["day"]))
     return tuple(
-        SeedSet(entry["name"], entry["group"], tuple(entry["seeds"]), tuple(met[entry["name"]]))
+        SeedSet(entry["name"], entry["group"], _seeds(entry["seeds"]), tuple(met[entry["name"]]))
         for entry in content["set"]
     )
+
+
+def _seeds(said: str | Sequence[str]) -> tuple[str, ...]:
+    """Return the seeds of a list, or of "3200..3699", both ends included."""
+    if not isinstance(said, str):
+        return tuple(said)
+    first, last = map(int, said.split(".."))
+    return tuple(map(str, range(first, last + 1)))
 
 
 def newest(group: str, file: Path = FILE) -> SeedSet:

@@ -164,7 +164,7 @@ def of_needle(folder: Path, commit: str) -> tuple[dict[str, list[Estimate]], str
     told = (
         f"Measured by python -m benchmarks stitch_needle at commit {commit}, seeds {seeds[0]} to {seeds[-1]}, "
         "fitted by python -m benchmarks.stitch.perception. Masks are the rendered truth spoiled as a learned mask's, "
-        "not a network's; elsewhere and tissue are of both forms of the same scenes. An estimate takes 0.13 s of one "
+        "not a network's; elsewhere and tissue are of all views whose place was drawn. An estimate takes 0.13 s of one "
         "core; what a network adds to it, persistence, systematic share and the error of the thread's length are "
         "assumed."
     )

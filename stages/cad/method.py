@@ -57,6 +57,15 @@ class CadMethod(Protocol):
         """Return placed models (sections 2.4.2 and 2.4.3): matched, aligned, measured and scored."""
         ...
 
+    @property
+    def recognises(self) -> bool:
+        """Whether shape may name what masks did not, or wrongly."""
+        ...
+
+    def misfit(self, target: Target) -> float:
+        """Return how far the best of a target's models is off where its planes put it [m]; infinite without any."""
+        ...
+
     def why_invalid(self, placement: Placement, target: Target) -> str | None:
         """Return why a placement is no candidate whatever it carries, or None."""
         ...

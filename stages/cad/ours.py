@@ -75,6 +75,17 @@ class Ours:
         aligned = self._refined(target, self._aligned(target, kept, rejected))
         return Proposals([self._measured(target, match, placement) for match, placement in aligned], rejected)
 
+    @property
+    def recognises(self) -> bool:
+        """As the options say."""
+        return self.parameters.recognition_error > 0
+
+    def misfit(self, target: Target) -> float:
+        """By the score that matches are screened with."""
+        shapes = [shape_of_state(model, model.states[0]) for model in target.models]
+        matches, _ = self._matches(target, shapes)
+        return min(self._screening_scores(target, matches), default=math.inf)
+
     def why_invalid(self, placement: Placement, target: Target) -> str | None:
         """Scale, error, balance and walls."""
         if not scale_fits(placement, self.parameters):
@@ -138,6 +149,10 @@ class Ours:
         Planes rank badly where they are few or misleading, the failure that the thesis names (section 2.6.6): a cup's
         side gives as many as noise likes, and lying models with as many planes outrank the upright one.
         """
+        order = np.argsort(self._screening_scores(target, matches), kind="stable")
+        return [matches[k] for k in order[: self.parameters.candidates * self.parameters.screening]]
+
+    def _screening_scores(self, target: Target, matches: list[Match]) -> list[float]:
         parameters = self.parameters
         some = target.points[:: max(1, len(target.points) // SCREENING_POINTS)]
         scores = []
@@ -150,8 +165,7 @@ class Ours:
                 + parameters.tilt_weight * match.tilt
                 + parameters.scale_weight * abs(math.log(placement.scale))
             )
-        order = np.argsort(scores, kind="stable")[: parameters.candidates * parameters.screening]
-        return [matches[k] for k in order]
+        return scores
 
     def _aligned(self, target: Target, matches: list[Match], rejected: Counter[str]) -> list[Aligned]:
         """Return the matches aligned by planes, the best by their error on vertices: planes alone rank badly where few

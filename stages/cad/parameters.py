@@ -114,6 +114,15 @@ class CadParameters(Parameters):
         description="ours: things (nodes, as fridge_3) and classes that somebody knows to move as their models do; "
         "joints of others need a ground: seen to move, open, a handle, a seam",
     )
+    recognition_error: float = Field(
+        0.028,
+        ge=0.0,
+        description="ours: a thing without a name, or with one that no model fits as well, takes the class of the "
+        "model that fits it so well; 0 for never [m]",
+    )
+    recognition_margin: float = Field(
+        0.01, ge=0.0, description="ours: as long as models of all other classes fit it worse by this [m]"
+    )
     built_ins: bool = Field(
         True, description="ours: a thing that no model fits becomes a run of boxes made for it, where that explains it"
     )
@@ -130,7 +139,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=8,
+    version=9,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={

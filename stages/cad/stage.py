@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from schemas.articulations import Articulation, Articulations
-from schemas.cad_library import CadLibrary
+from schemas.cad_library import CadLibrary, CadModel
 from schemas.cad_scene import SURROUNDINGS, CadScene, JointEvidence
 from schemas.contact_graph import ContactGraph, ContactGraphFile
 from schemas.errors import BadInput, UsageError
@@ -28,6 +28,7 @@ from stages.cad.model_surfaces import ModelSurface, load_surface
 from stages.cad.obstacles import floor_levels, obstacles_of
 from stages.cad.ours import Ours
 from stages.cad.parameters import CadParameters
+from stages.cad.recognition import is_doubtful, might_be, recognised, renamed
 from stages.cad.records import cad_graph, scene_file
 from stages.cad.shapes import Placement
 from stages.cad.surroundings import footing
@@ -80,6 +81,7 @@ def choose_and_write(
 ) -> CadScene:
     """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4). `moved`: what the log
     shows in two states."""
+    graph = renamed(graph, shortlists)
     with context.progress.step("global check"):
         chosen, selection = select(graph, shortlists, surfaces, method, context.random(CONFLICTS))
         copy_meshes(graph, chosen, panoptic_map, context)
@@ -153,9 +155,7 @@ def find_candidates(
             shortlists[node.id] = Shortlist(node, (), {}, "the map has no mesh of it")
             continue
         suitable = models_for(node.class_name, models)
-        for model in suitable:
-            if model.id not in surfaces:
-                surfaces[model.id] = load_surface(model_folder(library, model.id), model)
+        load_surfaces(library, suitable, surfaces)
         mesh = load_entity_mesh(panoptic_map.path(node.mesh))
         used = np.unique(mesh.faces)
         normals = vertex_normals(mesh.vertices, mesh.faces)
@@ -171,10 +171,21 @@ def find_candidates(
         )
         target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
         found = shortlist(target, method)
+        if method.recognises and is_doubtful(found, method):
+            alike = [model for model in models if might_be(model, target)]
+            load_surfaces(library, alike, surfaces)
+            found = recognised(found, target, alike, method)
         if not found.placements and method.builds_in and may_be_built_in(node):
             found = built_in_instead(found, target, mesh, moved, method.parameters, context.output / "models")
         shortlists[node.id] = found
     return shortlists
+
+
+def load_surfaces(library: CadLibrary, models: Sequence[CadModel], surfaces: dict[str, ModelSurface]) -> None:
+    """Add the surfaces of models to those that are loaded."""
+    for model in models:
+        if model.id not in surfaces:
+            surfaces[model.id] = load_surface(model_folder(library, model.id), model)
 
 
 def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) -> None:

@@ -67,6 +67,15 @@ class Thesis:
             placements.append(replace(placement, alignment_error=error, score=error))
         return Proposals(placements, rejected)
 
+    @property
+    def recognises(self) -> bool:
+        """The thesis takes the class from the masks."""
+        return False
+
+    def misfit(self, target: Target) -> float:
+        """Nobody asks."""
+        raise NotImplementedError
+
     def why_invalid(self, placement: Placement, target: Target) -> str | None:
         """Scale and walls."""
         if not scale_fits(placement, self.parameters):

@@ -16,7 +16,7 @@ from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
 from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.strange_places import thing_score, without_names
+from stages.fuse.strange_places import share_told, thing_score, without_names
 from stages.fuse.surface import Surface, extract_surface
 from stages.kit.formats.map_files import mesh_name
 from stages.kit.stage import Progress
@@ -108,20 +108,19 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
                 entities, labelled, scores, mapper.sightings, vocabulary, unnamed
             )
         if parameters.unnamed_area > 0 and ours:
-            entities, labelled = (by_geometry if strange else with_unnamed_pieces)(
-                surface,
-                entities,
-                labelled,
-                Classes(
-                    floor=vocabulary.by_name("floor").id,
-                    wall=vocabulary.by_name("wall").id,
-                    ceiling=vocabulary.by_name("ceiling").id,
-                    unnamed=unnamed,
-                    tables=frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED),
-                ),
-                voxel=parameters.voxel_size,
-                minimum_area=parameters.unnamed_area,
+            classes = Classes(
+                floor=vocabulary.by_name("floor").id,
+                wall=vocabulary.by_name("wall").id,
+                ceiling=vocabulary.by_name("ceiling").id,
+                unnamed=unnamed,
+                tables=frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED),
             )
+            size = {"voxel": parameters.voxel_size, "minimum_area": parameters.unnamed_area}
+            if strange:
+                entities, labelled = by_geometry(surface, entities, labelled, classes, **size)
+            else:
+                told = share_told(labelled, scores, mapper.sightings)
+                entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=told)
     file = EntitiesFile(
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,

@@ -1,11 +1,13 @@
 """Names that a thing cannot have: a mask may be cut off by its picture, the map shows how large the thing is.
 
 Ours. A detector that boxed a corner of a keyboard as a chair, or took a wall with a radiator for a plant, is corrected
-by a metre rule, unless most of the frames that saw the thing say the same: then the thing is an unusual one.
+by a metre rule. Where most of the frames that saw the thing say the same it gives way: the thing may be an unusually
+large one, or part of one. Else it has the name that comes next, if enough of its masks said so.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -13,12 +15,13 @@ import numpy as np
 
 from schemas.vocabulary import Vocabulary
 from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.fuse.strange_places import thing_score
+from stages.fuse.partition import NAMED_SHARE
 from stages.kit.class_extents import extent_of, is_plausible
 
 BELIEVED = 0.5
 """Score of the masks of a name, averaged over all frame segments that were matched to the thing (0 where no mask was),
-from which on it is believed whatever the size."""
+from which on no thing is too small for it, and one is too large from UNUSUAL times the usual limit on."""
+UNUSUAL = 1.5
 
 
 def without_impossible_names(
@@ -29,16 +32,35 @@ def without_impossible_names(
     vocabulary: Vocabulary,
     unnamed: int,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
-    """Return entities and labels with class `unnamed` for doubtful things that are too small or too large for theirs.
+    """Return entities and labels in which things that are too small or too large for their class have the next one of
+    their masks that they can be of, or class `unnamed`.
 
     `scores`, `sightings`: as in `strange_places.thing_score`.
     """
     result, class_id = [], labelled.class_id.copy()
     for entity in entities:
-        doubted = thing_score(entity.segments, scores, frozenset({entity.class_id}), sightings) < BELIEVED
-        name = vocabulary.by_id(entity.class_id).name
-        if doubted and not is_plausible(name, extent_of(np.asarray(entity.mesh.vertices)), cut_off=False):
-            class_id[labelled.instance == entity.instance] = unnamed
-            entity = replace(entity, class_id=unnamed)
+        said: Counter[int] = Counter()
+        for label in entity.segments:
+            said.update(scores.get(label, {}))
+        seen = max(1, sum(sightings.get(label, 0) for label in entity.segments))
+        extent = extent_of(np.asarray(entity.mesh.vertices))
+        if not _possible(entity.class_id, extent, said[entity.class_id] / seen, vocabulary):
+            class_id[labelled.instance == entity.instance] = new = _next_name(said, extent, seen, vocabulary, unnamed)
+            entity = replace(entity, class_id=new)
         result.append(entity)
     return result, replace(labelled, class_id=class_id)
+
+
+def _possible(class_id: int, extent: float, score: float, vocabulary: Vocabulary) -> bool:
+    """Whether a thing of this extent [m] can be of the class that its masks named with this score."""
+    believed = score >= BELIEVED
+    return is_plausible(vocabulary.by_id(class_id).name, extent / (UNUSUAL if believed else 1.0), cut_off=believed)
+
+
+def _next_name(said: Counter[int], extent: float, seen: int, vocabulary: Vocabulary, unnamed: int) -> int:
+    """Return the class with the largest score of those that a thing of this extent [m] can be of, if it has NAMED_SHARE
+    of what its masks said of things; else `unnamed`."""
+    things = {c: s for c, s in said.items() if c != unnamed and vocabulary.by_id(c).kind == "thing"}
+    possible = [c for c, score in things.items() if _possible(c, extent, score / seen, vocabulary)]
+    best = min(possible, key=lambda c: (-things[c], c), default=unnamed)
+    return best if things.get(best, 0.0) >= NAMED_SHARE * sum(things.values()) else unnamed

@@ -35,10 +35,12 @@ def with_unnamed_pieces(
     *,
     voxel: float,
     minimum_area: float,
+    told: np.ndarray | None = None,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities and labels with the pieces of unnamed surface among them; as they are without a floor.
 
-    `voxel` [m], `minimum_area` [m^2] of a piece. Nobody voted for one: it has no segments, and no confidence.
+    `voxel` [m], `minimum_area` [m^2] of a piece, `told` (V,) as in `unnamed_pieces`. Nobody voted for one: it has no
+    segments, and no confidence.
     """
     vertices = _over_floor(surface, labelled, classes)
     if vertices is None:
@@ -54,6 +56,7 @@ def with_unnamed_pieces(
         voxel=voxel,
         minimum_area=minimum_area,
         tables={e.instance for e in entities if e.class_id in classes.tables},
+        told=told,
     )
     kept, labelled = _cut_anew(surface, entities, labelled, instance)
     return _with_pieces(surface, kept, labelled, piece, classes.unnamed)

@@ -33,6 +33,15 @@ def thing_score(
     return total / max(1, sum(sightings.get(label, 0) for label in segments))
 
 
+def share_told(
+    labelled: LabelledSurface, scores: Mapping[int, Mapping[int, float]], sightings: Mapping[int, int]
+) -> np.ndarray:
+    """Return the score (V,), 0..1, that masks of its class gave the surface per sighting of its segment label."""
+    pairs, place = np.unique(np.stack([labelled.segment, labelled.class_id]), axis=1, return_inverse=True)
+    told = [thing_score((int(s),), scores, frozenset({int(c)}), sightings) for s, c in pairs.T]
+    return np.asarray(told, float)[place.reshape(-1)]
+
+
 def without_names(
     entities: Sequence[ExtractedEntity],
     labelled: LabelledSurface,

@@ -33,6 +33,12 @@ SHADOW = 0.15
 """Gaps in a level top this wide are of it: what stands there hides it [m]."""
 STACKED_SHARE, STACKED_GAP = 0.5, 0.35
 """Pieces above each other with this share of the smaller footprint in common, and this gap at most [m], are one."""
+TOLD = 0.75
+"""What so many of its views had in a table's masks is of it whatever its shape. A detector's masks took along what
+stands at tables in at most half of the views, true ones a desk's own shelf in nearly all."""
+LEAST_RISE = 0.75
+"""What is so many voxels over a level top is of what lies on it; the highest quarter of that is a voxel over it."""
+BENDING_STEPS = 5
 FEWEST = 50
 """Vertices of a part that is looked at, and of a thing on a level top."""
 SCRAP_SHARE, SCRAP_DISTANCE = 0.25, 0.1
@@ -56,6 +62,7 @@ def unnamed_pieces(
     minimum_area: float,
     proposed: np.ndarray | None = None,
     tables: Collection[int] = (),
+    told: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the piece of every vertex (V,), from 1 in the order of size, 0 for what is named or of the room itself;
     and the instance (V,) of the named thing that every vertex is of, 0 for pieces.
@@ -63,9 +70,10 @@ def unnamed_pieces(
     vertices (V, 3) [m], z up, the floor at 0; normals (V, 3); instance (V,), 0 where no mask named the surface; `room`
     (V,): floor, walls and ceiling; `proposed` (V,): what doubtful masks took for one thing each, 0 for none; `voxel`
     [m]; `tables`: instances that end at their level top, so that what their mask took with them is a piece where it
-    rises over the top. Left out is what has less than `minimum_area` [m^2] and neither stands on a level top nor was
-    proposed, and what lies within the outline of a named thing and begins below its top: a leg, or a leaf that its mask
-    missed, which is of the thing where it touches it. Under a table are legs of chairs too: they stay unnamed.
+    rises over the top, unless most of its views say that it is of the table: `told` (V,), 0..1, by default 0. Left out
+    is what has less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and what lies within
+    the outline of a named thing and begins below its top: a leg, or a leaf that its mask missed, which is of the thing
+    where it touches it. Under a table are legs of chairs too: they stay unnamed.
     """
     piece = np.zeros(len(vertices), np.int32)
     members = np.flatnonzero((instance == 0) & ~room & (vertices[:, 2] > FLOOR))
@@ -75,8 +83,9 @@ def unnamed_pieces(
     parts, standing = _cut_at_tops(points, normals[members], parts, voxel)
     names, part_of, freed = np.where(room, 0, instance), np.full(len(vertices), NO_PART), set()
     part_of[members] = parts
+    told = np.zeros(len(vertices)) if told is None else told
     for table in sorted(set(tables) & set(np.unique(names).tolist())):
-        own, on_top = _cut_from_table(vertices, normals, names, part_of, table, voxel)
+        own, on_top = _cut_from_table(vertices, normals, names, part_of, told, table, voxel)
         freed |= own
         standing |= on_top
     members = np.flatnonzero(part_of != NO_PART)
@@ -170,11 +179,13 @@ def _cut_at_tops(
         level, footprint = float(np.median(points[top, 2])), _Footprint(points[top, :2], voxel)
         own = np.flatnonzero(result == part)
         over, inside = points[own, 2] - level, footprint.holds(points[own])
-        above = own[inside & ((over > RISE) | ((over > voxel) & (normals[own, 2] < LEVEL)))]
+        rise = _over_top(points[own], points[top], voxel)
+        risen = inside & (rise > LEAST_RISE * voxel)
+        above, rise = own[risen], rise[risen]
         component = _components(points[above], voxel)
         for number in np.flatnonzero(np.bincount(component, minlength=1) >= FEWEST):
             thing = above[component == number]
-            if np.ptp(points[thing, 2]) >= LEAST_HEIGHT - voxel:
+            if np.quantile(rise[component == number], TOP) > voxel:
                 result[thing] = after
                 standing.add(after)
                 after += 1
@@ -195,16 +206,42 @@ def _cut_at_tops(
     return result, standing
 
 
+def _over_top(points: np.ndarray, top: np.ndarray, voxel: float) -> np.ndarray:
+    """Return how high points (N, 3) are over a level top (M, 3) that may be bent, and may have some of what lies on it
+    among its points [m]: over the quadric of most of them."""
+    middle, level = np.median(top[:, :2], axis=0), float(np.median(top[:, 2]))
+
+    def terms(ground: np.ndarray) -> np.ndarray:
+        x, y = (ground - middle).T
+        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+
+    columns, height = terms(top[:, :2]), top[:, 2] - level
+    kept = np.abs(height) < 2 * voxel
+    for _ in range(BENDING_STEPS):
+        shape = np.linalg.lstsq(columns[kept], height[kept], rcond=None)[0]
+        kept = np.abs(height - columns @ shape) < voxel / 2
+    return points[:, 2] - level - terms(points[:, :2]) @ shape
+
+
 def _cut_from_table(
-    vertices: np.ndarray, normals: np.ndarray, names: np.ndarray, part_of: np.ndarray, table: int, voxel: float
+    vertices: np.ndarray,
+    normals: np.ndarray,
+    names: np.ndarray,
+    part_of: np.ndarray,
+    told: np.ndarray,
+    table: int,
+    voxel: float,
 ) -> tuple[set[int], set[int]]:
     """Make parts, in place, of what rises over the top of a named table, whether its mask took it along or nobody named
     it: `names` (V,) has 0 there then, `part_of` (V,) new parts. Return these, and those of them that stand on the top.
+    A shelf over a desk, which most views `told` (V,) to be of it, is of it.
     """
     members = np.flatnonzero(part_of != NO_PART)
     loose = members[_of_named(vertices[members], part_of[members], vertices[names == table])]
     around = np.concatenate([np.flatnonzero(names == table), loose])
     cut, on_top = _cut_at_tops(vertices[around], normals[around], np.zeros(len(around), int), voxel)
+    mean = np.bincount(cut, weights=told[around]) / np.maximum(np.bincount(cut), 1)
+    cut[mean[cut] >= TOLD] = 0
     first, rising = 1 + int(part_of.max(initial=0)), around[cut > 0]
     part_of[rising], names[rising] = first + cut[cut > 0], 0
     return set(part_of[rising].tolist()), {first + part for part in on_top if part}

@@ -158,7 +158,7 @@ SCENE = Stage(
 )
 NEEDLE = Stage(
     name="suture needle",
-    version=5,
+    version=6,
     summary="Find the needle's pose in stereo pairs, with its covariance, or say why it cannot be known (STITCH)",
     parameters=NeedleParameters,
     reads={"sequence": Sequence, "disparity": Optionally(Disparity), "masks": MASKS, "segmenter": SEGMENTER},

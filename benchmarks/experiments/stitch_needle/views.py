@@ -62,7 +62,7 @@ CASES = {
     for case in (
         Case("rendered", 40, TWO_CAMERAS, TWO_CAMERAS_NOISE, rendered=True),
         Case("geometry", 200, TWO_CAMERAS, TWO_CAMERAS_NOISE),
-        *(Case(f"geometry_noise_{noise:g}", 100, TWO_CAMERAS, noise) for noise in (0.0, 0.25, 0.5, 2.0)),
+        *(Case(f"geometry_noise_{noise:g}", 100, TWO_CAMERAS, noise) for noise in (0.0, 0.25, 0.5, 1.5, 2.0, 3.0)),
         *(Case(f"geometry_ground_{g}", 100, TWO_CAMERAS, TWO_CAMERAS_NOISE, ground=g) for g in (1, 2, 3)),
         Case("geometry_miscalibrated", 100, TWO_CAMERAS, TWO_CAMERAS_NOISE, calibration_error=0.3),
         Case("geometry_filtered", 20, TWO_CAMERAS, TWO_CAMERAS_NOISE, frames=FRAMES),

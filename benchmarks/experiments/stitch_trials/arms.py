@@ -1,11 +1,13 @@
-"""The arms of the suture trials: those of `suture simulate`, and those that exchange one mechanism."""
+"""The arms of the suture trials: those of `suture simulate`, those that exchange one mechanism, and changed eyes."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from stages.suture.trials.ours.pose_correction import BySeenEnds, latest
+from stages.suture.trials.perception import FOLDER, PerceptionModel, Shares
 from stages.suture.trials.policies import OURS, POLICIES, THESIS
 from stages.suture.trials.thesis.extraction import NoSweep
 from stages.suture.trials.thesis.handover import NormalUnchanged
@@ -13,6 +15,7 @@ from stages.suture.trials.thesis.handover import NormalUnchanged
 ARMS = {
     **POLICIES,
     "ours_thesis_eyes": replace(OURS, perception="thesis"),
+    "ours_thesis_eyes_supervised": replace(POLICIES["ours_supervised"], perception="thesis"),
     "ours_one_at_a_time": replace(OURS, coordination=THESIS.coordination),
     "ours_network_eyes": OURS,
     "thesis_other_test": replace(THESIS, handover_test=NormalUnchanged()),
@@ -33,3 +36,41 @@ WITHOUT = {
     "ours_without_sweeps": replace(OURS, sweep=NoSweep()),
 }
 """Ours, one mechanism at a time as in the thesis (or left out)."""
+
+
+def _shares(shares: Shares, change: Callable[[float], float]) -> Shares:
+    return Shares(**{place: change(share) for place, share in shares.model_dump().items()})
+
+
+def _ends(model: PerceptionModel, times: float) -> PerceptionModel:
+    errors = (model.right, model.wrong)
+    right, wrong = (e.model_copy(update={"end_millimetres": times * e.end_millimetres}) for e in errors)
+    return model.model_copy(update={"right": right, "wrong": wrong})
+
+
+def _with(**values: float) -> Callable[[PerceptionModel], PerceptionModel]:
+    return lambda model: model.model_copy(update=values)
+
+
+CHANGES: dict[str, Callable[[PerceptionModel], PerceptionModel]] = {
+    "not_right_twice": lambda model: model.model_copy(
+        update={"right_share": _shares(model.right_share, lambda share: max(0.0, 2.0 * share - 1.0))}
+    ),
+    "never_abstains": lambda model: model.model_copy(
+        update={"abstained_share": _shares(model.abstained_share, lambda share: 0.0)}
+    ),
+    "fate_stays": _with(persistence=0.9),
+    "error_stays": _with(systematic=1.0),
+    "ends_1.5": lambda model: _ends(model, 1.5),
+    "ends_2": lambda model: _ends(model, 2.0),
+    "thread_10": _with(thread_length_error=0.1),
+    "slow": _with(seconds_an_estimate=0.5),
+}
+"""Case -> what of ours' error model is changed in it."""
+
+
+def eyes_of(arm: str) -> Path:
+    """Return the error model by which an arm sees, if none is given."""
+    if arm == "ours_network_eyes":
+        return NETWORK_EYES
+    return FOLDER / f"perception_{(ARMS | WITHOUT)[arm].perception}.toml"

@@ -39,6 +39,8 @@ GROWTH_SIGMA, GROWTH_STEP = 0.3, 0.1
 """Prior standard deviation of the masks' growth [px], and half of what its parabola spans."""
 FARTHEST_STEP, MOST_STEPS = 2.0, 4
 """A parabola's least is looked for within so many of its half widths, so often."""
+OUTLYING = 3.0
+"""A frame whose radius is off by more of its deviations than this is left out where frames count together."""
 LEAST, MOST = 0.005, 0.024
 """Radii [m] beyond which no least is looked for."""
 
@@ -144,10 +146,17 @@ def _spread(rivals: list[_Fit]) -> Radius | None:
 
 def together(radii: Sequence[Radius]) -> Radius:
     """Return one needle's radius from several frames (one at least) by their information; errors that frames share, the
-    calibration's, do not shrink."""
-    weights = np.array([1.0 / radius.deviation**2 for radius in radii])
-    mean = float(weights @ [radius.metres for radius in radii] / weights.sum())
-    alone = float(np.mean([radius.deviation**2 for radius in radii]))
+    calibration's, do not shrink. Frames that are OUTLYING from the weighted median are left out: half hidden, a needle
+    looks like a whole smaller one."""
+    metres, deviations = (np.array(values) for values in zip(*((r.metres, r.deviation) for r in radii), strict=True))
+    weights = 1.0 / deviations**2
+    order = np.argsort(metres)
+    upto = np.cumsum(weights[order])
+    middle = metres[order][np.searchsorted(upto, 0.5 * upto[-1])]
+    kept = np.abs(metres - middle) <= OUTLYING * deviations
+    metres, deviations, weights = metres[kept], deviations[kept], weights[kept]
+    alone = float(np.mean(deviations**2))
+    mean = float(weights @ metres / weights.sum())
     return Radius(mean, float(np.sqrt(SHARED * alone + (1.0 - SHARED) / weights.sum())))
 
 

@@ -52,6 +52,11 @@ def test_seeds_that_two_methods_of_an_experiment_have_met_are_tuning_seeds(file:
     assert found.first_used is not None and found.met_first("mapping") == "aa" and found.met_first("house") is None
 
 
+def test_a_set_of_numbers_may_be_a_range(file: Path) -> None:
+    file.write_text(TEXT.replace('["kitchen-2", "office-2"]', '"9..12"'))
+    assert newest("rooms", file).seeds == ("9", "10", "11", "12")
+
+
 def test_uses_name_a_set_and_sets_have_names_of_their_own(file: Path) -> None:
     file.write_text(TEXT.replace('set = "first"', 'set = "third"'))
     with pytest.raises(ValueError, match="no set 'third'"):

@@ -9,7 +9,7 @@ from stages.fuse.closing import MaskSource, is_strange
 from stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.piece_entities import Classes, by_geometry
-from stages.fuse.strange_places import LEAST_THING_SCORE, thing_score, without_names
+from stages.fuse.strange_places import LEAST_THING_SCORE, share_told, thing_score, without_names
 from stages.fuse.surface import Surface
 from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import THINGS, class_id
@@ -29,6 +29,11 @@ def test_the_score_counts_views_that_had_no_mask() -> None:
     scores = {1: {CHAIR: 2.0, FRIDGE: 1.0, WALL: 3.0}, 2: {}}
     assert thing_score((1, 2), scores, THINGS, {1: 4, 2: 6}) == pytest.approx(0.3)
     assert thing_score((7,), scores, THINGS, {}) == 0.0
+
+
+def test_the_share_of_a_surface_is_that_of_its_segment_and_class() -> None:
+    labelled = LabelledSurface(*(np.array(row, np.int32) for row in ([1, 1, 2], [CHAIR, FRIDGE, CHAIR], [5, 6, 5])))
+    assert share_told(labelled, {1: {CHAIR: 3.0, FRIDGE: 1.0}}, {1: 4, 2: 9}) == pytest.approx([0.75, 0.25, 0.0])
 
 
 def test_things_lose_their_names_and_doubtful_ones_their_surface() -> None:

@@ -70,3 +70,9 @@ def test_frames_say_more_together_but_for_what_they_share() -> None:
     assert 0.5 * 0.0002 < both.deviation < 0.0003
     many = together([one] * 1000)
     assert many.deviation == pytest.approx(0.5 * one.deviation, rel=0.01)
+
+
+def test_a_frame_that_shows_half_a_needle_is_left_out() -> None:
+    seen, half = Radius(0.012, 0.0002), Radius(0.009, 0.0003)
+    assert together([seen, half, seen, seen]) == together([seen] * 3)
+    assert together([half]).metres == pytest.approx(half.metres)
