@@ -20,14 +20,15 @@ from benchmarks.experiments.house.models import FOLDERS, MODELS, absent, importe
 from benchmarks.experiments.house.recording import record
 from benchmarks.experiments.house.scoring import Judged, judge
 from benchmarks.experiments.surface.scenes import camera_of
-from benchmarks.reporting_seeds import newest
+from benchmarks.reporting_seeds import Method, newest
 from benchmarks.steps import made
-from benchmarks.tabulation import markdown
+from benchmarks.tabulation import Figure, markdown
 from stages.kit.stage import Parameters
 
 MASKS, NETWORK = "masks", "network"
 TUNING = ("0",)
-REPORTING = newest("house").seeds
+GROUP = "house"
+REPORTING = newest(GROUP).seeds
 LIBRARY_SEED = 1
 STEPS = ("library build", "library add", "ingest", "segment", "fuse", "graph", "cad", "urdf")
 
@@ -99,13 +100,15 @@ def notes(results: Results) -> str:
     return markdown("Rooms", ("masks", "room", "seed", "PQ", "movable", "wrong"), rows)
 
 
-def more_figures(results: Results) -> dict[str, float | None]:
+def more_figures(results: Results) -> dict[str, Figure]:
     """All rooms together."""
-    figures: dict[str, float | None] = {}
+    figures: dict[str, Figure] = {}
     for arm in EXPERIMENT.arms:
         rooms: list[Any] = [room for trial, room in results.records.items() if trial.arm == arm]
         if rooms:
-            figures |= {f"{arm}/all/{name}": figure.of(rooms) for name, figure in EXPERIMENT.measures.items()}
+            for name, figure in EXPERIMENT.measures.items():
+                if (value := figure.of(rooms)) is not None:
+                    figures[f"{arm}/all/{name}"] = Figure(float(value), None, None, len(rooms), figure.unit)
     return figures
 
 
@@ -120,6 +123,8 @@ EXPERIMENT = Experiment(
     cases=tuple(RECIPES),
     tuning=TUNING,
     reporting=REPORTING,
+    seed_group=GROUP,
+    method=Method(STEPS, {MASKS: {"backend": "masks"}, NETWORK: {"backend": NETWORK}}),
     seeds_of=seeds_of,
     prepare=prepare,
     inputs=inputs,
