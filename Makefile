@@ -304,7 +304,7 @@ cutting: setup ## Cutting towards goals: table 6.1, the thesis's arms and ours (
 # task in pybullet too, about a minute of a core for each. PUBLISH=1 writes docs/results from what is measured.
 come-robot: setup ## A robot told in words (COME-robot): tables 3.2 to 3.4, ablations, curves (QUICK=1: ten seeds; PHYSICS=N; PUBLISH=1)
 	$(EXPERIMENT) come_robot --out $(OUTPUTS)/experiments/come-robot$(if $(QUICK),-quick) $(ASKED) $(if $(PUBLISH),--publish)
-	$(if $(PHYSICS),$(EXPERIMENT) come_robot_physics --count $(PHYSICS) --arms open_loop thesis ours --out $(OUTPUTS)/experiments/come-robot-physics $(ASKED) $(if $(PUBLISH),--publish))
+	$(if $(PHYSICS),$(EXPERIMENT) come_robot_physics --count $(PHYSICS) --out $(OUTPUTS)/experiments/come-robot-physics $(ASKED) $(if $(PUBLISH),--publish))
 	$(if $(PUBLISH),$(PYTHON) -m benchmarks.figures)
 
 .PHONY: bench-disparity bench-reconstruct-stereo train-stereo
