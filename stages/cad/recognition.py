@@ -14,6 +14,7 @@ import numpy as np
 
 from schemas.cad_library import CadModel
 from schemas.contact_graph import ContactGraphFile
+from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import UNNAMED, load_vocabulary
 from stages.cad.candidates import Shortlist, shortlist
 from stages.cad.method import CadMethod
@@ -48,6 +49,13 @@ def recognised(own: Shortlist, target: Target, models: Iterable[CadModel], metho
     rest = f"all else {1000 * next_score:.0f} mm or more" if others else "nothing else fits"
     reason = f"by its shape a {best.node.class_name}: {1000 * score:.0f} mm off, {rest}"
     return replace(best, reason="; ".join(filter(None, (reason, best.reason))))
+
+
+def named_by_people(panoptic_map: PanopticMap) -> frozenset[str]:
+    """Return the nodes whose class somebody gave or changed by an edit of the map: that word stands."""
+    edits = panoptic_map.edits
+    applied = () if edits is None else (edit for edit in edits.edits if edit.status != "conflict")
+    return frozenset(name for edit in applied for name in edit.things)
 
 
 def renamed(graph: ContactGraphFile, shortlists: Mapping[str, Shortlist]) -> ContactGraphFile:

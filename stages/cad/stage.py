@@ -28,7 +28,7 @@ from stages.cad.model_surfaces import ModelSurface, load_surface
 from stages.cad.obstacles import floor_levels, obstacles_of
 from stages.cad.ours import Ours
 from stages.cad.parameters import CadParameters
-from stages.cad.recognition import is_doubtful, might_be, recognised, renamed
+from stages.cad.recognition import is_doubtful, might_be, named_by_people, recognised, renamed
 from stages.cad.records import cad_graph, scene_file
 from stages.cad.shapes import Placement
 from stages.cad.surroundings import footing
@@ -148,7 +148,7 @@ def find_candidates(
     built-ins are written into the output. `moved`: what the log shows in two states."""
     models = library.info.models
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
-    free_space = method.free_space(panoptic_map)
+    free_space, told = method.free_space(panoptic_map), named_by_people(panoptic_map)
     shortlists: dict[str, Shortlist] = {}
     for node in context.progress.track(objects, description="objects"):
         if node.mesh is None:
@@ -171,7 +171,7 @@ def find_candidates(
         )
         target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
         found = shortlist(target, method)
-        if method.recognises and is_doubtful(found, method):
+        if method.recognises and node.id not in told and is_doubtful(found, method):
             alike = [model for model in models if might_be(model, target)]
             load_surfaces(library, alike, surfaces)
             found = recognised(found, target, alike, method)

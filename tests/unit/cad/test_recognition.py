@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from tests.panoptic_maps import floor_mesh, seen_surface
+from schemas.edits import AppliedEdit, AppliedEditsFile
+from schemas.panoptic_map import PanopticMap
+from stages.cad.parameters import CadParameters
+from stages.cad.stage import run as run_cad
+from stages.graph.parameters import GraphParameters
+from stages.graph.stage import run as run_graph
+from tests.panoptic_maps import floor_mesh, seen_surface, write_map
+from tests.unit.cad.conftest import context
 from tests.unit.cad.test_cad_stage import EYES, decisions, mesh_of
 
 
@@ -50,6 +57,17 @@ def test_only_where_it_tells(room, replace_objects):
     decisive = {"recognition_margin": 1.0, "built_ins": False}
     kept = named(replace_objects(room, {**classes, 4: "object"}, "ambiguous", **decisive))
     assert kept["object_2"] == ("table", "table_long"), "nothing else fits at all"
+
+
+def test_what_people_said_stands(room, library, tmp_path):
+    panoptic_map = write_map(tmp_path / "map", room, {1: "floor", 2: "object", 3: "bottle", 4: "fridge"})
+    said = AppliedEdit(number=1, what="rename", status="applied", things=("bottle_3",))
+    AppliedEditsFile(edits=(said,)).write(panoptic_map.path("edits.json"))
+    panoptic_map = PanopticMap(panoptic_map.root)
+    graph = run_graph(panoptic_map, parameters=GraphParameters(), context=context(tmp_path / "graph"))
+    options = CadParameters(built_ins=False)
+    scene = run_cad(graph, panoptic_map, library, parameters=options, context=context(tmp_path / "cad"))
+    assert named(scene)["bottle_3"] == ("bottle", None) and named(scene)["object_2"][0] == "table"
 
 
 def test_the_thesis_believes_masks(room, replace_objects):
