@@ -66,7 +66,7 @@ def renamed(graph: ContactGraphFile, shortlists: Mapping[str, Shortlist]) -> Con
 
 def by_class(target: Target, models: Iterable[CadModel], method: CadMethod) -> list[Shortlist]:
     """Return shortlists that are not empty, a class each, the best first: of the classes whose models are least off
-    where their planes put them, the thing's own left out."""
+    where their planes put them, the thing's own left out. `models`, `target` as in `recognised`."""
     classes: dict[str, list[CadModel]] = {}
     for model in models:
         if model.class_name not in (UNNAMED, target.node.class_name):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -73,8 +74,8 @@ class Thesis:
         return False
 
     def misfit(self, target: Target) -> float:
-        """Nobody asks."""
-        raise NotImplementedError
+        """No other class promises anything."""
+        return math.inf
 
     def why_invalid(self, placement: Placement, target: Target) -> str | None:
         """Scale and walls."""
