@@ -85,6 +85,8 @@ class Felt:
     kind: FeltKind = ""
     failure: Failure | None = None
     """What motion planning or control said, with its numbers, where there is motion."""
+    furniture: SeenFurniture | None = None
+    """The furniture of a door that was moved, where more of it than the door is changed: a drawer is in the way."""
 
 
 class Body(Protocol):

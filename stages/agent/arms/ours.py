@@ -521,14 +521,17 @@ class OwnSkills(CommonSkills):
         piece = self.scene.furniture[key]
         at = (*piece.centre, piece.height)
         tries = 0
+        last: Failure | None = None
         for base in self._stations(key, at):
             if tries and not self._use.repair:
                 break
             tries += 1
             if not self._there(base, key):
                 continue
-            if self._body.pull(at, opening=opening).ok:
-                self.scene.set_opened(key, opening)
+            felt = self._body.pull(at, opening=opening)
+            if felt.ok:
+                self.scene.set_opened(key, opening, felt.furniture)
                 return Outcome(True)
+            last = felt.failure
             self._failed_from(key, base, at)
-        return self._unreachable(key, tries)
+        return self._unreachable(key, tries, last)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from schemas.base import as_transform
 from stages.agent.world.physics.eyes import Surface
+from stages.agent.world.physics.fronts import Front
 from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
 from stages.agent.world.physics.shapes import record_of, slab, urdf_of
 from stages.kit.geometry.transforms import inverse
@@ -46,6 +50,7 @@ NESTLES = 0.015
 HELD = "held"
 """Name of the box of what is in the hand."""
 Box = tuple[np.ndarray, np.ndarray]
+Believed = Box | Front
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class Motion:
 
 
 class Beliefs:
-    """Boxes around the robot, for collision checks. An `ArmModel` of the kit."""
+    """Boxes and doors around the robot, for collision checks. A `JointedModel` of the kit."""
 
     def __init__(self, description: RobotDescription) -> None:
         self.description = description
@@ -94,25 +99,57 @@ class Beliefs:
         self.robot = Robot(self.world, description)
         self.checker = CollisionChecker(self.world, self.robot, 0.004)
         self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
-        self._boxes: dict[str, tuple[float, ...]] = {}
+        self._boxes: dict[str, object] = {}
 
     def close(self) -> None:
         """End the pybullet world."""
         self.world.close()
 
-    def show(self, boxes: dict[str, Box]) -> None:
-        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, and in nothing else
-        but what is held."""
-        wanted = {name: (*np.round(low, 3), *np.round(high, 3)) for name, (low, high) in boxes.items()}
+    def show(self, boxes: dict[str, Believed]) -> None:
+        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, in these fronts, and in
+        nothing else but what is held."""
+        wanted = {name: _told(entry) for name, entry in boxes.items()}
         for name in [n for n, box in self._boxes.items() if n != HELD and wanted.get(n) != box]:
             self.world.remove_body(name)
             del self._boxes[name]
         for name, box in wanted.items():
-            if name not in self._boxes:
+            if name in self._boxes:
+                continue
+            entry = boxes[name]
+            if isinstance(entry, Front):
+                self._add_front(name, entry)
+            else:
+                assert isinstance(box, tuple)
                 part = slab(box[:3], tuple(max(h, low + 0.004) for low, h in zip(box[:3], box[3:], strict=True)))  # type: ignore[arg-type]
                 self.world.add_body(record_of(name, "box", (0, 0, 0), 0), urdf_of(name, (part,), 1.0))
-                self.checker.add_body(name)
-                self._boxes[name] = box
+            self.checker.add_body(name)
+            self._boxes[name] = box
+
+    def _add_front(self, name: str, front: Front) -> None:
+        record = record_of(name, "front", (0, 0, 0), 0).model_copy(
+            update={
+                "world_from_body": as_transform(front.map_from_front),
+                "joints": (front.joint,),
+                "joint_values": {front.joint.name: front.value},
+            }
+        )
+        self.world.add_body(record, front.urdf())
+
+    def pose(self, name: str) -> np.ndarray:
+        """Return map_from_body (4, 4) of what is believed in."""
+        return self.world.pose(name)
+
+    @contextmanager
+    def joints_at(self, name: str, values: dict[str, float]) -> Iterator[None]:
+        """Put joints of what is believed in at values for a while."""
+        before = {joint: self.world.joint_value(name, joint) for joint in values}
+        try:
+            for joint, value in values.items():
+                self.world.set_joint(name, joint, value)
+            yield
+        finally:
+            for joint, value in before.items():
+                self.world.set_joint(name, joint, value)
 
     def hold(self, hold: Hold | None) -> None:
         """Let checks carry the box of what is held."""
@@ -128,6 +165,14 @@ class Beliefs:
         self.checker.add_body(HELD)
         self._boxes[HELD] = tuple(half)
         self.checker.carry(HELD, hold.tool_from_box)
+
+
+def _told(entry: Believed) -> object:
+    """Return what tells a box or a front from another one: numbers to the millimetre."""
+    if not isinstance(entry, Front):
+        return (*np.round(entry[0], 3).tolist(), *np.round(entry[1], 3).tolist())
+    pose = tuple(np.round(entry.map_from_front, 3).ravel().tolist())
+    return (pose, entry.size, entry.panel, entry.bar, round(entry.value, 3))
 
 
 def reachable(beliefs: Beliefs, base: np.ndarray, at: tuple[float, float, float], random: np.random.Generator) -> bool:
@@ -302,9 +347,9 @@ class Spot:
     """On what was seen there, in the map [m]."""
     rim: float
     """Height of the top of what is around it, as of a box that it is put into [m]."""
-    around: dict[str, Box]
+    around: dict[str, Believed]
     """All that stands there."""
-    beside: dict[str, Box]
+    beside: dict[str, Believed]
     """The same without what covers the spot, which the hand comes down into."""
     nestled: tuple[str, ...]
     """What lies beside it on the same carrier: what is held may come down against it."""
