@@ -63,6 +63,8 @@ class Look:
     sector: int
     """Quarter turn of the camera around what was looked at, 0 to 3."""
     close: bool
+    in_view: bool = True
+    """False where the camera did not get to see the place: what is not among the detections may be there."""
 
 
 @dataclass(frozen=True)

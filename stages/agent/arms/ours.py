@@ -159,7 +159,7 @@ class OwnSkills(CommonSkills):
             for found in self.scene.enter(look.detections, place, lambda d: (quarter(base, d.position), close))
         }
         should = [item] if item is not None else [i for i in self.scene.items.values() if i.place == place]
-        for each in should:
+        for each in should if look.in_view else ():
             if each.key not in seen:
                 each.votes[quarter(base, each.position), close] = None
                 if len(each.sides(seen=False)) > len(each.sides(seen=True)):

@@ -146,3 +146,19 @@ def test_in_an_empty_world_all_is_free() -> None:
     with PhysicsWorld() as world:
         checker = CollisionChecker(world, Robot(world, PANDA))
         assert checker.check(np.concatenate([np.zeros(3), PANDA.carry])) is None
+
+
+def test_a_body_in_the_place_of_another_of_its_name_is_seen() -> None:
+    """pybullet gives the id of a body that was taken out to the next one."""
+    with PhysicsWorld() as world:
+        robot = Robot(world, PANDA)
+        robot.set(Configuration(np.zeros(3), PANDA.carry, PANDA.opening))
+        far, here = slab((3.0, -0.2, 0.0), (3.4, 0.2, 1.0)), slab((-0.2, -0.2, 0.5), (0.2, 0.2, 1.5))
+        world.add_body(record_of("box", "box", (0, 0, 0), 0), urdf_of("box", (far,), 1.0))
+        checker = CollisionChecker(world, robot)
+        body = np.concatenate([np.zeros(3), PANDA.carry])
+        assert checker.check(body) is None
+        world.remove_body("box")
+        world.add_body(record_of("box", "box", (0, 0, 0), 0), urdf_of("box", (here,), 1.0))
+        checker.add_body("box")
+        assert checker.check(body) is not None

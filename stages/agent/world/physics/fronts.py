@@ -15,6 +15,7 @@ import numpy as np
 
 from schemas.base import as_vector
 from schemas.scene_parts import Joint
+from stages.agent.body import Position
 from stages.agent.world.physics.eyes import Surface
 from stages.agent.world.physics.shapes import jointed_text, slab
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
@@ -29,10 +30,18 @@ HALF_BAR = 0.01
 """Half of a bar's thickness: the middle of a handle lies so far behind what is seen of it [m]."""
 ROOM = 0.008
 """Around a bar that the hand keeps when it goes past it [m]."""
+OVER = 0.025
+"""Believed of a front over where its mask ends, which is a pixel too low [m]."""
 STAYS = 0.04
 """Of a drawer stays in [m]."""
 WIDEST = 1.9
 """Angle to which a leaf opens [rad]."""
+NEAR_HINGE = 0.15
+"""Points of a leaf this near to its hinge tell little of its angle [m]."""
+LOOK_AT = 0.6
+"""Height at which it is looked into, as a share of its own."""
+NARROWEST = 0.25
+"""Of a front that was looked at, and not its edge [m]."""
 EDGE_CELL = 0.01
 TRAY = 0.5
 """Height of the sides of a drawer, as a share of its front's."""
@@ -90,7 +99,9 @@ class Front:
             slab((-x, -w, max(z1 if self.slides else 0.0, h - THICK)), (inner, w, h)),
         ]
         grown = tuple(tuple(v + sign * ROOM for v in end) for sign, end in zip((-1, 1), self.bar, strict=True))
-        moving = [slab((inner, y0, z0), (x, y1, z1)), slab(*grown)]
+        if self.floor is not None and not self.slides:
+            still.append(slab((-x, -w, self.floor - LEAF), (inner, w, self.floor - 0.003)))
+        moving = [slab((inner, y0, z0), (x, y1, z1 + OVER)), slab(*grown)]
         if self.slides:
             edge = z0 + TRAY * (z1 - z0)
             far = STAYS - x
@@ -119,6 +130,16 @@ class Front:
             & (own[:, 2] < self.size[2] - 0.05)
         )
 
+    def behind(self, at: np.ndarray) -> float:
+        """Return how far a point (3,) of the map is behind the open front of a shelf [m]; 0 in a drawer, which is open
+        from above."""
+        return 0.0 if self.slides else max(0.0, self.size[0] / 2 - float(self.local(at[None])[0, 0]))
+
+    def opening(self) -> Position:
+        """Return a place of the map in the middle of a shelf."""
+        x, y, z = apply(self.map_from_front, np.array([(0.0, 0.0, LOOK_AT * self.size[2])]))[0]
+        return float(x), float(y), float(z)
+
     def of_part(self, points: np.ndarray, room: float) -> np.ndarray:
         """Return (N,) bool: points of the map that are of what moves, where it is now, or within `room` [m] of it."""
         shut = apply(inverse(body_from_moved(self.joint, self.value)), self.local(points))
@@ -134,6 +155,16 @@ class Front:
         grid = np.stack(np.meshgrid(xs, np.arange(y0, y1 + 0.04, 0.05), [0.5]), -1).reshape(-1, 3)
         return apply(self.map_from_front @ body_from_moved(self.joint, self.value), grid)[:, :2]
 
+    def value_seen(self, points: np.ndarray) -> float:
+        """Return how far it is open by points (N, 3) of the map that were seen of what moves [rad] or [m]."""
+        own = self.local(points)
+        if self.slides:
+            return edges(own[:, :2])[1] - self.size[0] / 2
+        joint = self.joint
+        from_hinge = own[:, :2] - np.array(joint.origin)[:2]
+        far = from_hinge[np.hypot(*from_hinge.T) > NEAR_HINGE] * (1.0, -joint.axis[2])
+        return float(np.median(np.arctan2(far[:, 0], far[:, 1]))) if len(far) else self.value
+
     def felt(self, tool: np.ndarray, contact: np.ndarray) -> float:
         """Return the joint value at which a point that was at `contact` (3,), own frame, when it was shut is where the
         tool (3,) of the map is now."""
@@ -146,48 +177,50 @@ class Front:
         return float((turned * self.joint.axis[2] + np.pi) % (2 * np.pi) - np.pi)
 
 
-def front_seen(name: str, label: str, box: tuple[np.ndarray, np.ndarray], surfaces: Sequence[Surface]) -> Front | None:
-    """Return the front of furniture in a box (3,), (3,) of the map by what a look at it showed; None without a handle.
-
-    The front is the side of the box beyond which the handle lies farthest.
-    """
-    handles = [s for s in surfaces if s.label == "handle"]
+def front_seen(
+    name: str, label: str, box: tuple[np.ndarray, np.ndarray], surfaces: Sequence[Surface], base: np.ndarray
+) -> Front | None:
+    """Return the front of furniture in a box (3,), (3,) of the map by what a look at it from a base pose (3,) showed;
+    None without a handle, or where a side was looked at: of a door that shows an edge."""
+    handles = [s.points for s in surfaces if s.label == "handle"]
+    panels = [s.points for s in surfaces if s.label in PARTS[1:]]
     if not handles:
         return None
-    handle = max(handles, key=lambda s: len(s.points))
     low, high = box
-    centre, half = (low + high) / 2, (high - low) / 2
-    beyond = {}
-    for normal in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        axis = 0 if normal[0] else 1
-        beyond[normal] = normal[axis] * (handle.middle[axis] - centre[axis]) - half[axis]
-    normal = max(beyond, key=lambda side: beyond[side])
-    axis = 0 if normal[0] else 1
-    half_depth, half_width = float(half[axis]), float(half[1 - axis])
-    panels = [s.points for s in surfaces if s.label in PARTS[1:]]
+    handle, panel = max(handles, key=len), max([*panels, _facing(box, base)], key=len)
+    across = int(np.ptp(np.percentile(panel[:, :2], (5, 95), axis=0), axis=0).argmin())
+    normal = np.zeros(2)
+    normal[across] = 1.0 if base[across] > np.median(panel[:, across]) else -1.0
+    middle, half_depth, half_width = (low + high) / 2, (high - low)[across] / 2, (high - low)[1 - across] / 2
     slides = label in WITH_DRAWERS
-    frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([centre[0], centre[1], 0.0]))
-    extent = (-half_width, half_width, 0.0, float(high[2]))
-    if panels:
-        own = apply(inverse(frame), max(panels, key=len))
-        plane = float(np.median(own[:, 0]))
-        (y0, y1), (z0, z1) = edges(own[:, 1:]), edges(own[:, :0:-1])
-        if slides:  # wider than a picture, perhaps
-            y0, y1 = min(y0, -half_width), max(y1, half_width)
-        shift = np.eye(4)
-        shift[:2, 3] = (plane - half_depth) / 2, (y0 + y1) / 2  # the back is where the box ends
-        frame, half_depth, half_width = frame @ shift, (half_depth + plane) / 2, (y1 - y0) / 2
-        extent = (-half_width, half_width, z0 if slides else LEAF, min(z1, float(high[2])))
-    bar = handle.points
-    if panels:  # what is farther back is the panel seen beside the bar
-        bar = bar[apply(inverse(frame), bar)[:, 0] > half_depth + 0.015]
+    frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*middle[:2], 0.0]))
+    own = apply(inverse(frame), panel)
+    plane = float(np.median(own[:, 0]))
+    (y0, y1), (z0, z1) = edges(own[:, 1:]), edges(own[:, :0:-1])
+    if y1 - y0 < NARROWEST:
+        return None
+    if slides:  # wider than a picture, perhaps
+        y0, y1 = min(y0, -half_width), max(y1, half_width)
+    shift = np.eye(4)
+    shift[:2, 3] = (plane - half_depth) / 2, (y0 + y1) / 2  # the back is where the box ends
+    frame, half_depth, half_width = frame @ shift, (half_depth + plane) / 2, (y1 - y0) / 2
+    bar = apply(inverse(frame), handle)
+    bar = bar[bar[:, 0] > half_depth + 0.015]  # what is farther back is the panel seen beside the bar
     if len(bar) < 5:
         return None
-    own = apply(inverse(frame), bar)
-    near, far = np.percentile(own, 5, axis=0), np.percentile(own, 95, axis=0)
+    near, far = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)
     near[0] = far[0] - 2 * HALF_BAR
+    extent = (-half_width, half_width, z0 if slides else LEAF, min(z1, float(high[2])))
     size = (2 * half_depth, 2 * half_width, float(high[2]))
     return Front(name, label, frame, size, extent, (tuple(near.tolist()), tuple(far.tolist())), slides)
+
+
+def _facing(box: tuple[np.ndarray, np.ndarray], base: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) of the side of a box that faces a base pose (3,): few, for where no panel was seen."""
+    (low, high), across = box, int(np.argmax(np.maximum(box[0] - base, base - box[1])[:2]))
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 12).T, indexing="ij"), -1)
+    side = grid.take(-1 if base[across] > high[across] else 0, axis=across)
+    return side.reshape(-1, 3)
 
 
 def edges(points: np.ndarray) -> tuple[float, float]:
@@ -199,9 +232,10 @@ def edges(points: np.ndarray) -> tuple[float, float]:
     return float(full.min() * EDGE_CELL), float((full.max() + 1) * EDGE_CELL)
 
 
-def footprint(front: Front) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (2,), (2,) of the map over which furniture with its drawer stands; a leaf is left out."""
-    x, w, out = front.size[0] / 2, front.size[1] / 2, front.value if front.slides else 0.0
+def footprint(front: Front, less: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (2,), (2,) of the map over which furniture with its drawer stands, `less` [m] of its front; a
+    leaf is left out."""
+    x, w, out = front.size[0] / 2, front.size[1] / 2, (front.value if front.slides else 0.0) - less
     corners = apply(front.map_from_front, np.array([(-x, -w, 0.0), (x + out, w, 0.0)]))[:, :2]
     return corners.min(axis=0), corners.max(axis=0)
 

@@ -45,7 +45,9 @@ class Handling:
             pose = np.array([base.x, base.y, base.yaw])
             return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
         self._robot.beliefs.show(self._seen.boxes(at))
-        return reachable(self._robot.beliefs, np.array([base.x, base.y, base.yaw]), at, np.random.default_rng(5))
+        pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
+        forward = front is not None and not front.slides
+        return reachable(self._robot.beliefs, pose, at, np.random.default_rng(5), forward=forward)
 
     def grasp(self, at: Position, label: str, candidate: int) -> Felt:
         """Take the surface that was seen at a position. A slip and a wrong thing are not felt."""
@@ -113,7 +115,8 @@ class Handling:
         front = self._seen.front_at(surface.middle)
         measured = measured if front is None else front.floor
         floor = 0.0 if at[2] < FLOOR else float(surface.low[2]) if measured is None else measured
-        return Target(surface, f"thing_{number}", rank, floor)
+        behind = front.behind(surface.middle) if front is not None else 0.0
+        return Target(surface, f"thing_{number}", rank, floor, behind)
 
     def _close_hand(self) -> None:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from schemas.base import as_transform
 from stages.agent.world.physics.eyes import Surface
 from stages.agent.world.physics.fronts import Front
-from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
+from stages.agent.world.physics.grasps import FORWARD_PITCHES, PITCHES, antipodal_grasps, within_reach
 from stages.agent.world.physics.shapes import record_of, slab, urdf_of
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -30,8 +30,8 @@ CANDIDATES = 20
 """Grasps that are tried, those from above first (Han 2024, 3.3.3)."""
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
-APPROACH, LIFT = 0.08, 0.10
-"""Of the hand before and after it closes [m]."""
+APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
+"""Of the hand before and after it closes, and after it does behind a front [m]."""
 DROP = 0.15
 """Height over its target at which the thesis lets go [m]."""
 JUST_OVER = 0.008
@@ -78,6 +78,8 @@ class Target:
     """How often a grasp of it has slipped already: other ones are tried."""
     floor: float
     """Height of what it stands on [m]."""
+    behind: float = 0.0
+    """How far behind an open front it stands [m]: the hand goes in and comes out straight."""
 
 
 @dataclass(frozen=True)
@@ -172,15 +174,25 @@ def _told(entry: Believed) -> object:
     if not isinstance(entry, Front):
         return (*np.round(entry[0], 3).tolist(), *np.round(entry[1], 3).tolist())
     pose = tuple(np.round(entry.map_from_front, 3).ravel().tolist())
-    return (pose, entry.size, entry.panel, entry.bar, round(entry.value, 3))
+    return (pose, entry.size, entry.panel, entry.bar, round(entry.value, 3), entry.floor)
 
 
-def reachable(beliefs: Beliefs, base: np.ndarray, at: tuple[float, float, float], random: np.random.Generator) -> bool:
-    """Whether some hand pose from above or aslant at a position is free from a base pose (3,), in the map."""
+def reachable(
+    beliefs: Beliefs,
+    base: np.ndarray,
+    at: tuple[float, float, float],
+    random: np.random.Generator,
+    *,
+    forward: bool = False,
+) -> bool:
+    """Whether some hand pose from above or aslant, or `forward` into a shelf, at a position is free from a base pose
+    (3,), in the map."""
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
-    for pitch in (np.pi / 2, 1.1):
+    for pitch in FORWARD_PITCHES if forward else (np.pi / 2, 1.1):
         pose = _pointing(float(np.arctan2(at[1] - base[1], at[0] - base[0])), pitch)
-        pose[:3, 3] = (at[0], at[1], at[2] + 0.10)
+        pose[:3, 3] = (at[0], at[1], at[2] + (0.05 if forward else 0.10))
+        if forward:
+            pose[:3, 3] -= 0.10 * pose[:3, 2]
         if shoulder_distance(base, pose, beliefs.description, beliefs.chain) > planner.reach - 0.02:
             continue
         arm = planner.reachable(base, pose, tally, starts=3)
@@ -218,7 +230,7 @@ def plan_grasp(
     searches = 2
     for grasp in grasps:
         try:
-            motion = _one_grasp(planner, base, arm, surface, name, grasp, target.floor, tally)
+            motion = _one_grasp(planner, base, arm, target, grasp, tally)
         except MotionFailed as failed:
             tally.failed(failed)
             searches -= 1
@@ -240,7 +252,7 @@ def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.ran
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     carry, grasps = beliefs.description.carry, _grasps_of(target, base, beliefs.description.opening)[:CANDIDATES]
     try:
-        return any(_way_in(planner, base, carry, target.name, grasp, tally) is not None for grasp in grasps)
+        return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
     finally:
         beliefs.checker.allow()
 
@@ -250,7 +262,9 @@ def _grasps_of(target: Target, base: np.ndarray, opening: float) -> list[np.ndar
     surface = target.surface
     keep = _inside(surface)
     heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    return within_reach(antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor), heading)
+    pitches = FORWARD_PITCHES if target.behind > 0 else PITCHES
+    grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor, pitches)
+    return within_reach(grasps, heading)
 
 
 def _inside(surface: Surface) -> np.ndarray:
@@ -268,25 +282,18 @@ def whole_box(surface: Surface, floor: float) -> Box:
 
 
 def _one_grasp(
-    planner: ArmPlanner,
-    base: np.ndarray,
-    arm: np.ndarray,
-    surface: Surface,
-    name: str,
-    map_from_tool: np.ndarray,
-    floor: float,
-    tally: Tally,
+    planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, target: Target, map_from_tool: np.ndarray, tally: Tally
 ) -> Motion | None:
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     checker, opening = beliefs.checker, beliefs.description.opening
-    way = _way_in(planner, base, arm, name, map_from_tool, tally)
+    way = _way_in(planner, base, arm, target, map_from_tool, tally)
     if way is None:
         return None
     approach, lift = way
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
-    low, high = whole_box(surface, floor)
+    low, high = whole_box(target.surface, target.floor)
     box = np.eye(4)
     box[:3, 3] = (low + high) / 2
     hold = Hold(
@@ -296,7 +303,7 @@ def _one_grasp(
         map_from_tool[:3, :3],
         beliefs.description.carry,
     )
-    beliefs.world.set_pose(name, _far())
+    beliefs.world.set_pose(target.name, _far())
     beliefs.hold(hold)
     checker.allow(touch=(HELD,))
     folded = planner.folded(base, lift[-1], tally)
@@ -311,26 +318,31 @@ def _one_grasp(
 
 
 def _way_in(
-    planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, name: str, map_from_tool: np.ndarray, tally: Tally
+    planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, target: Target, map_from_tool: np.ndarray, tally: Tally
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return arm values (N, 7) from a grasp back to before it, and (M, 7) from it to above; None where one is not
     free."""
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     beliefs.robot.set(Configuration(base, arm, beliefs.description.opening))
-    beliefs.checker.allow(touch=(name,))
+    beliefs.checker.allow(touch=(target.name,))
     at = planner.reachable(base, map_from_tool, tally, starts=3)
     if at is None or not planner.free(base, at, tally):
         return None
     before = map_from_tool.copy()
-    before[:3, 3] -= APPROACH * before[:3, 2]
+    before[:3, 3] -= (APPROACH + target.behind) * before[:3, 2]
     approach = planner.line(base, at, before, tally)
     if approach is None:
         return None
     above = map_from_tool.copy()
-    above[2, 3] += LIFT
+    above[2, 3] += LIFT_INSIDE if target.behind > 0 else LIFT
     lift = planner.line(base, at, above, tally)
-    return None if lift is None else (approach, lift)
+    if lift is None or target.behind == 0:
+        return None if lift is None else (approach, lift)
+    out = above.copy()
+    out[:2, 3] -= (APPROACH + target.behind) * out[:2, 2] / np.linalg.norm(out[:2, 2])
+    way_out = planner.line(base, lift[-1], out, tally)
+    return None if way_out is None else (approach, np.concatenate([lift, way_out[1:]]))
 
 
 def _far() -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from math import atan2, cos, pi, sin
 
 import numpy as np
@@ -24,8 +25,10 @@ SIDEWAYS = (0.0, -0.5, 0.5)
 """Turns of the first joint for the three wrist poses [rad]."""
 STEEP, OVER = (1.5, 1.3, 1.1), 0.45
 """How far down the wrist camera looks at a thing from above, the steepest first [rad], and from how far [m]."""
-FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), 0.6, (0.0, 0.25, -0.25)
+FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
+INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7), (0.0, 0.12, -0.12)
+"""The same of looks into a shelf."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
 
@@ -73,7 +76,13 @@ class Looking:
         found: list[Surface] = []
         renderer = None
         arms = [np.array([np.clip(toward + turn, -2.7, 2.7), *VIEW[1:]]) for turn in ((0.0,) if close else SIDEWAYS)]
-        for arm in arms + (self._arms_over(at) if close else []):
+        shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
+        if shelf is not None and not shelf.slides:
+            arms = self._arms_into(at if close else shelf.opening(), close=close)
+        elif close:
+            arms += self._arms_over(at)
+        in_view = bool(arms)
+        for arm in arms:
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
@@ -93,7 +102,7 @@ class Looking:
         found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
         near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
         self._seen.keep(near, at, piece, close)
-        return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
+        return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close, in_view)
 
     def _count_missed(self) -> None:
         for name in sorted(self._segmenter.missed):
@@ -117,11 +126,16 @@ class Looking:
         self._count_missed()
         return fuse(found)
 
+    def _arms_into(self, at: Position, *, close: bool) -> list[np.ndarray]:
+        """Return arms that hold the wrist camera before an open shelf."""
+        asides = INTO_ASIDE[:1] if close else INTO_ASIDE
+        return [] if self._robot.hold is not None else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
+
     def _arms_at(
-        self, at: Position, pitches: tuple[float, ...], away: float, asides: tuple[float, ...]
+        self, at: Position, pitches: tuple[float, ...], aways: tuple[float, ...], asides: tuple[float, ...]
     ) -> list[np.ndarray]:
-        """Return arms that hold the wrist camera `away` [m] from a position, looking at places `asides` [m] beside it:
-        of each the first of the pitches [rad] at which the arm gets there."""
+        """Return arms that hold the wrist camera away from a position, looking at places `asides` [m] beside it, each by
+        the first of the distances `aways` [m] and pitches [rad] at which the arm gets there."""
         self._robot.beliefs.hold(None)
         self._robot.beliefs.show(self._seen.boxes())
         base, tally = self._robot.believed, Tally()
@@ -130,7 +144,7 @@ class Looking:
         arms = []
         for aside in asides:
             target = np.array(at) + aside * np.array([-sin(heading), cos(heading), 0.0])
-            for pitch in pitches:
+            for away, pitch in product(aways, pitches):
                 ahead = np.array([cos(heading) * cos(pitch), sin(heading) * cos(pitch), -sin(pitch)])
                 tool = look_at(np.array(at) - away * ahead, target) @ inverse(TOOL_FROM_CAMERA)
                 arm = planner.reachable(base, tool, tally, starts=3)

@@ -21,14 +21,15 @@ class NoisyOracle:
     def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
         """Return the masks of furniture, without errors."""
         names = {int(number): self._room.named.get(int(number), "") for number in np.unique(picture.instance)}
+        owners = {number: name.split("__")[0] for number, name in names.items()}  # a door is of its furniture
         return [
-            Mask(self._room.furniture[name].label, picture.instance == number)
-            for number, name in names.items()
-            if name in self._room.furniture
+            Mask(piece.label, np.isin(picture.instance, [number for number, owner in owners.items() if owner == name]))
+            for name, piece in self._room.furniture.items()
+            if name in owners.values()
         ]
 
     def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
-        """Return the masks of things, of handles and of what they are on. `view`: ("hand", number), or (quarter, near)."""
+        """Return the masks of things, handles, doors and drawers. `view`: ("hand", number), or (quarter turn, near)."""
         found = []
         for number in np.unique(picture.instance):
             name = self._room.named.get(int(number), "")

@@ -12,7 +12,7 @@ import numpy as np
 
 from stages.agent.body import Base, Felt, FeltKind, Position
 from stages.agent.world.physics.driving import Driving
-from stages.agent.world.physics.fronts import Front, away_from, bases_before, front_seen, sides_of
+from stages.agent.world.physics.fronts import PARTS, Front, away_from, bases_before, front_seen, sides_of
 from stages.agent.world.physics.looking import Looking
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.agent.world.physics.seen import Seen
@@ -54,7 +54,7 @@ SHARES = (1.0, 0.75)
 SAMPLES = 500
 HERE = 0.12
 """A base this near to one that is asked for stands there [m]."""
-LOOKS_IN = ((0.62, 0.2), (0.72, 0.1), (0.62, 0.35), (0.8, 0.25))
+LOOKS_IN = ((0.6, 0.15), (0.6, 0.28), (0.6, 0.02), (0.5, 0.2))
 """Base poses from which an open leaf's inside is seen: before the front and to the handle's side [m]."""
 
 
@@ -132,7 +132,7 @@ class Pulling:
         if known is not None:
             handle = apply(known.map_from_front, np.array([known.joint.handle]))[0]
             at = (float(handle[0]), float(handle[1]), float(handle[2]))
-        front = front_seen(f"furniture_{number}", piece.label, (low, high), self._looking.look_at_front(at))
+        front = front_seen(f"furniture_{number}", piece.label, (low, high), self._looking.look_at_front(at), base)
         if front is not None:
             self._seen.fronts[front.name] = front
         return front
@@ -202,7 +202,8 @@ class Pulling:
     def _carry_out(self, front: Front, motion: Manipulation) -> float:
         """Carry out a motion along with a front; return where the arm's joints say that it is then.
 
-        Raises MotionFailed; `door_stuck` when the bar is no longer between the fingers.
+        Where the bar is no longer between the fingers, and of a leaf, which swings on, the eyes say it. Raises
+        MotionFailed.
         """
         robot = self._robot
         *there, away, home = motion.segments
@@ -215,17 +216,22 @@ class Pulling:
         shut = apply(inverse(body_from_moved(front.joint, front.value)), contact[None])[0]
         robot.carry_out(tuple(there[start:]))
         slipped = pulls and robot.driver.robot.configuration().opening < NOTHING_GRIPPED
-        value = max(0.0, front.felt(self._tool(robot.measured_arm()), shut))
-        if slipped:
-            value = front.value
+        value = front.value if slipped else max(0.0, front.felt(self._tool(robot.measured_arm()), shut))
         try:
             robot.carry_out((away, home))
         except MotionFailed:
             robot.draw_in()  # it let go already
         robot.driver.wait(0.5)
-        if slipped:
-            raise MotionFailed("door_stuck", f"the handle of {front.name} slipped out of the fingers", (front.name,))
+        if not front.slides or slipped:
+            value = self._seen_open(front, value)
         return value
+
+    def _seen_open(self, front: Front, value: float) -> float:
+        """Return how far a front is open as seen from here; where it is not seen, the `value` that was felt."""
+        handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
+        at = (float(handle[0]), float(handle[1]), float(handle[2]))
+        seen = [s for s in self._looking.look_at_front(at) if s.label in PARTS[1:]]
+        return max(0.0, front.value_seen(max(seen, key=lambda s: len(s.points)).points)) if seen else value
 
     def _tool(self, arm: np.ndarray) -> np.ndarray:
         """Return the tool point (3,) of the map for joint values (7,)."""
