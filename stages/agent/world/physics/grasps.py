@@ -40,6 +40,8 @@ OF_ONE_PITCH = 8
 """Grasps that come equally steeply, at most: where the arm cannot come from above, the others have their turn."""
 ASIDE = 0.3
 """Least cosine between where an aslant hand comes from and where the robot stands: it does not reach around a thing."""
+STRAIGHT = 0.8
+"""The same of a hand that goes into a shelf, which has walls."""
 TIP_BEFORE = 0.008
 """The tool point lies this far behind the finger tips [m]."""
 
@@ -107,15 +109,15 @@ def _grasp_at(
     return pose, square, float(last - first)
 
 
-def within_reach(grasps: list[np.ndarray], heading: float) -> list[np.ndarray]:
+def within_reach(grasps: list[np.ndarray], heading: float, least: float = ASIDE) -> list[np.ndarray]:
     """Return those of grasps (4, 4) that an arm may get at that stands before the thing, a few of each pitch in their
-    order. `heading` [rad]: from the base to the thing."""
+    order. `heading` [rad]: from the base to the thing; `least`: cosine between that and where a hand comes from."""
     kept: list[np.ndarray] = []
     of_pitch: dict[float, int] = {}
     for pose in grasps:
         along = pose[:2, 2]
         pitch, level = round(float(pose[2, 2]), 2), float(np.hypot(*along))
-        aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < ASIDE * level
+        aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < least * level
         if not aside and of_pitch.get(pitch, 0) < OF_ONE_PITCH:
             of_pitch[pitch] = of_pitch.get(pitch, 0) + 1
             kept.append(pose)

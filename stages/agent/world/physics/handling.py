@@ -115,8 +115,10 @@ class Handling:
         front = self._seen.front_at(surface.middle)
         measured = measured if front is None else front.floor
         floor = 0.0 if at[2] < FLOOR else float(surface.low[2]) if measured is None else measured
-        behind = front.behind(surface.middle) if front is not None else 0.0
-        return Target(surface, f"thing_{number}", rank, floor, behind)
+        if front is None:
+            return Target(surface, f"thing_{number}", rank, floor)
+        inward = float(np.arctan2(*-front.map_from_front[1::-1, 0]))
+        return Target(surface, f"thing_{number}", rank, floor, front.behind(surface.middle), inward)
 
     def _close_hand(self) -> None:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]

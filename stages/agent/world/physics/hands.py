@@ -12,15 +12,15 @@ from scipy.spatial.transform import Rotation
 from schemas.base import as_transform
 from stages.agent.world.physics.eyes import Surface
 from stages.agent.world.physics.fronts import Front
-from stages.agent.world.physics.grasps import FORWARD_PITCHES, PITCHES, antipodal_grasps, within_reach
+from stages.agent.world.physics.grasps import FORWARD_PITCHES, STRAIGHT, antipodal_grasps, within_reach
 from stages.agent.world.physics.shapes import record_of, slab, urdf_of
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.base_placement import shoulder_distance
+from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.grasps import narrowest_width
-from stages.kit.motion.kinematics import arm_chain
+from stages.kit.motion.kinematics import arm_chain, inverse_kinematics, random_starts
 from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
@@ -43,6 +43,8 @@ SOME_WAY_OVER = 0.06
 TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6))
 """How the hand is turned about the vertical, and leaned away from the robot where it gets no farther upright [rad]."""
 SLOW = 0.35
+ELBOWS = 12
+"""Ways to hold the elbow that are tried where the first is in the way."""
 SAMPLES = 500
 """Of one path search."""
 NESTLES = 0.015
@@ -80,6 +82,8 @@ class Target:
     """Height of what it stands on [m]."""
     behind: float = 0.0
     """How far behind an open front it stands [m]: the hand goes in and comes out straight."""
+    inward: float = 0.0
+    """Heading that goes straight into that front [rad]."""
 
 
 @dataclass(frozen=True)
@@ -262,8 +266,10 @@ def _grasps_of(target: Target, base: np.ndarray, opening: float) -> list[np.ndar
     surface = target.surface
     keep = _inside(surface)
     heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    pitches = FORWARD_PITCHES if target.behind > 0 else PITCHES
-    grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor, pitches)
+    if target.behind > 0:
+        grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor, FORWARD_PITCHES)
+        return within_reach(grasps, target.inward, STRAIGHT)
+    grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor)
     return within_reach(grasps, heading)
 
 
@@ -327,7 +333,9 @@ def _way_in(
     beliefs.robot.set(Configuration(base, arm, beliefs.description.opening))
     beliefs.checker.allow(touch=(target.name,))
     at = planner.reachable(base, map_from_tool, tally, starts=3)
-    if at is None or not planner.free(base, at, tally):
+    if at is not None and not planner.free(base, at, tally):
+        at = _by_another_elbow(planner, base, map_from_tool, tally) if target.behind > 0 else None
+    if at is None:
         return None
     before = map_from_tool.copy()
     before[:3, 3] -= (APPROACH + target.behind) * before[:3, 2]
@@ -343,6 +351,18 @@ def _way_in(
     out[:2, 3] -= (APPROACH + target.behind) * out[:2, 2] / np.linalg.norm(out[:2, 2])
     way_out = planner.line(base, lift[-1], out, tally)
     return None if way_out is None else (approach, np.concatenate([lift, way_out[1:]]))
+
+
+def _by_another_elbow(
+    planner: ArmPlanner, base: np.ndarray, map_from_tool: np.ndarray, tally: Tally
+) -> np.ndarray | None:
+    """Return free arm values (7,) for a tool pose that the arm gets to with its elbow in the way of something."""
+    chain, wanted = planner.model.chain, in_arm_frame(base, map_from_tool, planner.model.description)
+    for start in random_starts(chain, ELBOWS, planner.random):
+        found = inverse_kinematics(chain, wanted, start[None])
+        if found.found and planner.free(base, found.arm, tally):
+            return found.arm
+    return None
 
 
 def _far() -> np.ndarray:

@@ -134,8 +134,8 @@ class Looking:
     def _arms_at(
         self, at: Position, pitches: tuple[float, ...], aways: tuple[float, ...], asides: tuple[float, ...]
     ) -> list[np.ndarray]:
-        """Return arms that hold the wrist camera away from a position, looking at places `asides` [m] beside it, each by
-        the first of the distances `aways` [m] and pitches [rad] at which the arm gets there."""
+        """Return arms that hold the wrist camera away from a position, looking at places `asides` [m] beside it: each
+        by the first of the distances `aways` [m] and pitches [rad] at which the arm gets there."""
         self._robot.beliefs.hold(None)
         self._robot.beliefs.show(self._seen.boxes())
         base, tally = self._robot.believed, Tally()
