@@ -54,7 +54,7 @@ SHARES = (1.0, 0.75)
 SAMPLES = 500
 HERE = 0.12
 """A base this near to one that is asked for stands there [m]."""
-LOOKS_IN = ((0.6, 0.15), (0.6, 0.28), (0.6, 0.02), (0.5, 0.2))
+LOOKS_IN = ((0.6, 0.15), (0.6, 0.28), (0.6, 0.02))
 """Base poses from which an open leaf's inside is seen: before the front and to the handle's side [m]."""
 
 

@@ -24,7 +24,7 @@ FOUND_WITHIN = 0.12
 FLOOR, FLOOR_AROUND = 0.05, 1.6
 """What begins lower lies on the floor [m], and how far around its middle a look at the floor tells of it [m]."""
 NEARER = 0.08
-"""The folded elbow goes over a drawer, and the arm into a shelf: the base stands so much nearer there [m]."""
+"""The folded elbow goes over a drawer: the base stands so much nearer to it than to furniture [m]."""
 BESIDE_PART = 0.06
 """What the head sees so near to a leaf or a drawer is of it [m]."""
 AROUND = 1.4
@@ -58,7 +58,7 @@ class Seen:
         piece = self.pieces[number]
         low, high = piece.box
         front = self.fronts.get(f"furniture_{number}")
-        if front is not None and front.value > 0:
+        if front is not None and front.slides and front.value > 0:
             ends = zip(footprint(front, NEARER), (low[2], high[2]), strict=True)
             low, high = (np.array([*corner, z]) for corner, z in ends)
         centre, size = (low + high) / 2, np.maximum(high - low, 0.1)
