@@ -32,6 +32,8 @@ ROOM = 0.008
 """Around a bar that the hand keeps when it goes past it [m]."""
 OVER = 0.025
 """Believed of a front over where its mask ends, which is a pixel too low [m]."""
+BEHIND_BAR = 0.03
+"""Room of a hand's fingers behind a bar: so far is a front from it where it was not seen itself [m]."""
 STAYS = 0.04
 """Of a drawer stays in [m]."""
 WIDEST = 1.9
@@ -195,6 +197,8 @@ def front_seen(
     slides = label in WITH_DRAWERS
     frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*middle[:2], 0.0]))
     own = apply(inverse(frame), panel)
+    if not panels:
+        own[:, 0] = np.percentile(apply(inverse(frame), handle)[:, 0], 95) - 2 * HALF_BAR - BEHIND_BAR
     plane = float(np.median(own[:, 0]))
     (y0, y1), (z0, z1) = edges(own[:, 1:]), edges(own[:, :0:-1])
     if y1 - y0 < NARROWEST:
@@ -205,7 +209,7 @@ def front_seen(
     shift[:2, 3] = (plane - half_depth) / 2, (y0 + y1) / 2  # the back is where the box ends
     frame, half_depth, half_width = frame @ shift, (half_depth + plane) / 2, (y1 - y0) / 2
     bar = apply(inverse(frame), handle)
-    bar = bar[bar[:, 0] > half_depth + 0.015]  # what is farther back is the panel seen beside the bar
+    bar = bar[bar[:, 0] > half_depth + BEHIND_BAR / 2]  # what is farther back is the panel seen beside the bar
     if len(bar) < 5:
         return None
     near, far = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)

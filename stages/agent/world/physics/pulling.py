@@ -31,7 +31,7 @@ from stages.kit.motion.doors import (
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward
 from stages.kit.motion.rrt_connect import SearchSpace
-from stages.kit.motion.segments import Manipulation
+from stages.kit.motion.segments import Manipulation, Segment
 from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.shapes import joined, link_shapes
 
@@ -45,6 +45,8 @@ FINE = 0.02
 """Largest step of a joint between two checks [rad]: a bar is thinner than what the elbow sweeps in a larger one."""
 GRIP_OPENING = 0.06
 """Of the fingers around a bar before they close [m]: there is little room behind it."""
+DEEPER = 0.008
+"""Of the tool point behind the middle of a bar [m]: held by their ends alone, the fingers slide off it."""
 NOTHING_GRIPPED = 0.01
 """Opening of the fingers below which they hold no bar [m]."""
 PRESS, OVERSHOOT = 0.006, 0.02
@@ -185,7 +187,7 @@ class Pulling:
                 for roll in (0.0, pi) if abs(bar[2]) > 0.5 else (pi / 2, -pi / 2):
                     for tilt in TILTS:
                         turns = np.full(len(values), tilt)
-                        arc = Arc(front.name, joint, contact, values, turns, roll, 0.0, GRIP_OPENING, 0.0)
+                        arc = Arc(front.name, joint, contact, values, turns, roll, -DEEPER, GRIP_OPENING, 0.0)
                         motion = along_arc(self._robot.beliefs, self._robot.arm, arc, base, planner, tally)
                         if motion is not None:
                             return motion
@@ -207,16 +209,13 @@ class Pulling:
         """
         robot = self._robot
         *there, away, home = motion.segments
-        pulls = there[-1].label == "pull"
         start = next(k for k, segment in enumerate(there) if segment.label in ("pull", "push"))
         robot.room.world.wake()
-        robot.carry_out(tuple(there[:start]))
-        before = self._tool(there[start].path[0, 3:])
-        contact = front.local(before[None])[0]
-        shut = apply(inverse(body_from_moved(front.joint, front.value)), contact[None])[0]
-        robot.carry_out(tuple(there[start:]))
-        slipped = pulls and robot.driver.robot.configuration().opening < NOTHING_GRIPPED
-        value = front.value if slipped else max(0.0, front.felt(self._tool(robot.measured_arm()), shut))
+        robot.driver.robot.finger_force = robot.description.firm_finger_force
+        try:
+            value, slipped = self._along(front, there, start)
+        finally:
+            robot.driver.robot.finger_force = robot.description.finger_force
         try:
             robot.carry_out((away, home))
         except MotionFailed:
@@ -225,6 +224,18 @@ class Pulling:
         if not front.slides or slipped:
             value = self._seen_open(front, value)
         return value
+
+    def _along(self, front: Front, there: list[Segment], start: int) -> tuple[float, bool]:
+        """Carry out the segments of which number `start` is the first that moves a front; return where the arm's joints
+        say that it is then, and whether the bar slipped out of the fingers."""
+        robot = self._robot
+        robot.carry_out(tuple(there[:start]))
+        before = front.local(self._tool(there[start].path[0, 3:])[None])
+        shut = apply(inverse(body_from_moved(front.joint, front.value)), before)[0]
+        robot.carry_out(tuple(there[start:]))
+        if there[start].label == "pull" and robot.driver.robot.configuration().opening < NOTHING_GRIPPED:
+            return front.value, True
+        return max(0.0, front.felt(self._tool(robot.measured_arm()), shut)), False
 
     def _seen_open(self, front: Front, value: float) -> float:
         """Return how far a front is open as seen from here; where it is not seen, the `value` that was felt."""
