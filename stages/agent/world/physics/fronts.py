@@ -44,6 +44,8 @@ LOOK_AT = 0.6
 """Height at which it is looked into, as a share of its own."""
 NARROWEST = 0.25
 """Of a front that was looked at, and not its edge [m]."""
+AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
+"""From where a side is looked at: before it, and beside its middle [m]."""
 EDGE_CELL = 0.01
 TRAY = 0.5
 """Height of the sides of a drawer, as a share of its front's."""
@@ -250,7 +252,7 @@ def bases_before(front: Front) -> list[np.ndarray]:
     at = np.array(front.joint.handle or (0.0, 0.0, 0.0))
     x = front.size[0] / 2
     if front.slides:
-        spots = [(away, at[1] + aside) for aside in (0.0, 0.35, -0.35, 0.5, -0.5) for away in (0.85, 0.75, 0.65)]
+        spots = [(away, at[1] + aside) for aside in (0.0, 0.35, -0.35, 0.5, -0.5) for away in AWAYS]
     else:
         side = -front.joint.axis[2]
         offs = ((0.75, 0.15), (0.65, 0.25), (0.85, 0.1), (0.85, 0.3), (0.55, 0.35), (0.75, -0.05), (0.95, 0.15))
@@ -262,14 +264,17 @@ def bases_before(front: Front) -> list[np.ndarray]:
     return made
 
 
-def sides_of(box: tuple[np.ndarray, np.ndarray], off: float) -> list[np.ndarray]:
-    """Return base poses (3,) before the middles of the four sides of a box, `off` [m] from them."""
-    centre, half = (box[0] + box[1]) / 2, (box[1] - box[0]) / 2
-    poses = []
-    for normal in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        x, y = (c + n * (h + off) for c, n, h in zip(centre[:2], normal, half[:2], strict=True))
-        poses.append(np.array([x, y, atan2(-normal[1], -normal[0])]))
-    return poses
+def sides_of(box: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the middles (2,) of the four sides of a box with their unit normals (2,)."""
+    centre, half = (box[0] + box[1])[:2] / 2, (box[1] - box[0])[:2] / 2
+    return [(centre + normal * half, normal) for normal in np.array([(1, 0), (-1, 0), (0, 1), (0, -1)], float)]
+
+
+def before(middle: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
+    """Return base poses (3,) from which a side (its middle and normal, (2,)) is looked at, the best first."""
+    left = np.array([-normal[1], normal[0]])
+    spots = (middle + away * normal + aside * left for aside in ASIDES for away in AWAYS)
+    return [np.array([*spot, atan2(*(middle - spot)[::-1])]) for spot in spots]
 
 
 def away_from(front: Front, base: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from stages.agent.body import Base, Detection, Look, Position, Sweep
 from stages.agent.scene_map import quarter
 from stages.agent.world.physics import head
 from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Mask, Segmenter, Surface, fuse, seen_in
-from stages.agent.world.physics.fronts import PARTS
+from stages.agent.world.physics.fronts import PARTS, Front
 from stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
 from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
 from stages.kit.geometry.cameras import back_project
@@ -78,7 +78,7 @@ class Looking:
         arms = [np.array([np.clip(toward + turn, -2.7, 2.7), *VIEW[1:]]) for turn in ((0.0,) if close else SIDEWAYS)]
         shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
         if shelf is not None and not shelf.slides:
-            arms = self._arms_into(at if close else shelf.opening(), close=close)
+            arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)
         elif close:
             arms += self._arms_over(at)
         in_view = bool(arms)
@@ -126,10 +126,11 @@ class Looking:
         self._count_missed()
         return fuse(found)
 
-    def _arms_into(self, at: Position, *, close: bool) -> list[np.ndarray]:
-        """Return arms that hold the wrist camera before an open shelf."""
+    def _arms_into(self, shelf: Front, at: Position, *, close: bool) -> list[np.ndarray]:
+        """Return arms that hold the wrist camera before an open shelf; none where the robot does not stand there."""
         asides = INTO_ASIDE[:1] if close else INTO_ASIDE
-        return [] if self._robot.hold is not None else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
+        before = shelf.local(np.array([[*self._robot.believed[:2], 0.0]]))[0, 0] > shelf.size[0] / 2
+        return [] if self._robot.hold is not None or not before else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
 
     def _arms_at(
         self, at: Position, pitches: tuple[float, ...], aways: tuple[float, ...], asides: tuple[float, ...]

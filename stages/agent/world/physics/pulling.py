@@ -12,7 +12,7 @@ import numpy as np
 
 from stages.agent.body import Base, Felt, FeltKind, Position
 from stages.agent.world.physics.driving import Driving
-from stages.agent.world.physics.fronts import PARTS, Front, away_from, bases_before, front_seen, sides_of
+from stages.agent.world.physics.fronts import PARTS, Front, away_from, bases_before, before, front_seen, sides_of
 from stages.agent.world.physics.looking import Looking
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.agent.world.physics.seen import Seen
@@ -35,8 +35,8 @@ from stages.kit.motion.segments import Manipulation, Segment
 from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.shapes import joined, link_shapes
 
-BEFORE, HEIGHT_OF_LOOK = 0.85, 0.65
-"""Of the base from a side that may be the front [m], and at which share of its height it is looked at."""
+HEIGHT_OF_LOOK = 0.65
+"""At which share of its height a side is looked at."""
 PITCHES = (0.0, 0.5, 0.9)
 """How far the hand comes down to a bar [rad]."""
 TILTS, WIDE_TILTS = (0.0, 0.35, -0.35, 0.7, -0.7), ((1.0, 0.0), (-1.0, 0.0), (0.5, -0.5), (-0.5, 0.5))
@@ -103,38 +103,39 @@ class Pulling:
     def _find(self, number: int) -> Front:
         """Return the front of furniture with its handle, looked for from before its sides, those with most room first.
         Raises MotionFailed `no_grasp`."""
-        box = self._seen.pieces[number].box
-        poses = [pose for pose in sides_of(box, BEFORE) if self._seen.obstacles.fits(pose[0], pose[1])]
-        poses.sort(key=lambda pose: -self._room_behind(pose))
-        for pose in poses:
-            if self._go(pose, self._seen.pieces[number].label):
-                front = self._look(number)
+        label, fits = self._seen.pieces[number].label, self._seen.obstacles.fits
+        looked, sides = 0, sides_of(self._seen.pieces[number].box)
+        for middle, normal in sorted(sides, key=lambda side: -self._room_before(*side)):
+            pose = next((pose for pose in before(middle, normal) if fits(pose[0], pose[1])), None)
+            if pose is not None and self._go(pose, label):
+                looked += 1
+                front = self._look(number, middle)
                 if front is not None:
                     return front
-        label = self._seen.pieces[number].label
         raise MotionFailed(
-            "no_grasp", f"no handle of the {label} was seen from {len(poses)} sides", (label,), {"sides": len(poses)}
+            "no_grasp", f"no handle of the {label} was seen from {looked} sides", (label,), {"sides": looked}
         )
 
-    def _room_behind(self, pose: np.ndarray) -> int:
-        """Return how many steps of 10 cm a base pose (3,) could be moved back."""
-        back = -np.array([np.cos(pose[2]), np.sin(pose[2])])
-        steps = (pose[:2] + 0.1 * k * back for k in range(1, 40))
-        return next((k for k, at in enumerate(steps) if not self._seen.obstacles.fits(*at)), 40)
+    def _room_before(self, middle: np.ndarray, normal: np.ndarray) -> int:
+        """Return at how many of 40 distances, 10 cm apart, the base fits before a side."""
+        return sum(self._seen.obstacles.fits(*(middle + 0.1 * k * normal)) for k in range(1, 41))
 
-    def _look(self, number: int) -> Front | None:
-        """Look at the side of furniture that the robot stands before; keep the front, if its handle is there."""
+    def _look(self, number: int, middle: np.ndarray | None = None) -> Front | None:
+        """Look at the handle of furniture where it was seen before, or at the `middle` (2,) of a side; keep the front,
+        if its handle is there."""
         piece, base = self._seen.pieces[number], self._robot.believed
         low, high = piece.box
-        nearest = np.clip(base[:2], low[:2], high[:2])
         known = self._seen.fronts.get(f"furniture_{number}")
         if known is not None and known.value > 0:
             return known  # half open, the handle does not tell where the front is
-        at = (float(nearest[0]), float(nearest[1]), HEIGHT_OF_LOOK * float(high[2]))
         if known is not None:
-            handle = apply(known.map_from_front, np.array([known.joint.handle]))[0]
-            at = (float(handle[0]), float(handle[1]), float(handle[2]))
-        front = front_seen(f"furniture_{number}", piece.label, (low, high), self._looking.look_at_front(at), base)
+            at = apply(known.map_from_front, np.array([known.joint.handle]))[0]
+        else:
+            assert middle is not None
+            at = np.array([*middle, HEIGHT_OF_LOOK * high[2]])
+        front = front_seen(
+            f"furniture_{number}", piece.label, (low, high), self._looking.look_at_front(_position(at)), base
+        )
         if front is not None:
             self._seen.fronts[front.name] = front
         return front
@@ -240,8 +241,7 @@ class Pulling:
     def _seen_open(self, front: Front, value: float) -> float:
         """Return how far a front is open as seen from here; where it is not seen, the `value` that was felt."""
         handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
-        at = (float(handle[0]), float(handle[1]), float(handle[2]))
-        seen = [s for s in self._looking.look_at_front(at) if s.label in PARTS[1:]]
+        seen = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
         return max(0.0, front.value_seen(max(seen, key=lambda s: len(s.points)).points)) if seen else value
 
     def _tool(self, arm: np.ndarray) -> np.ndarray:
@@ -313,6 +313,10 @@ class Pulling:
                     if motion is not None:
                         return motion
         return None
+
+
+def _position(at: np.ndarray) -> Position:
+    return (float(at[0]), float(at[1]), float(at[2]))
 
 
 def _felt_kind(failed: MotionFailed) -> FeltKind:
