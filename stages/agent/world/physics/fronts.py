@@ -217,7 +217,7 @@ def front_seen(
     near, far = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)
     near[0] = far[0] - 2 * HALF_BAR
     extent = (-half_width, half_width, z0 if slides else LEAF, min(z1, float(high[2])))
-    size = (2 * half_depth, 2 * half_width, float(high[2]))
+    size = (float(2 * half_depth), float(2 * half_width), float(high[2]))
     return Front(name, label, frame, size, extent, (tuple(near.tolist()), tuple(far.tolist())), slides)
 
 

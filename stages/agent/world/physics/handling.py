@@ -40,11 +40,11 @@ class Handling:
         """Whether a free arm pose over a position exists in the robot's own map, from a base pose; to `take` what was
         seen there a grasp of it."""
         self._robot.beliefs.hold(None)
-        target = self._target(at, 0) if take else None
+        target = self._target(at, 0, base) if take else None
         if target is not None:
             pose = np.array([base.x, base.y, base.yaw])
             return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
-        self._robot.beliefs.show(self._seen.boxes(at))
+        self._robot.beliefs.show(self._seen.boxes(at, base))
         pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
         forward = front is not None and not front.slides
         return reachable(self._robot.beliefs, pose, at, np.random.default_rng(5), forward=forward)
@@ -101,15 +101,16 @@ class Handling:
             self._robot.hold = None
             self._robot.driver.held = None
 
-    def _target(self, at: Position, rank: int) -> Target | None:
-        """Return what was seen nearest to a position, and show the arm what is around; None where nothing was seen."""
+    def _target(self, at: Position, rank: int, base: Base | None = None) -> Target | None:
+        """Return what was seen nearest to a position, and show the arm what is around a base pose, the robot's own if
+        none is given; None where nothing was seen."""
         away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._seen.surfaces]
         if not away or min(away) > FOUND_WITHIN:
             return None
         surface = self._seen.surfaces[int(np.argmin(away))]
         self._seen.surfaces = [s for s in self._seen.surfaces if s is surface or not s.same_as(surface)]
         number = next(k for k, s in enumerate(self._seen.surfaces) if s is surface)
-        self._robot.beliefs.show(self._seen.boxes())
+        self._robot.beliefs.show(self._seen.boxes(None, base))
         piece = self._seen.piece_at(at)
         measured = self._seen.pieces[piece].measured_top if piece is not None else None
         front = self._seen.front_at(surface.middle)

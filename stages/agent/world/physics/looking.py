@@ -27,7 +27,7 @@ STEEP, OVER = (1.5, 1.3, 1.1), 0.45
 """How far down the wrist camera looks at a thing from above, the steepest first [rad], and from how far [m]."""
 FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
-INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7), (0.0, 0.12, -0.12)
+INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8), (0.0, 0.12, -0.12)
 """The same of looks into a shelf."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
@@ -81,7 +81,8 @@ class Looking:
             arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)
         elif close:
             arms += self._arms_over(at)
-        in_view = bool(arms)
+        if not arms:
+            return Look((), sector, close, in_view=False)
         for arm in arms:
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
@@ -102,7 +103,7 @@ class Looking:
         found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
         near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
         self._seen.keep(near, at, piece, close)
-        return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close, in_view)
+        return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
 
     def _count_missed(self) -> None:
         for name in sorted(self._segmenter.missed):

@@ -8,7 +8,7 @@ from math import hypot
 
 import numpy as np
 
-from stages.agent.body import Position, SeenFurniture
+from stages.agent.body import Base, Position, SeenFurniture
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.world.physics import head
 from stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
@@ -152,12 +152,14 @@ class Seen:
         away = [s for s in self.surfaces if not any(s is old for old in known)]
         self.surfaces = away + [better.get(id(s), s) for s in fresh]
 
-    def boxes(self, without: Position | None = None) -> dict[str, Believed]:
-        """Return what is around the base in the map; what covers a position is left out."""
+    def boxes(self, without: Position | None = None, base: Base | None = None) -> dict[str, Believed]:
+        """Return what is around a base pose in the map, the robot's own if none is given; what covers a position is
+        left out."""
+        here = np.array([base.x, base.y]) if base is not None else self._robot.believed[:2]
         boxes: dict[str, Believed] = {}
         for number, piece in enumerate(self.pieces):
             low, high = piece.box
-            off = np.maximum(0.0, np.maximum(low[:2] - self._robot.believed[:2], self._robot.believed[:2] - high[:2]))
+            off = np.maximum(0.0, np.maximum(low[:2] - here, here - high[:2]))
             if len(piece.cubes) >= head.LEAST and np.hypot(*off) < AROUND:
                 if f"furniture_{number}" in self.fronts:
                     boxes[f"furniture_{number}"] = self.fronts[f"furniture_{number}"]
@@ -172,7 +174,7 @@ class Seen:
             low, high = surface.low, surface.high
             if (
                 not (without is not None and _covers(surface, without))
-                and np.hypot(*(surface.middle - [*self._robot.believed[:2], 0])[:2]) < AROUND
+                and np.hypot(*(surface.middle[:2] - here)) < AROUND
             ):
                 boxes[f"thing_{number}"] = (low, high)
         return boxes
