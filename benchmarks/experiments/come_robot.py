@@ -7,18 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.experiment import (
-    RESAMPLES,
-    SEED_OF_INTERVALS,
-    Bench,
-    Experiment,
-    Measure,
-    Pooled,
-    Results,
-    Trial,
-    count,
-    mean,
-)
+from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Share, Trial, count, mean, pooled
 from benchmarks.tabulation import Figure, markdown
 from stages.agent.arms.registry import ARMS
 from stages.agent.judging import CAUSES, Score, score
@@ -26,7 +15,6 @@ from stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
 from stages.agent.trials import Setting, run_trial
 from stages.agent.world.failures import TABLE_3_4, Rates
 from stages.agent.world.floor import Floor
-from stages.kit.measurement.bootstrap import pooled_interval
 
 TUNING, REPORTING = (*range(1100), *range(2000, 2100), *range(4000, 4100)), range(5000, 5100)
 """Versions 1, 3 and 4 were reported on seeds 1000 to 1099, 2000 to 2099 and 4000 to 4099: they were seen."""
@@ -111,9 +99,9 @@ def share(part: str, whole: str) -> Pooled:
     return Pooled(lambda record: (100.0 * getattr(record, part), float(getattr(record, whole))))
 
 
-def percent(name: str) -> Pooled:
+def percent(name: str) -> Share:
     """Return a figure: the share of trials of which something is true."""
-    return Pooled(lambda record: (100.0 * getattr(record, name), 1.0))
+    return Share(lambda record: (100.0 * getattr(record, name), 1.0), 100.0)
 
 
 def failed(cause: str, which: int) -> Callable[[Sequence[Record]], float | None]:
@@ -130,8 +118,8 @@ def more_figures(results: Results) -> Mapping[str, float | Figure | None]:
 def of_groups(
     results: Results, groups: Mapping[str, Sequence[str]], arms: Sequence[str]
 ) -> dict[str, float | Figure | None]:
-    """Return figures over all trials of a group of cases, `<arm>/<group>/<measure>`, shares with intervals that
-    resample trials."""
+    """Return figures over all trials of a group of cases, `<arm>/<group>/<measure>`, shares with intervals over
+    trials."""
     flat: dict[str, float | Figure | None] = {}
     for group, cases in groups.items():
         for arm in arms:
@@ -139,9 +127,7 @@ def of_groups(
             for name in ("success", "step_success", "recovery", "false_success") if records else ():
                 of = MEASURES[name].of
                 assert isinstance(of, Pooled)
-                parts = np.array([of.parts(record) for record in records])
-                random = np.random.default_rng(SEED_OF_INTERVALS)
-                found = pooled_interval(parts, None, random, resamples=RESAMPLES)
+                found = pooled(of, np.array([of.parts(record) for record in records]))
                 if found is not None:
                     figure = Figure(found.value, found.low, found.high, len(records), "%")
                     flat[f"{arm}/{group}/{name}"] = figure
