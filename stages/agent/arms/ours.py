@@ -267,11 +267,11 @@ class OwnSkills(CommonSkills):
     def _stations(self, place: str, at: Position, *, take: bool = False) -> Iterator[Base]:
         """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short
         arm explores until one is known. To `take` what is there a grasp of what was seen so far has to be possible,
-        or, where none is from anywhere, the first pose that reaches shows more."""
+        or, where none is from anywhere, a pose that reaches shows more, and the next one other sides of it."""
         wanted, tried = take, list[Base]()
         while len(tried) < TRIES:
             fresh = self._fresh(place, at, tried, take)
-            if fresh is None and take and not tried:
+            if fresh is None and take:
                 take = False
                 continue
             if fresh is None:
