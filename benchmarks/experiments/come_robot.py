@@ -30,8 +30,8 @@ CURVES = {
     for scale in SCALES
 }
 """Case -> factors of the rates of execution and of perception."""
-FEWER, CURVED = {MIXED: 50}, 25
-"""Seeds of a case that is no task with the rates as they are, for want of processor time."""
+CURVED = 50
+"""Seeds of a case with other rates, for want of processor time."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class Record:
 
 
 def seeds_of(bench: Bench, case: str) -> list[str]:
-    """The first seeds are enough for ablations and curves."""
-    most = FEWER.get(case, CURVED if case in CURVES else None)
+    """The first seeds are enough for curves."""
+    most = CURVED if case in CURVES else None
     return [str(seed) for seed in (TUNING if bench.tuning else REPORTING)[:most]]
 
 
