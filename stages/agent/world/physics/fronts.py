@@ -102,10 +102,8 @@ class Front:
             slab((-x, -w, 0.0), (inner, w, z0 if self.slides else THICK)),
             slab((-x, -w, max(z1 if self.slides else 0.0, h - THICK)), (inner, w, h)),
         ]
-        grown = tuple(tuple(v + sign * ROOM for v in end) for sign, end in zip((-1, 1), self.bar, strict=True))
-        if self.floor is not None and not self.slides:
-            still.append(slab((-x, -w, self.floor - LEAF), (inner, w, self.floor - 0.003)))
-        moving = [slab((inner, y0, z0), (x, y1, z1 + OVER)), slab(*grown)]
+        low, high = np.array(self.bar[0]) - ROOM, np.array(self.bar[1]) + ROOM
+        moving = [slab((inner, y0, z0), (x, y1, z1 + OVER)), slab(as_vector(low), as_vector(high))]
         if self.slides:
             edge = z0 + TRAY * (z1 - z0)
             far = STAYS - x
