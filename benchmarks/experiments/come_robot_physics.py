@@ -24,6 +24,7 @@ CASES = tuple(f"{task}/physics" for task in (*THESIS_TASKS, *WITH_DOORS, *IMPOSS
 GROUPS = {
     "tabletop": CASES[:4],
     "mobile": CASES[4:8],
+    "without_doors": CASES[:8],
     "doors": CASES[8:10],
     "possible": CASES[:10],
     "impossible": CASES[10:],
