@@ -24,6 +24,7 @@ from stages.kit.measurement.bootstrap import (
     paired_interval,
     pooled_interval,
 )
+from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.stage import Parameters
 
 RESAMPLES = 2000
@@ -87,6 +88,27 @@ class Pooled:
         """Return the figure; None with nothing below the line."""
         above, below = self.sums(records)
         return above / below if below else None
+
+
+@dataclass(frozen=True)
+class Share(Pooled):
+    """How many of all tries: each record adds `whole` or 0 to what is above the line, and 1 or 0 below it."""
+
+    whole: float = 1.0
+
+
+def pooled(of: Pooled, parts: np.ndarray) -> Interval | None:
+    """Return a pooled figure of clusters (N, 2) with its 95 % interval; None with nothing below the line.
+
+    Percentile bootstrap over clusters, but Wilson's (1927) for a share of which each cluster is one try: tries that all
+    came out alike would have an interval without width.
+    """
+    tries = int(parts[:, 1].sum())
+    if not isinstance(of, Share) or not tries or (parts[:, 1] > 1).any():
+        return pooled_interval(parts, None, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES)
+    successes = round(parts[:, 0].sum() / of.whole)
+    low, high = wilson_interval(successes, tries)
+    return Interval(of.whole * successes / tries, of.whole * low, of.whole * high)
 
 
 Measuring = Callable[[Bench, Sequence[Trial]], Iterable[tuple[Trial, Any]]]
@@ -220,15 +242,16 @@ class Results:
         return self.experiment.measures[measure].of(records) if records else None
 
     def interval(self, arm: str, case: str, measure: str) -> Interval | None:
-        """A measure with its 95 % percentile bootstrap interval over clusters of seeds; None where it is undefined, or
-        where there are fewer than two clusters."""
+        """A measure with its 95 % interval over clusters of seeds, by percentile bootstrap, or as `pooled` says; None
+        where it is undefined, or where there are fewer than two clusters."""
         names = list(self._grouped(arm, case))
         if len(names) < LEAST_CLUSTERS:
             return None
-        random = np.random.default_rng(SEED_OF_INTERVALS)
-        parts = self._parts(arm, case, measure, names)
+        of, parts = self.experiment.measures[measure].of, self._parts(arm, case, measure, names)
         if parts is not None:
-            return pooled_interval(parts, None, random, resamples=RESAMPLES)
+            assert isinstance(of, Pooled)
+            return pooled(of, parts)
+        random = np.random.default_rng(SEED_OF_INTERVALS)
         return figure_interval(self._figure(arm, case, measure, names), range(len(names)), random, resamples=RESAMPLES)
 
     def difference(self, first: str, second: str, case: str, measure: str) -> Interval | None:
@@ -314,6 +337,16 @@ def mean(name: str, unit: str = "", *, interval: bool = True) -> Measure:
         return (0.0, 0.0) if value is None else (float(value), 1.0)
 
     return Measure(Pooled(parts), unit, interval)
+
+
+def share(name: str) -> Measure:
+    """Return the share of trials of which an entry of the record is true."""
+
+    def parts(record: Any) -> tuple[float, float]:
+        value = entry(record, name)
+        return (0.0, 0.0) if value is None else (float(bool(value)), 1.0)
+
+    return Measure(Share(parts))
 
 
 def median(name: str, unit: str = "", *, interval: bool = True) -> Measure:

@@ -13,7 +13,7 @@ from math import cos, hypot, pi, sin
 
 import numpy as np
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean, median
+from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean, median, share
 from stages.tableware.actions.grasp import grasp, grasp_two
 from stages.tableware.simulation.physics import PhysicsTable
 from stages.tableware.world.footprints import footprint
@@ -215,14 +215,15 @@ EXPERIMENT = Experiment(
     arms={"hold": "hold"},
     cases=CASES,
     default_cases=lambda bench: SHOWN,
-    reporting=tuple(map(str, range(10))),
+    tuning=tuple(map(str, range(10))),
+    reporting=tuple(map(str, range(10, 20))),
     measure=measure,
     record=Grasp,
     subcases={case: (case, lambda grasp: grasp if grasp.stood else None) for case in CASES},
     measures={
         "grasps": Measure(count, interval=False),
-        "kept_share": mean("kept"),
-        "lost_share": mean("lost", interval=False),
+        "kept_share": share("kept"),
+        "lost_share": share("lost"),
         "tilt_degrees": median("tilt", "°", interval=False),
         "seconds": mean("seconds", "s", interval=False),
     },

@@ -15,7 +15,7 @@ from math import cos, hypot, pi, sin
 
 import numpy as np
 
-from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, share
 from stages.tableware.actions.pull import Pull
 from stages.tableware.actions.pull_grasp import pull_grasp
 from stages.tableware.planning.rules import Rules
@@ -138,7 +138,8 @@ EXPERIMENT = Experiment(
     does_not_show="A real arm or table.",
     arms={"ours": "ours"},
     cases=tuple(WORK),
-    reporting=tuple(map(str, range(10))),
+    tuning=tuple(map(str, range(10))),
+    reporting=tuple(map(str, range(10, 30))),
     measure=measure,
     record=dict[str, float],
     measures={
@@ -146,7 +147,7 @@ EXPERIMENT = Experiment(
         "initial_distance_cm": mean("initial", "cm"),
         "final_distance_cm": mean("final", "cm"),
         "expected_divergence": Measure(expected_divergence),
-        "kept_share": mean("kept"),
+        "kept_share": share("kept"),
     },
     quick_seeds=2,
     more_figures=printed,

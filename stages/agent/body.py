@@ -63,6 +63,8 @@ class Look:
     sector: int
     """Quarter turn of the camera around what was looked at, 0 to 3."""
     close: bool
+    in_view: bool = True
+    """False where the camera did not get to see the place: what is not among the detections may be there."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,8 @@ class Felt:
     kind: FeltKind = ""
     failure: Failure | None = None
     """What motion planning or control said, with its numbers, where there is motion."""
+    furniture: SeenFurniture | None = None
+    """The furniture of a door that was moved, where more of it than the door is changed: a drawer is in the way."""
 
 
 class Body(Protocol):

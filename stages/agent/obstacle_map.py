@@ -38,6 +38,8 @@ class ObstacleMap:
     comfort: float = 0.0
     """Nearer than so many cells to what is occupied it goes where it has to."""
     state: np.ndarray = field(init=False)
+    _aside: np.ndarray = field(init=False, default_factory=lambda: np.zeros((0, 2), int))
+    """Cells (N, 2) that something movable stands over now."""
     _fields: dict[tuple[int, int], np.ndarray] = field(init=False, default_factory=dict)
     _drivable: np.ndarray | None = field(init=False, default=None)
     _dear: np.ndarray | None = field(init=False, default=None)
@@ -89,7 +91,17 @@ class ObstacleMap:
         """Return (H, W) bool: cells of the window at most so far from what is occupied."""
         k = ceil(cells)
         disk = np.hypot(*np.mgrid[-k : k + 1, -k : k + 1]) <= cells
-        return binary_dilation(self.window == OCCUPIED, disk)
+        occupied = self.window == OCCUPIED
+        rows = self._aside - self._zero - self._low
+        rows = rows[np.all((rows >= 0) & (rows < occupied.shape), axis=1)]
+        occupied[rows[:, 0], rows[:, 1]] = True
+        return binary_dilation(occupied, disk)
+
+    def put_aside(self, points: np.ndarray) -> None:
+        """Say over which points (N, 2) [m] something movable stands now, in place of those said before."""
+        self._aside = np.unique(np.rint(points / CELL).astype(int), axis=0).reshape(-1, 2)
+        self._fields.clear()
+        self._drivable = self._dear = None
 
     def fits(self, x: float, y: float) -> bool:
         """Whether the base fits at a point [m], as far as is known."""

@@ -225,9 +225,9 @@ class SceneMap:
         """Return the things of a place."""
         return ObjectMap(tuple(self.scene_object(i.key) for i in self.items.values() if i.place == place))
 
-    def set_opened(self, key: str, opened: bool) -> None:
-        """Remember that a door was opened or closed."""
-        self.furniture[key] = replace(self.furniture[key], opened=opened)
+    def set_opened(self, key: str, opened: bool, seen: SeenFurniture | None = None) -> None:
+        """Remember that a door was opened or closed, and what its furniture is `seen` to be like now."""
+        self.furniture[key] = replace(seen or self.furniture[key], opened=opened)
 
     def _name(self, label: str) -> str:
         name = f"{label.replace(' ', '_')}_{self._named[label]}"

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from schemas.apartment import Apartment
-from schemas.errors import UsageError
 from stages.agent.arms.registry import ARMS
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.brains.brain import Brain
@@ -15,7 +14,7 @@ from stages.agent.brains.open_loop import OpenLoopBrain
 from stages.agent.brains.rules import RulesBrain
 from stages.agent.brains.slips import Slips
 from stages.agent.brains.words import NotUnderstood, understood
-from stages.agent.goals import Goal, Move, descriptions, sought
+from stages.agent.goals import Goal, sought
 from stages.agent.session import Limits, Session, Turn, run_session
 from stages.agent.world.failures import Rates
 from stages.agent.world.fast import FastWorld
@@ -58,17 +57,12 @@ def goals_of(words: str) -> tuple[Goal, ...]:
 def open_world(setting: Setting, arm: str) -> World:
     """Return the world of a trial: its eyes are prompted with the classes that the goals name. Close it.
 
-    Raises UsageError for goals with doors in physics, and as AskedSegmenter does for a segmentation service.
+    Raises as AskedSegmenter does for a segmentation service.
     """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
     if setting.world == "physics":
         from stages.agent.world.physics.body import PhysicsBody  # heavy: pybullet and Open3D
-        from stages.agent.world.physics.seen import DOORS
 
-        if any(set(each.labels) & set(DOORS) for goal in setting.goals for each in descriptions(goal)) or any(
-            isinstance(goal, Move) and goal.start in DOORS for goal in setting.goals
-        ):
-            raise UsageError("doors of the physics world do not move", hint="give --simulation fast")
         segmenter = None
         if setting.segmenter:
             from stages.agent.world.physics.asked import AskedSegmenter

@@ -11,11 +11,11 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.errors import UsageError
 from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.motion.doors import is_closed, is_open
 from stages.kit.tasks.strips import Atom, Problem, atom_text
 from stages.plan.action import goal_checks
 from stages.plan.affordances import LAYOUT, affordance_atoms
 from stages.plan.domain import DOMAIN, START
-from stages.plan.door_motion import is_closed, is_open
 from stages.plan.world_model import WorldModel
 
 COMFORT = 0.9

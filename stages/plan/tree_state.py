@@ -6,11 +6,11 @@ import numpy as np
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.plan import BodyMatch, TreeDifference
+from stages.kit.motion.doors import is_closed, is_open
 from stages.kit.simulation.world import PhysicsWorld
 from stages.plan.action import action_named
 from stages.plan.believed_tree import TreeState
 from stages.plan.carriers import HAND, NOTHING, carrier
-from stages.plan.door_motion import is_closed, is_open
 from stages.plan.refinement import Step
 from stages.plan.updated_graph import update_graph
 from stages.plan.world_model import WorldModel

@@ -47,11 +47,17 @@ LOOKS: dict[str, dict[str, object]] = {
 }
 """Case in a reconstructed room -> what the robot sees before it acts: the truth, what can be fitted to pictures, the
 truth through a robot and a segmentation that err, nothing."""
-CASES = (EXACT, *LOOKS)
+ROBOTS: dict[str, dict[str, object]] = {
+    EXACT: {},
+    "exact_ur5": {"robot": "ur5"},
+    "exact_kinova_gen3": {"robot": "kinova_gen3"},
+}
+"""Case in the exact room -> whose arm stands on the driving base: a Panda's, or another."""
+CASES = (*ROBOTS, *LOOKS)
 RECIPE = "household"
 ROOMS, QUICK_ROOMS = 50, 2
-TUNING, REPORTING = (*range(0, ROOMS), 1200, 1201), range(1202, 1202 + ROOMS)
-"""Rooms 1000 to 1201 have met earlier versions of `plan`: they do not report."""
+TUNING, REPORTING = (*range(0, ROOMS), *range(1200, 1205)), range(1205, 1205 + ROOMS)
+"""Rooms 1000 to 1204 have met earlier versions of `plan`: they do not report."""
 FRAMES = 120
 LIBRARY_SEED = 1
 CHAIN: tuple[tuple[str, str, dict[str, str], tuple[str, ...]], ...] = (
@@ -143,7 +149,7 @@ def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, RoomResult]]:
     """Yield the results of the tasks in the room of one seed; a room that cannot be made is a result too."""
-    exact, seed = trials[0].case == EXACT, int(trials[0].seed)
+    exact, seed = trials[0].case in ROBOTS, int(trials[0].seed)
     folder = bench.out / "rooms" / ("exact" if exact else "reconstructed") / str(seed)
     try:
         scene, truth = _room(exact, seed, bench.out / "cad_library", folder)
@@ -153,7 +159,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Room
             yield trial, RoomResult(trial.arm, trial.case, seed, False, "infeasible", "no_room", 0, {})
         return
     for trial in trials:
-        yield trial, plan_room(scene, truth, trial, bench.folder(trial) / "plan", **LOOKS.get(trial.case, {}))
+        yield trial, plan_room(scene, truth, trial, bench.folder(trial) / "plan", **(ROBOTS | LOOKS)[trial.case])
 
 
 def _room(exact: bool, seed: int, library: Path, folder: Path) -> tuple[InteractiveScene, GroundTruth | None]:
@@ -252,7 +258,7 @@ EXPERIMENT = Experiment(
     cases=CASES,
     tuning=tuple(map(str, TUNING)),
     reporting=tuple(map(str, REPORTING)),
-    together=lambda trial: (trial.case == EXACT, trial.seed),
+    together=lambda trial: (trial.case in ROBOTS, trial.seed),
     measure=measure,
     record=RoomResult,
     measures={},

@@ -24,7 +24,8 @@ from stages.tableware.world.overhead import LEVELS, SCHEMES, Scheme, overhead_ca
 from stages.tableware.world.scenes import TIERS, make_table
 
 ARMS = {"ours": detect, "thesis": detect_thesis}
-TUNING, REPORTING = range(200), range(1000, 1200)
+TUNING, REPORTING = (*range(200), *range(1000, 1200)), range(1200, 1300)
+"""Seeds 1000 to 1199 were reported of earlier code."""
 LOOKS = 5
 
 
@@ -79,7 +80,8 @@ EXPERIMENT = Experiment(
     title="Vision of tableware on rendered tables",
     simulated="Tables and their images.",
     knows="The camera's pose and the sizes of all dishes; tuned on the same renderer.",
-    does_not_show="What it finds on a real table.",
+    does_not_show="What it finds on a real table: sizes of the dishes are known to it and the renderer is the one it "
+    "was tuned on. On real frames it finds about two thirds (below). Milliseconds are of a shared machine.",
     arms={"ours": "ours", "thesis": "thesis"},
     cases=("detect",),
     tuning=tuple(map(str, TUNING)),

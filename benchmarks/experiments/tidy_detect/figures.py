@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.experiment import Measure, Results
+from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Measure, Results
 from benchmarks.experiments.tidy_detect.looks import Looks
-from benchmarks.experiments.tidy_detect.score import Match, measures, reliability
-from benchmarks.tabulation import markdown
+from benchmarks.experiments.tidy_detect.score import Match, counts, measures, reliability
+from benchmarks.tabulation import Figure, markdown
+from stages.kit.measurement.bootstrap import pooled_interval
 
 ALL, OURS = "detect", "ours"
 
@@ -39,32 +40,41 @@ MEASURES = {
 }
 
 
-def more_figures(results: Results) -> dict[str, float | None]:
-    """`<arm>/detect[_<tier, level or scheme>]/<class>/<measure>`."""
-    flat: dict[str, float | None] = {}
+def more_figures(results: Results) -> dict[str, float | Figure | None]:
+    """`<arm>/detect[_<tier, level or scheme>]/<class>/<measure>`, shares of all looks with intervals over scenes, and
+    `ours/confidence <from> to <to>/<measure>`."""
+    flat: dict[str, float | Figure | None] = {}
     for case in results.cases:
         for arm in results.arms(case):
-            for kind, values in measures(matches_of(results.of(arm, case))).items():
+            records = results.of(arm, case)
+            for kind, values in measures(matches_of(records)).items():
                 flat |= {f"{arm}/{case}/{kind}/{name}": value for name, value in values.items()}
-    flat[f"{OURS}/{ALL}/all/calibration_error"] = reliability(matches_of(results.of(OURS, ALL)))[1]
+                flat |= {f"{arm}/{case}/{kind}/{name}": share for name, share in _shares(records, kind).items()}
+    bins, flat[f"{OURS}/{ALL}/all/calibration_error"] = reliability(matches_of(results.of(OURS, ALL)))
+    for low, high, number, confidence, right in bins:
+        name = f"{OURS}/confidence {low:g} to {high:g}"
+        flat[f"{name}/mean_confidence"] = Figure(confidence, None, None, number, "")
+        flat[f"{name}/share_right"] = Figure(right, None, None, number, "")
     return flat
 
 
+def _shares(records: Sequence[Looks], kind: str) -> dict[str, Figure]:
+    """Return precision and recall of a class; a scene under all its conditions is one sample."""
+    rows = np.array([counts([m for look in looks for m in look.matches], kind) for looks in records], dtype=float)
+    found = {}
+    for name, column in (("precision", 1), ("recall", 2)):
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        of = pooled_interval(rows[:, [0, column]], None, random, resamples=RESAMPLES)
+        if of is not None:
+            found[name] = Figure(of.value, of.low, of.high, int(rows[:, column].sum()), "")
+    return found
+
+
 def doubts(results: Results) -> str:
-    """Confidence of `ours` against correctness (the right kind within 20 mm), and its reasons for doubt."""
-    matches = matches_of(results.of(OURS, ALL))
-    bins = [
-        (f"{low:g} to {high:g}", str(count), f"{mean:.3f}", f"{share:.3f}")
-        for low, high, count, mean, share in reliability(matches)[0]
-    ]
-    claims = [m for m in matches if m.found not in (None, "unknown")]
+    """Reasons of `ours` for doubt, and how often what it doubted was wrong."""
     silent = "(none)"
+    claims = [m for m in matches_of(results.of(OURS, ALL)) if m.found not in (None, "unknown")]
     doubted = Counter(reason for m in claims for reason in m.unsure or (silent,))
     wrong = Counter(reason for m in claims if not m.right for reason in m.unsure or (silent,))
     reasons = [(reason, str(count), str(wrong[reason])) for reason, count in doubted.most_common()]
-    return "\n".join(
-        (
-            markdown("Confidence of ours", ("confidence", "detections", "mean confidence", "share right"), bins),
-            markdown("", ("reason for doubt", "detections", "of these wrong"), reasons),
-        )
-    )
+    return markdown("", ("reason for doubt", "detections", "of these wrong"), reasons)

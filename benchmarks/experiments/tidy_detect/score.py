@@ -108,25 +108,31 @@ def compare(table: Table, detections: tuple[Detection, ...]) -> list[Match]:
     return result
 
 
+def counts(matches: Sequence[Match], kind: str) -> tuple[int, int, int]:
+    """Return how many items of a class (or `all`) are right, how many were said to be there, how many are."""
+    true = [m for m in matches if m.kind is not None and kind in ("all", m.kind)]
+    found = [m for m in matches if m.found is not None and (kind == m.found or kind == "all" != m.found != "unknown")]
+    return sum(m.right for m in true), len(found), len(true)
+
+
 def measures(matches: Iterable[Match]) -> dict[str, dict[str, float]]:
     """Return class -> measure -> value; `all` and `unknown` beside the kinds. Shares of nothing are left out."""
     rows = list(matches)
     result: dict[str, dict[str, float]] = {}
     for kind in ("all", *STANDARD.kinds, "unknown"):
-        true = [m for m in rows if m.kind is not None and kind in ("all", m.kind)]
-        found = [m for m in rows if m.found is not None and (kind == m.found or kind == "all" != m.found != "unknown")]
-        right = [m for m in true if m.right]
+        number_right, found, true = counts(rows, kind)
         if not true and not found:
             continue
-        values = {"items": float(len(true)), "found": float(len(found))}
+        values = {"items": float(true), "found": float(found)}
         if kind == "unknown":
             result[kind] = values
             continue
         if found:
-            values["precision"] = len(right) / len(found)
+            values["precision"] = number_right / found
         if true:
-            values["recall"] = len(right) / len(true)
-        if right:
+            values["recall"] = number_right / true
+        if number_right:
+            right = [m for m in rows if m.right and kind in ("all", m.kind)]
             values |= _errors(right, utensil=kind in UTENSILS)
         result[kind] = values
     return result

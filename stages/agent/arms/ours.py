@@ -159,7 +159,7 @@ class OwnSkills(CommonSkills):
             for found in self.scene.enter(look.detections, place, lambda d: (quarter(base, d.position), close))
         }
         should = [item] if item is not None else [i for i in self.scene.items.values() if i.place == place]
-        for each in should:
+        for each in should if look.in_view else ():
             if each.key not in seen:
                 each.votes[quarter(base, each.position), close] = None
                 if len(each.sides(seen=False)) > len(each.sides(seen=True)):
@@ -267,11 +267,11 @@ class OwnSkills(CommonSkills):
     def _stations(self, place: str, at: Position, *, take: bool = False) -> Iterator[Base]:
         """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short
         arm explores until one is known. To `take` what is there a grasp of what was seen so far has to be possible,
-        or, where none is from anywhere, the first pose that reaches shows more."""
+        or, where none is from anywhere, a pose that reaches shows more, and the next one other sides of it."""
         wanted, tried = take, list[Base]()
         while len(tried) < TRIES:
             fresh = self._fresh(place, at, tried, take)
-            if fresh is None and take and not tried:
+            if fresh is None and take:
                 take = False
                 continue
             if fresh is None:
@@ -521,14 +521,17 @@ class OwnSkills(CommonSkills):
         piece = self.scene.furniture[key]
         at = (*piece.centre, piece.height)
         tries = 0
+        last: Failure | None = None
         for base in self._stations(key, at):
             if tries and not self._use.repair:
                 break
             tries += 1
             if not self._there(base, key):
                 continue
-            if self._body.pull(at, opening=opening).ok:
-                self.scene.set_opened(key, opening)
+            felt = self._body.pull(at, opening=opening)
+            if felt.ok:
+                self.scene.set_opened(key, opening, felt.furniture)
                 return Outcome(True)
+            last = felt.failure
             self._failed_from(key, base, at)
-        return self._unreachable(key, tries)
+        return self._unreachable(key, tries, last)

@@ -88,5 +88,5 @@ class ThesisSkills(CommonSkills):
         piece = self.scene.furniture[key]
         felt = self._body.pull((*piece.centre, piece.height), opening=opening)
         if felt.ok:
-            self.scene.set_opened(key, opening)
+            self.scene.set_opened(key, opening, felt.furniture)
         return Outcome(felt.ok)

@@ -13,7 +13,7 @@ from stages.kit.motion.convex_pieces import ConvexPiece, link_pieces
 from stages.kit.motion.kinematics import arm_chain
 from stages.kit.simulation.robot import Robot
 from stages.kit.simulation.robot_description import PEDESTAL_LINK, mobile_robot_urdf
-from stages.kit.simulation.world import PhysicsWorld
+from stages.kit.simulation.world import LoadedBody, PhysicsWorld
 
 HULL_MARGIN = 0.001
 """By which Bullet widens every convex hull [m]."""
@@ -41,7 +41,7 @@ class CompiledModel:
         """Names of the scene's links, by index of the group."""
         self._group_body: list[str] = []
         self._group_range: dict[str, range] = {}
-        self._bodies: dict[str, int] | None = None
+        self._bodies: list[LoadedBody] | None = None
         self._seen: tuple[int, str | None] = (-1, None)
         self._seen_body: dict[str, int] = {}
         self._rules: tuple[object, ...] | None = None
@@ -58,9 +58,11 @@ class CompiledModel:
     ) -> None:
         """Take over what changed in the world, in the hand and in what may be touched."""
         rebuilt = False
-        ids = {name: body.body_id for name, body in self.world.bodies.items()}
-        if ids != self._bodies:
-            self._build_scene(ids)
+        bodies = list(self.world.bodies.values())
+        # By the bodies themselves: pybullet gives the id of one that was taken out to the next.
+        if self._bodies is None or [*map(id, bodies)] != [*map(id, self._bodies)]:
+            self._bodies = bodies
+            self._build_scene()
             rebuilt = True
         elif (self.world.revision, carried) != self._seen:
             for name, body_range in self._group_range.items():
@@ -91,8 +93,7 @@ class CompiledModel:
 
     # --- the scene --------------------------------------------------------------------------------------------
 
-    def _build_scene(self, ids: dict[str, int]) -> None:
-        self._bodies = ids
+    def _build_scene(self) -> None:
         self.groups, self._group_body, self._group_range = [], [], {}
         pieces: list[ConvexPiece] = []
         begin = [0]

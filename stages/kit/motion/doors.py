@@ -125,3 +125,18 @@ def tool_poses(
         pose[:3, 3] = point - gap * inward
         poses.append(pose)
     return poses
+
+
+def is_closed(joint: Joint, value: float) -> bool:
+    """Whether a joint value counts as shut: below 0.08 rad or 2 cm, whatever the joint's range."""
+    return value < (0.08 if joint.type == "revolute" else 0.02)
+
+
+def open_value(joint: Joint) -> float:
+    """Return the value to which a joint is opened: 1.4 rad, or 85 % of a drawer's (or smaller door's) range."""
+    return min(1.4, 0.85 * joint.upper) if joint.type == "revolute" else 0.85 * joint.upper
+
+
+def is_open(joint: Joint, value: float) -> bool:
+    """Whether a joint is open enough to reach through: at least 0.9 rad or 60 % of its range."""
+    return value >= min(0.9 if joint.type == "revolute" else np.inf, 0.6 * joint.upper)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from stages.kit.motion.doors import is_closed
 from stages.kit.motion.segments import Manipulation
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import Execution, MotionRequest, PlanAction
 from stages.plan.checks import check_joints
-from stages.plan.door_motion import check_joint, is_closed, plan_close
+from stages.plan.door_motion import check_joint, plan_close
 from stages.plan.world_model import RobotState, WorldModel
 
 

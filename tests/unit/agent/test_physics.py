@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from schemas.apartment import Apartment, Furniture, Room, Thing
-from schemas.errors import UsageError
 from stages.agent.body import Base, Body, Detection, SeenFurniture, Sweep
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.scene_map import SceneMap, classes_not_of
-from stages.agent.tasks import TASKS, make_apartment
-from stages.agent.trials import Setting, open_world
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.eyes import Surface, fuse
@@ -93,13 +90,6 @@ def test_a_world_is_its_seed() -> None:
         looks.append((made.look(ABOVE, close=False), made.look((2.0, 2.3, 0.76), close=True)))
         made.close()
     assert looks[0] == looks[1]
-
-
-def test_doors_are_refused_in_a_sentence() -> None:
-    task = TASKS["fridge_bottle"]
-    setting = Setting(make_apartment(task, 1), task.words, task.goals, NO_ERRORS, 1, world="physics")
-    with pytest.raises(UsageError, match="doors"):
-        open_world(setting, "ours")
 
 
 def test_grasps_come_from_above_first_and_across_the_narrow_side() -> None:

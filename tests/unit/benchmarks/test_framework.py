@@ -16,7 +16,7 @@ from benchmarks import command, discovery, keeping
 from benchmarks.code_digest import code_digest
 from benchmarks.command import run
 from benchmarks.discovery import experiment_files, load_experiment
-from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean, share
 from benchmarks.tabulation import Figure
 from schemas.errors import UsageError
 from stages.kit.stage import Parameters
@@ -148,6 +148,17 @@ def test_differences_resample_whole_rooms() -> None:
     assert found is not None and found.value == pytest.approx(2 / 3) and (found.low, found.high) == (0.0, 1.0)
     alone = Results(replace(SMALL, cluster=str), results.bench, {t: r for t, r in records.items() if t.seed == "1a"})
     assert alone.difference("ours", "thesis", "one", "value") is None
+
+
+def test_tries_that_all_came_out_alike_have_an_interval_with_a_width() -> None:
+    records = {Trial("ours", "one", str(seed)): Row(1.0) for seed in range(20)}
+    tries = replace(SMALL, cluster=str, measures={"value": share("value")})
+    bench = Bench(Path("nowhere"), Options.model_validate({}))
+    found = Results(tries, bench, records).interval("ours", "one", "value")
+    assert found is not None
+    assert (found.value, found.low, found.high) == pytest.approx((1.0, 20 / (20 + 1.959964**2), 1.0))
+    rooms = Results(replace(tries, cluster=lambda seed: seed[0]), bench, records).interval("ours", "one", "value")
+    assert rooms is not None and (rooms.low, rooms.high) == (1.0, 1.0), "several tries a room: rooms are drawn anew"
 
 
 @pytest.fixture

@@ -5,17 +5,37 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
+from schemas.base import as_transform
+from schemas.interactive_scene import SceneBody
+from schemas.scene_parts import Box
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.compiled_check import FREE, HIT, find_collision
 from stages.kit.motion.convex_distance import Hull, convex_distance
 from stages.kit.motion.convex_pieces import link_pieces
 from stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
-from stages.kit.simulation.robot import Robot
+from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import load_robot, mobile_robot_urdf
 from stages.kit.simulation.world import PhysicsWorld
 
 PANDA = load_robot("panda")
 UNIT = np.eye(4)[:3]
+BOX = SceneBody(
+    name="box",
+    class_name="box",
+    movable=False,
+    world_from_body=as_transform(np.eye(4)),
+    box=Box(center=(0, 0, 0), size=(0.4, 0.4, 0.4)),
+    mass=0.0,
+    world_from_reconstructed=None,
+)
+
+
+def box_text(at: tuple[float, ...]) -> str:
+    place = " ".join(map(str, at))
+    return (
+        f'<robot name="box"><link name="box"><collision><origin xyz="{place}"/><geometry><box size="0.4 0.4 0.4"/>'
+        "</geometry></collision></link></robot>"
+    )
 
 
 def test_balls_cover_the_hull_of_every_link() -> None:
@@ -146,3 +166,19 @@ def test_in_an_empty_world_all_is_free() -> None:
     with PhysicsWorld() as world:
         checker = CollisionChecker(world, Robot(world, PANDA))
         assert checker.check(np.concatenate([np.zeros(3), PANDA.carry])) is None
+
+
+def test_a_body_in_the_place_of_another_of_its_name_is_seen() -> None:
+    """pybullet gives the id of a body that was taken out to the next one."""
+    with PhysicsWorld() as world:
+        robot = Robot(world, PANDA)
+        robot.set(Configuration(np.zeros(3), PANDA.carry, PANDA.opening))
+        far, here = (box_text((x, 0.0, 0.7)) for x in (3.0, 0.0))
+        world.add_body(BOX, far)
+        checker = CollisionChecker(world, robot)
+        body = np.concatenate([np.zeros(3), PANDA.carry])
+        assert checker.check(body) is None
+        world.remove_body("box")
+        world.add_body(BOX, here)
+        checker.add_body("box")
+        assert checker.check(body) is not None

@@ -15,6 +15,7 @@ from stages.agent.world.physics.driving import Driving
 from stages.agent.world.physics.handling import Handling
 from stages.agent.world.physics.looking import Looking
 from stages.agent.world.physics.oracle import NoisyOracle
+from stages.agent.world.physics.pulling import Pulling
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.agent.world.physics.room import Body, Room
 from stages.agent.world.physics.seen import Seen
@@ -50,6 +51,7 @@ class PhysicsBody:
         self._driving = Driving(self._robot, seen)
         self._looking = Looking(self._robot, seen, eyes, sought)
         self._handling = Handling(self._robot, seen, self._looking)
+        self._pulling = Pulling(self._robot, seen, self._looking, self._driving)
 
     def close(self) -> None:
         """End both pybullet worlds, and the connection to a segmenter."""
@@ -100,7 +102,7 @@ class PhysicsBody:
 
     def pull(self, at: Position, *, opening: bool) -> Felt:
         """Open or close a door."""
-        return self._handling.pull(at, opening=opening)
+        return self._pulling.pull(at, opening=opening)
 
     # ---- how it truly is ----
 
@@ -126,8 +128,8 @@ class PhysicsBody:
 
     @property
     def opened(self) -> set[str]:
-        """Furniture whose door is open: none."""
-        return set()
+        """Furniture whose door is not shut."""
+        return self._room.opened()
 
     @property
     def bodies(self) -> dict[str, Body]:

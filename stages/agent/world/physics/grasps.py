@@ -28,6 +28,10 @@ LEAST = 10
 HEADINGS = 16
 PITCHES = (np.pi / 2, 1.1, 0.7)
 """How steeply the hand comes, from above first [rad]."""
+FORWARD_PITCHES = (0.15, 0.0, 0.35)
+"""The same of the hand that goes into a shelf."""
+STEEP = 1.5
+"""From here on it comes from above [rad]."""
 HEIGHTS = (0.5, 0.65, 0.8, 0.35)
 """Shares of the thing's height at which an aslant hand grips it, that of its middle first."""
 OFF = 0.012
@@ -36,21 +40,25 @@ OF_ONE_PITCH = 8
 """Grasps that come equally steeply, at most: where the arm cannot come from above, the others have their turn."""
 ASIDE = 0.3
 """Least cosine between where an aslant hand comes from and where the robot stands: it does not reach around a thing."""
+STRAIGHT = 0.8
+"""The same of a hand that goes into a shelf, which has walls."""
 TIP_BEFORE = 0.008
 """The tool point lies this far behind the finger tips [m]."""
 
 
-def antipodal_grasps(points: np.ndarray, normals: np.ndarray, opening: float, floor: float) -> list[np.ndarray]:
-    """Return map_from_tool (4, 4) of grasps of points (N, 3) with normals, from above first, where the fingers meet the
-    surface squarely and near the middle of the thing before others: what is held by its end turns.
+def antipodal_grasps(
+    points: np.ndarray, normals: np.ndarray, opening: float, floor: float, pitches: tuple[float, ...] = PITCHES
+) -> list[np.ndarray]:
+    """Return map_from_tool (4, 4) of grasps of points (N, 3) with normals, of the first pitch first, where the fingers
+    meet the surface squarely and near the middle of the thing before others: what is held by its end turns.
 
     `opening` of the gripper [m]; `floor` [m]: height of what the thing stands on, over which the finger tips stay.
     """
     low, high = np.percentile(points, 2, axis=0), np.percentile(points, 98, axis=0)
     made = []
-    for rank, pitch in enumerate(PITCHES):
+    for rank, pitch in enumerate(pitches):
         deepest = max(high[2] - FINGER_DEPTH, (low[2] + high[2]) / 2 - 0.005)
-        heights = [deepest] if rank == 0 else [low[2] + share * (high[2] - low[2]) for share in HEIGHTS]
+        heights = [deepest] if pitch > STEEP else [low[2] + share * (high[2] - low[2]) for share in HEIGHTS]
         for height in heights:
             at = np.array([*_middle_above(points, height), max(height, floor + 0.004 + TIP_BEFORE * np.sin(pitch))])
             for number in range(HEADINGS):
@@ -101,15 +109,15 @@ def _grasp_at(
     return pose, square, float(last - first)
 
 
-def within_reach(grasps: list[np.ndarray], heading: float) -> list[np.ndarray]:
+def within_reach(grasps: list[np.ndarray], heading: float, least: float = ASIDE) -> list[np.ndarray]:
     """Return those of grasps (4, 4) that an arm may get at that stands before the thing, a few of each pitch in their
-    order. `heading` [rad]: from the base to the thing."""
+    order. `heading` [rad]: from the base to the thing; `least`: cosine between that and where a hand comes from."""
     kept: list[np.ndarray] = []
     of_pitch: dict[float, int] = {}
     for pose in grasps:
         along = pose[:2, 2]
         pitch, level = round(float(pose[2, 2]), 2), float(np.hypot(*along))
-        aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < ASIDE * level
+        aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < least * level
         if not aside and of_pitch.get(pitch, 0) < OF_ONE_PITCH:
             of_pitch[pitch] = of_pitch.get(pitch, 0) + 1
             kept.append(pose)

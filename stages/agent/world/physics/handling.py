@@ -1,4 +1,4 @@
-"""Handling: grasps of what was seen, letting go, doors. Grasps, falls and collisions are pybullet's."""
+"""Handling: grasps of what was seen, letting go. Grasps, falls and collisions are pybullet's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,6 @@ from stages.agent.world.physics.seen import FLOOR, FOUND_WITHIN, Seen
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.segments import Segment, whole_body
-from stages.kit.simulation.robot import Configuration
 
 CLOSED_ON_NOTHING = 0.004
 """Opening of the fingers below which they hold nothing [m]."""
@@ -41,12 +40,14 @@ class Handling:
         """Whether a free arm pose over a position exists in the robot's own map, from a base pose; to `take` what was
         seen there a grasp of it."""
         self._robot.beliefs.hold(None)
-        target = self._target(at, 0) if take else None
+        target = self._target(at, 0, base) if take else None
         if target is not None:
             pose = np.array([base.x, base.y, base.yaw])
             return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
-        self._robot.beliefs.show(self._seen.boxes(at))
-        return reachable(self._robot.beliefs, np.array([base.x, base.y, base.yaw]), at, np.random.default_rng(5))
+        self._robot.beliefs.show(self._seen.boxes(at, base))
+        pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
+        forward = front is not None and not front.slides
+        return reachable(self._robot.beliefs, pose, at, np.random.default_rng(5), forward=forward)
 
     def grasp(self, at: Position, label: str, candidate: int) -> Felt:
         """Take the surface that was seen at a position. A slip and a wrong thing are not felt."""
@@ -58,7 +59,7 @@ class Handling:
         try:
             self._take(at, candidate)
         except MotionFailed as failed:
-            self._recover()
+            self._robot.draw_in()
             self._robot.log.done("grasp", step, False, "grasp", "")
             return Felt(False, _felt_kind(failed), failed.failure)
         held = self._robot.driver.held or self._between_the_fingers()
@@ -100,19 +101,25 @@ class Handling:
             self._robot.hold = None
             self._robot.driver.held = None
 
-    def _target(self, at: Position, rank: int) -> Target | None:
-        """Return what was seen nearest to a position, and show the arm what is around; None where nothing was seen."""
+    def _target(self, at: Position, rank: int, base: Base | None = None) -> Target | None:
+        """Return what was seen nearest to a position, and show the arm what is around a base pose, the robot's own if
+        none is given; None where nothing was seen."""
         away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._seen.surfaces]
         if not away or min(away) > FOUND_WITHIN:
             return None
         surface = self._seen.surfaces[int(np.argmin(away))]
         self._seen.surfaces = [s for s in self._seen.surfaces if s is surface or not s.same_as(surface)]
         number = next(k for k, s in enumerate(self._seen.surfaces) if s is surface)
-        self._robot.beliefs.show(self._seen.boxes())
+        self._robot.beliefs.show(self._seen.boxes(None, base))
         piece = self._seen.piece_at(at)
         measured = self._seen.pieces[piece].measured_top if piece is not None else None
+        front = self._seen.front_at(surface.middle)
+        measured = measured if front is None else front.floor
         floor = 0.0 if at[2] < FLOOR else float(surface.low[2]) if measured is None else measured
-        return Target(surface, f"thing_{number}", rank, floor)
+        if front is None:
+            return Target(surface, f"thing_{number}", rank, floor)
+        inward = float(np.arctan2(*-front.map_from_front[1::-1, 0]))
+        return Target(surface, f"thing_{number}", rank, floor, front.behind(surface.middle), inward)
 
     def _close_hand(self) -> None:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]
@@ -133,18 +140,6 @@ class Handling:
     def _loose(self) -> list[str]:
         return [name for name in self._robot.room.things if name in self._robot.room.world.bodies]
 
-    def _recover(self) -> None:
-        """Draw the arm in after a motion that could not be planned or was stopped, with what it holds."""
-        if self._robot.hold is not None:
-            self._robot.arm = self._robot.measured_arm()
-            self._robot.arm_to(self._robot.home)
-            return
-        self._robot.arm = self._robot.description.carry
-        start = Configuration(
-            self._robot.true_base(), self._robot.arm + self._robot.joint_error, self._robot.description.opening
-        )
-        self._robot.driver.put(start)
-
     def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
         """Let go 15 cm over a position, or gently: down to contact."""
         name = self._robot.carried
@@ -159,7 +154,7 @@ class Handling:
         try:
             self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:
-            self._recover()
+            self._robot.draw_in()
             self._robot.log.done("release", step, False, "place", "")
             return Felt(False, "no_trajectory", failed.failure)
         body = self._robot.room.body(name, None)
@@ -206,7 +201,7 @@ class Handling:
                 (Segment(rows, self._robot.description.opening, motion.away[0].pace), *motion.away[1:])
             )
         except MotionFailed:
-            self._recover()  # it let go already: what became of it is for the eyes
+            self._robot.draw_in()  # it let go already: what became of it is for the eyes
         self._robot.driver.wait(0.5)
 
     def _touches(self) -> bool:
@@ -216,11 +211,6 @@ class Handling:
         own = self._robot.room.world.bodies[self._robot.carried].body_id
         contacts = self._robot.room.world.contacts(own)
         return sum(c.force for c in contacts if c.other_body != self._robot.driver.robot.body_id) > 1.0
-
-    def pull(self, at: Position, *, opening: bool) -> Felt:
-        """Doors of this world do not move."""
-        self._robot.log.done("pull", f"{'open' if opening else 'close'} something", False, "grasp", "")
-        return Felt(False, "door_stuck")
 
     def _nearest_thing(self, at: Position) -> str:
         true = apply(inverse(self._robot.map_from_true()), np.array([at], float))[0]

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from schemas.base import as_transform
 from stages.agent.world.physics.eyes import Surface
-from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
+from stages.agent.world.physics.fronts import Front
+from stages.agent.world.physics.grasps import FORWARD_PITCHES, STRAIGHT, antipodal_grasps, within_reach
 from stages.agent.world.physics.shapes import record_of, slab, urdf_of
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.base_placement import shoulder_distance
+from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.grasps import narrowest_width
-from stages.kit.motion.kinematics import arm_chain
+from stages.kit.motion.kinematics import arm_chain, inverse_kinematics, random_starts
 from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
@@ -26,8 +30,8 @@ CANDIDATES = 20
 """Grasps that are tried, those from above first (Han 2024, 3.3.3)."""
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
-APPROACH, LIFT = 0.08, 0.10
-"""Of the hand before and after it closes [m]."""
+APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
+"""Of the hand before and after it closes, and after it does behind a front [m]."""
 DROP = 0.15
 """Height over its target at which the thesis lets go [m]."""
 JUST_OVER = 0.008
@@ -39,6 +43,8 @@ SOME_WAY_OVER = 0.06
 TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6))
 """How the hand is turned about the vertical, and leaned away from the robot where it gets no farther upright [rad]."""
 SLOW = 0.35
+ELBOWS = 12
+"""Ways to hold the elbow that are tried where the first is in the way."""
 SAMPLES = 500
 """Of one path search."""
 NESTLES = 0.015
@@ -46,6 +52,7 @@ NESTLES = 0.015
 HELD = "held"
 """Name of the box of what is in the hand."""
 Box = tuple[np.ndarray, np.ndarray]
+Believed = Box | Front
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,10 @@ class Target:
     """How often a grasp of it has slipped already: other ones are tried."""
     floor: float
     """Height of what it stands on [m]."""
+    behind: float = 0.0
+    """How far behind an open front it stands [m]: the hand goes in and comes out straight."""
+    inward: float = 0.0
+    """Heading that goes straight into that front [rad]."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +96,7 @@ class Motion:
 
 
 class Beliefs:
-    """Boxes around the robot, for collision checks. An `ArmModel` of the kit."""
+    """Boxes and doors around the robot, for collision checks. A `JointedModel` of the kit."""
 
     def __init__(self, description: RobotDescription) -> None:
         self.description = description
@@ -94,25 +105,57 @@ class Beliefs:
         self.robot = Robot(self.world, description)
         self.checker = CollisionChecker(self.world, self.robot, 0.004)
         self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
-        self._boxes: dict[str, tuple[float, ...]] = {}
+        self._boxes: dict[str, object] = {}
 
     def close(self) -> None:
         """End the pybullet world."""
         self.world.close()
 
-    def show(self, boxes: dict[str, Box]) -> None:
-        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, and in nothing else
-        but what is held."""
-        wanted = {name: (*np.round(low, 3), *np.round(high, 3)) for name, (low, high) in boxes.items()}
+    def show(self, boxes: dict[str, Believed]) -> None:
+        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, in these fronts, and in
+        nothing else but what is held."""
+        wanted = {name: _told(entry) for name, entry in boxes.items()}
         for name in [n for n, box in self._boxes.items() if n != HELD and wanted.get(n) != box]:
             self.world.remove_body(name)
             del self._boxes[name]
         for name, box in wanted.items():
-            if name not in self._boxes:
+            if name in self._boxes:
+                continue
+            entry = boxes[name]
+            if isinstance(entry, Front):
+                self._add_front(name, entry)
+            else:
+                assert isinstance(box, tuple)
                 part = slab(box[:3], tuple(max(h, low + 0.004) for low, h in zip(box[:3], box[3:], strict=True)))  # type: ignore[arg-type]
                 self.world.add_body(record_of(name, "box", (0, 0, 0), 0), urdf_of(name, (part,), 1.0))
-                self.checker.add_body(name)
-                self._boxes[name] = box
+            self.checker.add_body(name)
+            self._boxes[name] = box
+
+    def _add_front(self, name: str, front: Front) -> None:
+        record = record_of(name, "front", (0, 0, 0), 0).model_copy(
+            update={
+                "world_from_body": as_transform(front.map_from_front),
+                "joints": (front.joint,),
+                "joint_values": {front.joint.name: front.value},
+            }
+        )
+        self.world.add_body(record, front.urdf())
+
+    def pose(self, name: str) -> np.ndarray:
+        """Return map_from_body (4, 4) of what is believed in."""
+        return self.world.pose(name)
+
+    @contextmanager
+    def joints_at(self, name: str, values: dict[str, float]) -> Iterator[None]:
+        """Put joints of what is believed in at values for a while."""
+        before = {joint: self.world.joint_value(name, joint) for joint in values}
+        try:
+            for joint, value in values.items():
+                self.world.set_joint(name, joint, value)
+            yield
+        finally:
+            for joint, value in before.items():
+                self.world.set_joint(name, joint, value)
 
     def hold(self, hold: Hold | None) -> None:
         """Let checks carry the box of what is held."""
@@ -130,12 +173,30 @@ class Beliefs:
         self.checker.carry(HELD, hold.tool_from_box)
 
 
-def reachable(beliefs: Beliefs, base: np.ndarray, at: tuple[float, float, float], random: np.random.Generator) -> bool:
-    """Whether some hand pose from above or aslant at a position is free from a base pose (3,), in the map."""
+def _told(entry: Believed) -> object:
+    """Return what tells a box or a front from another one: numbers to the millimetre."""
+    if not isinstance(entry, Front):
+        return (*np.round(entry[0], 3).tolist(), *np.round(entry[1], 3).tolist())
+    pose = tuple(np.round(entry.map_from_front, 3).ravel().tolist())
+    return (pose, entry.size, entry.panel, entry.bar, round(entry.value, 3), entry.floor)
+
+
+def reachable(
+    beliefs: Beliefs,
+    base: np.ndarray,
+    at: tuple[float, float, float],
+    random: np.random.Generator,
+    *,
+    forward: bool = False,
+) -> bool:
+    """Whether some hand pose from above or aslant, or `forward` into a shelf, at a position is free from a base pose
+    (3,), in the map."""
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
-    for pitch in (np.pi / 2, 1.1):
+    for pitch in FORWARD_PITCHES if forward else (np.pi / 2, 1.1):
         pose = _pointing(float(np.arctan2(at[1] - base[1], at[0] - base[0])), pitch)
-        pose[:3, 3] = (at[0], at[1], at[2] + 0.10)
+        pose[:3, 3] = (at[0], at[1], at[2] + (0.05 if forward else 0.10))
+        if forward:
+            pose[:3, 3] -= 0.10 * pose[:3, 2]
         if shoulder_distance(base, pose, beliefs.description, beliefs.chain) > planner.reach - 0.02:
             continue
         arm = planner.reachable(base, pose, tally, starts=3)
@@ -173,7 +234,7 @@ def plan_grasp(
     searches = 2
     for grasp in grasps:
         try:
-            motion = _one_grasp(planner, base, arm, surface, name, grasp, target.floor, tally)
+            motion = _one_grasp(planner, base, arm, target, grasp, tally)
         except MotionFailed as failed:
             tally.failed(failed)
             searches -= 1
@@ -195,7 +256,7 @@ def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.ran
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     carry, grasps = beliefs.description.carry, _grasps_of(target, base, beliefs.description.opening)[:CANDIDATES]
     try:
-        return any(_way_in(planner, base, carry, target.name, grasp, tally) is not None for grasp in grasps)
+        return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
     finally:
         beliefs.checker.allow()
 
@@ -205,7 +266,11 @@ def _grasps_of(target: Target, base: np.ndarray, opening: float) -> list[np.ndar
     surface = target.surface
     keep = _inside(surface)
     heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    return within_reach(antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor), heading)
+    if target.behind > 0:
+        grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor, FORWARD_PITCHES)
+        return within_reach(grasps, target.inward, STRAIGHT)
+    grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor)
+    return within_reach(grasps, heading)
 
 
 def _inside(surface: Surface) -> np.ndarray:
@@ -223,25 +288,18 @@ def whole_box(surface: Surface, floor: float) -> Box:
 
 
 def _one_grasp(
-    planner: ArmPlanner,
-    base: np.ndarray,
-    arm: np.ndarray,
-    surface: Surface,
-    name: str,
-    map_from_tool: np.ndarray,
-    floor: float,
-    tally: Tally,
+    planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, target: Target, map_from_tool: np.ndarray, tally: Tally
 ) -> Motion | None:
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     checker, opening = beliefs.checker, beliefs.description.opening
-    way = _way_in(planner, base, arm, name, map_from_tool, tally)
+    way = _way_in(planner, base, arm, target, map_from_tool, tally)
     if way is None:
         return None
     approach, lift = way
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
-    low, high = whole_box(surface, floor)
+    low, high = whole_box(target.surface, target.floor)
     box = np.eye(4)
     box[:3, 3] = (low + high) / 2
     hold = Hold(
@@ -251,7 +309,7 @@ def _one_grasp(
         map_from_tool[:3, :3],
         beliefs.description.carry,
     )
-    beliefs.world.set_pose(name, _far())
+    beliefs.world.set_pose(target.name, _far())
     beliefs.hold(hold)
     checker.allow(touch=(HELD,))
     folded = planner.folded(base, lift[-1], tally)
@@ -266,26 +324,45 @@ def _one_grasp(
 
 
 def _way_in(
-    planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, name: str, map_from_tool: np.ndarray, tally: Tally
+    planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, target: Target, map_from_tool: np.ndarray, tally: Tally
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return arm values (N, 7) from a grasp back to before it, and (M, 7) from it to above; None where one is not
     free."""
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     beliefs.robot.set(Configuration(base, arm, beliefs.description.opening))
-    beliefs.checker.allow(touch=(name,))
+    beliefs.checker.allow(touch=(target.name,))
     at = planner.reachable(base, map_from_tool, tally, starts=3)
-    if at is None or not planner.free(base, at, tally):
+    if at is not None and not planner.free(base, at, tally):
+        at = _by_another_elbow(planner, base, map_from_tool, tally) if target.behind > 0 else None
+    if at is None:
         return None
     before = map_from_tool.copy()
-    before[:3, 3] -= APPROACH * before[:3, 2]
+    before[:3, 3] -= (APPROACH + target.behind) * before[:3, 2]
     approach = planner.line(base, at, before, tally)
     if approach is None:
         return None
     above = map_from_tool.copy()
-    above[2, 3] += LIFT
+    above[2, 3] += LIFT_INSIDE if target.behind > 0 else LIFT
     lift = planner.line(base, at, above, tally)
-    return None if lift is None else (approach, lift)
+    if lift is None or target.behind == 0:
+        return None if lift is None else (approach, lift)
+    out = above.copy()
+    out[:2, 3] -= (APPROACH + target.behind) * out[:2, 2] / np.linalg.norm(out[:2, 2])
+    way_out = planner.line(base, lift[-1], out, tally)
+    return None if way_out is None else (approach, np.concatenate([lift, way_out[1:]]))
+
+
+def _by_another_elbow(
+    planner: ArmPlanner, base: np.ndarray, map_from_tool: np.ndarray, tally: Tally
+) -> np.ndarray | None:
+    """Return free arm values (7,) for a tool pose that the arm gets to with its elbow in the way of something."""
+    chain, wanted = planner.model.chain, in_arm_frame(base, map_from_tool, planner.model.description)
+    for start in random_starts(chain, ELBOWS, planner.random):
+        found = inverse_kinematics(chain, wanted, start[None])
+        if found.found and planner.free(base, found.arm, tally):
+            return found.arm
+    return None
 
 
 def _far() -> np.ndarray:
@@ -302,9 +379,9 @@ class Spot:
     """On what was seen there, in the map [m]."""
     rim: float
     """Height of the top of what is around it, as of a box that it is put into [m]."""
-    around: dict[str, Box]
+    around: dict[str, Believed]
     """All that stands there."""
-    beside: dict[str, Box]
+    beside: dict[str, Believed]
     """The same without what covers the spot, which the hand comes down into."""
     nestled: tuple[str, ...]
     """What lies beside it on the same carrier: what is held may come down against it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from math import atan2, cos, pi, sin
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from stages.agent.body import Base, Detection, Look, Position, Sweep
 from stages.agent.scene_map import quarter
 from stages.agent.world.physics import head
-from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Segmenter, Surface, fuse, seen_in
+from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Mask, Segmenter, Surface, fuse, seen_in
+from stages.agent.world.physics.fronts import PARTS, Front
 from stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
 from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
 from stages.kit.geometry.cameras import back_project
@@ -23,6 +25,10 @@ SIDEWAYS = (0.0, -0.5, 0.5)
 """Turns of the first joint for the three wrist poses [rad]."""
 STEEP, OVER = (1.5, 1.3, 1.1), 0.45
 """How far down the wrist camera looks at a thing from above, the steepest first [rad], and from how far [m]."""
+FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
+"""How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
+INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8), (0.0, 0.12, -0.12)
+"""The same of looks into a shelf."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
 
@@ -49,7 +55,7 @@ class Looking:
             pose = look_at(eye, eye + away)
             picture = take(renderer, HEAD, pose, self._robot.random)
             points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
-            there = head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points)
+            there = head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points) & ~self._seen.of_parts(points)
             clouds.append(points[there])
             for entry in self._segmenter.furniture(picture, map_from_true @ pose):
                 own = there & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
@@ -70,7 +76,14 @@ class Looking:
         found: list[Surface] = []
         renderer = None
         arms = [np.array([np.clip(toward + turn, -2.7, 2.7), *VIEW[1:]]) for turn in ((0.0,) if close else SIDEWAYS)]
-        for arm in arms + (self._arms_over(at) if close else []):
+        shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
+        if shelf is not None and not shelf.slides:
+            arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)
+        elif close:
+            arms += self._arms_over(at)
+        if not arms:
+            return Look((), sector, close, in_view=False)
+        for arm in arms:
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
@@ -78,19 +91,69 @@ class Looking:
             camera = self._aimed(seen_pose, at, close)
             if not close:  # a thing fills a picture from near by
                 self._seen.keep_top(picture, camera, piece)
+            front = self._seen.front_of(piece)
+            if front is not None:
+                self._seen.keep_floor(picture, camera, front)
             masks = self._segmenter.masks(picture, camera, (sector, close))
-            found += seen_in(picture, masks, camera, camera[:3, 3])
+            found += seen_in(picture, _things(masks), camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
-        for name in sorted(self._segmenter.missed):
-            if self._robot.room.things[name].label in self._sought:
-                self._robot.log.mistaken("missed", f"look {name}")
-        self._segmenter.missed.clear()
+        self._count_missed()
         self.looked_near = (self._robot.base, at) if close else None
         found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
         near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
         self._seen.keep(near, at, piece, close)
         return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
+
+    def _count_missed(self) -> None:
+        for name in sorted(self._segmenter.missed):
+            thing = self._robot.room.things.get(name)
+            if thing is None or thing.label in self._sought:
+                self._robot.log.mistaken("missed", f"look {name}")
+        self._segmenter.missed.clear()
+
+    def look_at_front(self, at: Position) -> list[Surface]:
+        """Look at a front from before it, to both sides of a position: handles, and what they are on, as surfaces."""
+        sector, found, renderer = quarter(self._robot.base, at), list[Surface](), None
+        for arm in self._arms_at(at, FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE):
+            self._robot.arm_to(arm)
+            pose, camera = self._robot.wrist_poses()
+            renderer = renderer or self._robot.room.renderer(pose[:3, 3])
+            picture = take(renderer, WRIST, pose, self._robot.random)
+            masks = [m for m in self._segmenter.masks(picture, camera, (sector, False)) if m.label in PARTS]
+            found += seen_in(picture, masks, camera, camera[:3, 3])
+            self.pictures = [*self.pictures[-40:], (f"front {arm[0]:+.1f}", picture.color)]
+            self._robot.seconds_aside += PICTURE_SECONDS
+        self._count_missed()
+        return fuse(found)
+
+    def _arms_into(self, shelf: Front, at: Position, *, close: bool) -> list[np.ndarray]:
+        """Return arms that hold the wrist camera before an open shelf; none where the robot does not stand there."""
+        asides = INTO_ASIDE[:1] if close else INTO_ASIDE
+        before = shelf.local(np.array([[*self._robot.believed[:2], 0.0]]))[0, 0] > shelf.size[0] / 2
+        return [] if self._robot.hold is not None or not before else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
+
+    def _arms_at(
+        self, at: Position, pitches: tuple[float, ...], aways: tuple[float, ...], asides: tuple[float, ...]
+    ) -> list[np.ndarray]:
+        """Return arms that hold the wrist camera away from a position, looking at places `asides` [m] beside it: each
+        by the first of the distances `aways` [m] and pitches [rad] at which the arm gets there."""
+        self._robot.beliefs.hold(None)
+        self._robot.beliefs.show(self._seen.boxes())
+        base, tally = self._robot.believed, Tally()
+        planner = ArmPlanner(self._robot.beliefs, np.random.default_rng(5), 0)
+        heading = atan2(at[1] - base[1], at[0] - base[0])
+        arms = []
+        for aside in asides:
+            target = np.array(at) + aside * np.array([-sin(heading), cos(heading), 0.0])
+            for away, pitch in product(aways, pitches):
+                ahead = np.array([cos(heading) * cos(pitch), sin(heading) * cos(pitch), -sin(pitch)])
+                tool = look_at(np.array(at) - away * ahead, target) @ inverse(TOOL_FROM_CAMERA)
+                arm = planner.reachable(base, tool, tally, starts=3)
+                if arm is not None and planner.free(base, arm, tally):
+                    arms.append(arm)
+                    break
+        return arms
 
     def _arms_over(self, at: Position) -> list[np.ndarray]:
         """Return the arm that holds the wrist camera as steeply over a position as it gets; none where it does not."""
@@ -137,7 +200,7 @@ class Looking:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]
         pose = look_at(eye, tool)
         picture = take(self._robot.room.renderer(eye), WRIST, pose, self._robot.random)
-        masks = self._segmenter.masks(picture, pose, ("hand", view))
+        masks = _things(self._segmenter.masks(picture, pose, ("hand", view)))
         near = [
             (float(np.linalg.norm(s.middle - tool)), k, s) for k, s in enumerate(seen_in(picture, masks, pose, eye))
         ]
@@ -149,3 +212,8 @@ class Looking:
             label = self._sought[0] if self._sought else "thing"
             return Detection(label, position, "", None, 0.04) if held is None else None
         return None if held is None else Detection(held.label, position, held.color, None, 0.04)
+
+
+def _things(masks: list[Mask]) -> list[Mask]:
+    """Return the masks without those of what moves of furniture."""
+    return [entry for entry in masks if entry.label not in PARTS]

@@ -16,29 +16,32 @@ class NoisyOracle:
     def __init__(self, room: Room, errors: SegmenterErrors) -> None:
         self._room, self._errors = room, errors
         self.missed: set[str] = set()
-        """Things that were in a picture and are not among its masks."""
+        """What was in a picture and is not among its masks."""
 
     def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
         """Return the masks of furniture, without errors."""
         names = {int(number): self._room.named.get(int(number), "") for number in np.unique(picture.instance)}
+        owners = {number: name.split("__")[0] for number, name in names.items()}  # a door is of its furniture
         return [
-            Mask(self._room.furniture[name].label, picture.instance == number)
-            for number, name in names.items()
-            if name in self._room.furniture
+            Mask(piece.label, np.isin(picture.instance, [number for number, owner in owners.items() if owner == name]))
+            for name, piece in self._room.furniture.items()
+            if name in owners.values()
         ]
 
     def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
-        """Return the masks of things. `view`: ("hand", number), or (quarter turn, near)."""
+        """Return the masks of things, handles, doors and drawers. `view`: ("hand", number), or (quarter turn, near)."""
         found = []
         for number in np.unique(picture.instance):
             name = self._room.named.get(int(number), "")
             mask = picture.instance == number
-            if name not in self._room.things or mask.sum() < LEAST_PIXELS:
+            part = self._room.parts.get(name, "")
+            if not part and name not in self._room.things or mask.sum() < LEAST_PIXELS:
                 continue
             if view[0] != "hand" and self._errors.misses(
-                name, self._room.moved[name], int(str(view[0])), bool(view[1])
+                name, self._room.moved.get(name, 0), int(str(view[0])), bool(view[1])
             ):
                 self.missed.add(name)
                 continue
-            found.append(Mask(self._errors.class_of(name, self._room.things[name].label, *view), mask))
+            label = part or self._room.things[name].label
+            found.append(Mask(self._errors.class_of(name, label, *view), mask))
         return found

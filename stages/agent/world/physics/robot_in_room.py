@@ -7,6 +7,7 @@ their encoders say.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
@@ -104,6 +105,15 @@ class RobotInRoom:
                 arm = self.measured_arm()  # something is in the way: it looks from where it got to
         self.arm = arm
 
+    def draw_in(self) -> None:
+        """Draw the arm in after a motion that could not be planned or was stopped, with what it holds."""
+        if self.hold is not None:
+            self.arm = self.measured_arm()
+            self.arm_to(self.home)
+            return
+        self.arm = self.description.carry
+        self.driver.put(Configuration(self.true_base(), self.arm + self.joint_error, self.description.opening))
+
     def measured_arm(self) -> np.ndarray:
         """Return the joint values (7,) by the encoders."""
         return self.driver.robot.configuration().arm - self.joint_error
@@ -122,7 +132,7 @@ class RobotInRoom:
         for segment in segments:
             arms = segment.path[:, 3:]
             rows = whole_body(base, arms + self.joint_error)
-            self.carefully(Segment(rows, segment.opening, segment.pace))
+            self.carefully(replace(segment, path=rows, event=""))
             self.arm = arms[-1]
 
     def in_hand(self, points: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The apartment as it truly is: bodies in pybullet, meshes for the cameras, and what lies on what."""
+"""The apartment as it truly is: bodies in pybullet, meshes for the cameras, and what lies on or in what."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ import numpy as np
 import trimesh
 
 from schemas.apartment import Apartment, Furniture, Thing
+from schemas.base import as_transform
+from stages.agent.world.physics.doors import Doored, doored
 from stages.agent.world.physics.shapes import COLORS, joined, mesh_of, record_of, shape_of, slab, stained, urdf_of
+from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.motion.doors import body_from_moved, is_closed, open_value
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.simulation.world import PhysicsWorld
 
@@ -25,6 +29,8 @@ FURNITURE_COLORS = {
 }
 RESTS = 0.06
 """A thing whose foot is at most this far below a top is on it [m]."""
+HANDLES = (0.25, 0.25, 0.28)
+"""Colour of handles; what they are on is a little darker than its furniture."""
 IN_VIEW = 6.0
 """What is farther from a camera is not rendered [m]."""
 
@@ -40,7 +46,7 @@ class Body:
 
 
 class Room:
-    """Walls, furniture and things. What is behind a closed door is in no pybullet world: nobody can get at it."""
+    """Walls, furniture and things. What is behind a closed door is there from the start, and hidden by it."""
 
     def __init__(self, apartment: Apartment) -> None:
         self.apartment = apartment
@@ -49,27 +55,56 @@ class Room:
         self.things: dict[str, Thing] = {thing.name: thing for thing in apartment.things}
         self._meshes: dict[str, trimesh.Trimesh] = {}
         self.moved = dict.fromkeys(self.things, 0)
-        self._number = {name: 1 + k for k, name in enumerate([*self.furniture, *self.things])}
+        self.doored = {piece.name: doored(apartment, piece) for piece in apartment.furniture if piece.door}
+        self.parts = {made.joint.part: made.joint.part.rsplit("__", 1)[1] for made in self.doored.values()}
+        """What moves of furniture -> its class, handles included."""
+        self.parts |= {f"{name}__handle": "handle" for name in self.doored}
+        self._number = {name: 1 + k for k, name in enumerate([*self.furniture, *self.things, *self.parts])}
         self.named = {number: name for name, number in self._number.items()}
         """Instance number in a picture -> name; walls and floors are 0."""
         self._add_walls()
         for piece in apartment.furniture:
+            color = FURNITURE_COLORS.get(piece.label, (0.5, 0.5, 0.5))
+            if piece.door:
+                self._add_doored(piece, self.doored[piece.name], color)
+                continue
             (x, y), (w, d) = piece.centre, piece.size
             part = slab((x - w / 2, y - d / 2, 0.0), (x + w / 2, y + d / 2, piece.height))
             self.world.add_body(record_of(piece.name, piece.label, (0, 0, 0), 0), urdf_of(piece.name, (part,), 1.0))
-            self._meshes[piece.name] = mesh_of((part,), FURNITURE_COLORS.get(piece.label, (0.5, 0.5, 0.5)))
+            self._meshes[piece.name] = mesh_of((part,), color)
         for thing in apartment.things:
-            if not self._shut_in(thing):
-                self._add_thing(thing)
+            self._add_thing(thing)
         self.world.settle(0.5)
 
     def close(self) -> None:
         """End the pybullet world."""
         self.world.close()
 
-    def _shut_in(self, thing: Thing) -> bool:
-        piece = self.furniture.get(thing.on)
-        return piece is not None and piece.door
+    def _add_doored(self, piece: Furniture, made: Doored, color: tuple[float, float, float]) -> None:
+        record = record_of(piece.name, piece.label, (0, 0, 0), 0).model_copy(
+            update={
+                "world_from_body": as_transform(made.pose),
+                "joints": (made.joint,),
+                "joint_values": {made.joint.name: open_value(made.joint) if piece.opened else 0.0},
+            }
+        )
+        self.world.add_body(record, made.urdf())
+        darker = (0.93 * color[0], 0.93 * color[1], 0.93 * color[2])
+        self._meshes[piece.name] = mesh_of(made.still, color)
+        self._meshes[piece.name].apply_transform(made.pose)
+        for name, pieces, paint in (
+            (made.joint.part, made.moving, darker),
+            (f"{piece.name}__handle", made.handle, HANDLES),
+        ):
+            self._meshes[name] = mesh_of(pieces, paint)
+
+    def joint_value(self, name: str) -> float:
+        """Return how far the door of a piece of furniture is open [rad] or [m]."""
+        return self.world.joint_value(name, self.doored[name].joint.name)
+
+    def opened(self) -> set[str]:
+        """Return the furniture whose door is not shut."""
+        return {name for name, made in self.doored.items() if not is_closed(made.joint, self.joint_value(name))}
 
     def _add_walls(self) -> None:
         parts = []
@@ -102,10 +137,21 @@ class Room:
 
     def _add_thing(self, thing: Thing) -> None:
         shape, on = shape_of(thing), self.furniture.get(thing.on)
-        height = (on.height if on is not None else 0.77) + 0.002
-        record = record_of(thing.name, thing.label, (*thing.at, height), shape.mass)
+        height = on.height if on is not None else 0.77
+        at = np.array([*thing.at, self.doored[thing.on].floor if thing.on in self.doored else height])
+        if thing.on in self.doored:  # in a drawer that stands open it is where the drawer is
+            at = apply(self._moved(thing.on), at[None])[0]
+        record = record_of(thing.name, thing.label, (float(at[0]), float(at[1]), float(at[2]) + 0.002), shape.mass)
         self.world.add_body(record, urdf_of(thing.name, shape.parts(), shape.mass))
         self._meshes[thing.name] = stained(thing, mesh_of(shape.parts(), COLORS.get(thing.color, shape.color)))
+
+    def _moved(self, name: str) -> np.ndarray:
+        """Return the displacement (4, 4), world frame, of a drawer from where it is shut; of a leaf none, for nothing
+        stands in it."""
+        made = self.doored[name]
+        if made.joint.type == "revolute":
+            return np.eye(4)
+        return made.pose @ body_from_moved(made.joint, self.joint_value(name)) @ inverse(made.pose)
 
     def renderer(self, eye: np.ndarray) -> SceneRenderer:
         """Return what the cameras at a place (3,) see, as everything lies now."""
@@ -118,6 +164,10 @@ class Room:
                     continue
                 placed = mesh.copy()
                 placed.apply_transform(pose)
+            elif name in self.parts:
+                made = self.doored[name.rsplit("__", 1)[0]]
+                placed = mesh.copy()
+                placed.apply_transform(made.pose @ body_from_moved(made.joint, self.joint_value(made.name)))
             entries.append((self._number.get(name, 0), placed))
         return SceneRenderer(entries, shadows=False, antialias=False)
 
@@ -130,8 +180,6 @@ class Room:
 
     def lies(self, name: str) -> tuple[float, float, float]:
         """Return the middle of a thing's foot [m], world frame."""
-        if name not in self.world.bodies:
-            return (*self.things[name].at, 0.0)
         x, y, z = self.world.pose(name)[:3, 3]
         return float(x), float(y), float(z)
 
@@ -141,15 +189,25 @@ class Room:
         x, y, z = self.lies(name)
         if name == held:
             return Body(thing, "", (x, y), moved)
-        if name not in self.world.bodies:
-            return Body(thing, thing.on, thing.at, moved)
         for other in self.things.values():
-            if other.carries and other.name != name and other.name in self.world.bodies:
+            if other.carries and other.name != name:
                 u, v, w = self.lies(other.name)
                 if hypot(x - u, y - v) <= other.radius and -0.02 <= z - w < 0.2:
                     return Body(thing, other.name, (x, y), moved)
+        for door in self.doored:
+            if self._inside(door, np.array([x, y, z])):
+                return Body(thing, door, (x, y), moved)
         for piece in self.furniture.values():
             inside = all(abs(p - c) <= s / 2 for p, c, s in zip((x, y), piece.centre, piece.size, strict=True))
             if inside and z >= piece.height - RESTS:
                 return Body(thing, piece.name, (x, y), moved)
         return Body(thing, "floor", (x, y), moved)
+
+    def _inside(self, name: str, at: np.ndarray) -> bool:
+        """Whether a point (3,) is in furniture with a door, or in its drawer where that is now."""
+        made, piece = self.doored[name], self.furniture[name]
+        own = apply(inverse(self._moved(name) @ made.pose), at[None])[0]
+        size = np.array(piece.size if abs(made.pose[0, 0]) > 0.5 else piece.size[::-1])
+        drawer = made.joint.type == "prismatic"
+        lowest = made.floor - RESTS if drawer else 0.0
+        return bool(np.all(np.abs(own[:2]) <= size / 2) and lowest <= own[2] < piece.height - RESTS)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import hypot
 
 import numpy as np
 
-from stages.agent.body import Position, SeenFurniture
+from stages.agent.body import Base, Position, SeenFurniture
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.world.physics import head
 from stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
-from stages.agent.world.physics.hands import Box
+from stages.agent.world.physics.fronts import WITH_DRAWERS, WITH_LEAVES, Front, footprint
+from stages.agent.world.physics.hands import Believed
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply
@@ -21,8 +23,10 @@ FOUND_WITHIN = 0.12
 """A surface this near to a position is meant by it [m]."""
 FLOOR, FLOOR_AROUND = 0.05, 1.6
 """What begins lower lies on the floor [m], and how far around its middle a look at the floor tells of it [m]."""
-DOORS = ("fridge", "dresser")
-"""Furniture with doors, which are closed for ever here."""
+NEARER = 0.08
+"""The folded elbow goes over a drawer: the base stands so much nearer to it than to furniture [m]."""
+BESIDE_PART = 0.06
+"""What the head sees so near to a leaf or a drawer is of it [m]."""
 AROUND = 1.4
 """What is farther from the base does not matter to the arm [m]."""
 COMFORT = 4.5
@@ -36,27 +40,69 @@ class Seen:
         self._robot = robot
         self.pieces: list[head.SeenPiece] = []
         self.surfaces: list[Surface] = []
+        self.fronts: dict[str, Front] = {}
+        """Doors and drawers of which the handle was seen, by the names of `boxes`."""
         self.obstacles = ObstacleMap(robot.base, clearance, COMFORT)
 
     def furniture(self) -> list[SeenFurniture]:
         """Return the pieces of which enough was seen."""
         made = []
-        for piece in self.pieces:
+        for number, piece in enumerate(self.pieces):
             if len(piece.cubes) < head.LEAST:
                 continue
-            low, high = piece.box
-            centre, size = (low + high) / 2, np.maximum(high - low, 0.1)
-            made.append(
-                SeenFurniture(
-                    piece.label,
-                    (float(centre[0]), float(centre[1])),
-                    (float(size[0]), float(size[1])),
-                    float(high[2]),
-                    False,  # closed boxes: their doors cannot be told from the rest, nor moved
-                    False,
-                )
-            )
+            made.append(self.piece_seen(number))
         return made
+
+    def piece_seen(self, number: int) -> SeenFurniture:
+        """Return a piece as arms know it: with its drawer, where that is out."""
+        piece = self.pieces[number]
+        low, high = piece.box
+        front = self.fronts.get(f"furniture_{number}")
+        if front is not None and front.slides and front.value > 0:
+            ends = zip(footprint(front, NEARER), (low[2], high[2]), strict=True)
+            low, high = (np.array([*corner, z]) for corner, z in ends)
+        centre, size = (low + high) / 2, np.maximum(high - low, 0.1)
+        return SeenFurniture(
+            piece.label,
+            (float(centre[0]), float(centre[1])),
+            (float(size[0]), float(size[1])),
+            float(high[2]),
+            piece.label in (*WITH_DRAWERS, *WITH_LEAVES),
+            front is not None and front.value > 0,
+        )
+
+    def keep_floor(self, picture: Picture, map_from_camera: np.ndarray, front: Front) -> None:
+        """Measure the height on which things inside an open front lie: the most frequent height there [m]."""
+        points = apply(map_from_camera, back_project(picture.depth, picture.camera)[::2, ::2].reshape(-1, 3))
+        heights = points[front.inside(points), 2]
+        if len(heights) > 200:
+            counts, edges = np.histogram(heights, bins=np.arange(0.0, front.size[2], 0.005))
+            level = edges[counts.argmax()] + 0.0025
+            floor = float(np.median(heights[np.abs(heights - level) < 0.006]))
+            self.fronts[front.name] = replace(self.fronts[front.name], floor=floor)
+
+    def moved(self, name: str, value: float) -> None:
+        """Believe that the door of furniture is open so far, 0: shut; the base goes around it."""
+        self.fronts[name] = replace(self.fronts[name], value=value)
+        outlines = [front.outline() for front in self.fronts.values() if front.value > 0]
+        self.obstacles.put_aside(np.concatenate([*outlines, np.zeros((0, 2))]))
+
+    def of_parts(self, points: np.ndarray) -> np.ndarray:
+        """Return (N,) bool: points (N, 3) of leaves and drawers, which are no lasting obstacles."""
+        own = np.zeros(len(points), bool)
+        for front in self.fronts.values():
+            own |= front.of_part(points, BESIDE_PART)
+        return own
+
+    def front_of(self, piece: int | None) -> Front | None:
+        """Return the front of a piece, if it is open."""
+        front = self.fronts.get(f"furniture_{piece}")
+        return front if front is not None and front.value > 0 else None
+
+    def front_at(self, at: Sequence[float] | np.ndarray) -> Front | None:
+        """Return the open front of the furniture or drawer that a position is in."""
+        point = np.array([at[:3]], float)
+        return next((f for f in self.fronts.values() if f.value > 0 and f.inside(point)[0]), None)
 
     def keep_top(self, picture: Picture, map_from_camera: np.ndarray, piece: int | None) -> None:
         """Measure the height of the top of furniture that fills the picture: the most frequent height [m]."""
@@ -76,7 +122,8 @@ class Seen:
         if at[2] < FLOOR:
             return None
         for number, piece in enumerate(self.pieces):
-            low, high = piece.box
+            front = self.fronts.get(f"furniture_{number}")
+            low, high = piece.box if front is None else footprint(front)
             if len(piece.cubes) >= head.LEAST and np.all((at[:2] > low[:2] - 0.1) & (at[:2] < high[:2] + 0.1)):
                 return number
         return None
@@ -90,6 +137,9 @@ class Seen:
         if piece is None:
             return at[2] < FLOOR and float(surface.low[2]) < FLOOR and away <= FLOOR_AROUND
         low, high = self.pieces[piece].box
+        front = self.front_of(piece)
+        if front is not None and front.inside(middle[None])[0]:
+            return True
         return bool(
             np.all((middle[:2] > low[:2] - 0.05) & (middle[:2] < high[:2] + 0.05)) and middle[2] > high[2] - 0.1
         )
@@ -102,13 +152,18 @@ class Seen:
         away = [s for s in self.surfaces if not any(s is old for old in known)]
         self.surfaces = away + [better.get(id(s), s) for s in fresh]
 
-    def boxes(self, without: Position | None = None) -> dict[str, Box]:
-        """Return what is around the base in the map; what covers a position is left out."""
-        boxes: dict[str, Box] = {}
+    def boxes(self, without: Position | None = None, base: Base | None = None) -> dict[str, Believed]:
+        """Return what is around a base pose in the map, the robot's own if none is given; what covers a position is
+        left out."""
+        here = np.array([base.x, base.y]) if base is not None else self._robot.believed[:2]
+        boxes: dict[str, Believed] = {}
         for number, piece in enumerate(self.pieces):
             low, high = piece.box
-            off = np.maximum(0.0, np.maximum(low[:2] - self._robot.believed[:2], self._robot.believed[:2] - high[:2]))
+            off = np.maximum(0.0, np.maximum(low[:2] - here, here - high[:2]))
             if len(piece.cubes) >= head.LEAST and np.hypot(*off) < AROUND:
+                if f"furniture_{number}" in self.fronts:
+                    boxes[f"furniture_{number}"] = self.fronts[f"furniture_{number}"]
+                    continue
                 top = min(float(high[2]), piece.top) - 0.004
                 inner = 0.02
                 boxes[f"furniture_{number}"] = (
@@ -119,7 +174,7 @@ class Seen:
             low, high = surface.low, surface.high
             if (
                 not (without is not None and _covers(surface, without))
-                and np.hypot(*(surface.middle - [*self._robot.believed[:2], 0])[:2]) < AROUND
+                and np.hypot(*(surface.middle[:2] - here)) < AROUND
             ):
                 boxes[f"thing_{number}"] = (low, high)
         return boxes

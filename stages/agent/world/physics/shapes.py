@@ -13,7 +13,7 @@ from schemas.apartment import Thing
 from schemas.base import Model, as_transform, as_vector
 from schemas.interactive_scene import SceneBody
 from schemas.outside import file_toml
-from schemas.scene_parts import Box
+from schemas.scene_parts import Box, Joint
 from stages.kit.simulation.shapes import paint
 
 SHAPES = Path(__file__).resolve().parents[4] / "data" / "agent" / "things.toml"
@@ -28,6 +28,8 @@ COLORS = {
 STAIN = (0.30, 0.16, 0.06)
 """What a used cup has on its top."""
 RIM_PARTS = 12
+MOVING_MASS = 3.0
+"""Of a leaf or a drawer [kg]."""
 
 
 class Piece(Model):
@@ -86,6 +88,11 @@ def _geometry(piece: Piece) -> str:
 
 def urdf_of(name: str, parts: tuple[Piece, ...], mass: float) -> str:
     """Return URDF text of one rigid body; its frame is at the middle of its foot."""
+    return f'<robot name="{name}">{link_text(name, parts, mass)}</robot>'
+
+
+def link_text(name: str, parts: tuple[Piece, ...], mass: float) -> str:
+    """Return the <link> of pieces in the link's frame."""
     extent = np.max([np.abs(piece.at) for piece in parts], axis=0) + 0.03
     inertia = mass * float((extent**2).sum()) / 6
     height = sum(piece.at[2] for piece in parts) / len(parts)
@@ -95,9 +102,24 @@ def urdf_of(name: str, parts: tuple[Piece, ...], mass: float) -> str:
         for p in parts
     )
     return (
-        f'<robot name="{name}"><link name="{name}"><inertial><origin xyz="0 0 {height}"/><mass value="{mass}"/>'
+        f'<link name="{name}"><inertial><origin xyz="0 0 {height}"/><mass value="{mass}"/>'
         f'<inertia ixx="{inertia}" ixy="0" ixz="0" iyy="{inertia}" iyz="0" izz="{inertia}"/></inertial>'
-        f"{shapes_text}</link></robot>"
+        f"{shapes_text}</link>"
+    )
+
+
+def jointed_text(name: str, still: tuple[Piece, ...], moving: tuple[Piece, ...], joint: Joint) -> str:
+    """Return URDF text of furniture with one joint; pieces in its own frame, the joint at 0."""
+    shift = [-value for value in joint.origin]
+    parts = tuple(
+        piece.model_copy(update={"at": tuple(a + b for a, b in zip(piece.at, shift, strict=True))}) for piece in moving
+    )
+    at, along = (" ".join(str(value) for value in vector) for vector in (joint.origin, joint.axis))
+    return (
+        f'<robot name="{name}">{link_text(name, still, 1.0)}{link_text(joint.part, parts, MOVING_MASS)}'
+        f'<joint name="{joint.name}" type="{joint.type}"><parent link="{name}"/><child link="{joint.part}"/>'
+        f'<origin xyz="{at}"/><axis xyz="{along}"/>'
+        f'<limit lower="{joint.lower}" upper="{joint.upper}" effort="100" velocity="5"/></joint></robot>'
     )
 
 

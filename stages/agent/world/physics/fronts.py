@@ -1,0 +1,281 @@
+"""A door or a drawer as the robot believes in it: of what was seen of its front, and of what such furniture is like.
+
+**Assumed** by the class of furniture as seen: a dresser's front is a drawer that comes straight out, any other's a leaf
+whose hinge is at the edge far from the handle; furniture with a door is hollow. All else is measured: which side the
+handle is on, where and how long its bar is, how wide and high the front, and how far it is open by the arm's joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, hypot
+
+import numpy as np
+
+from schemas.base import as_vector
+from schemas.scene_parts import Joint
+from stages.agent.body import Position
+from stages.agent.world.physics.eyes import Surface
+from stages.agent.world.physics.shapes import jointed_text, slab
+from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.kit.motion.doors import body_from_moved
+
+WITH_DRAWERS, WITH_LEAVES = ("dresser",), ("fridge",)
+PARTS = ("handle", "door", "drawer")
+"""Words for what moves of furniture: no things."""
+THICK, LEAF = 0.03, 0.02
+"""Of walls, and of leaves and drawer fronts [m]."""
+HALF_BAR = 0.01
+"""Half of a bar's thickness: the middle of a handle lies so far behind what is seen of it [m]."""
+ROOM = 0.008
+"""Around a bar that the hand keeps when it goes past it [m]."""
+OVER = 0.025
+"""Believed of a front over where its mask ends, which is a pixel too low [m]."""
+BEHIND_BAR = 0.03
+"""Room of a hand's fingers behind a bar: so far is a front from it where it was not seen itself [m]."""
+STAYS = 0.04
+"""Of a drawer stays in [m]."""
+WIDEST = 1.9
+"""Angle to which a leaf opens [rad]."""
+NEAR_HINGE = 0.15
+"""Points of a leaf this near to its hinge tell little of its angle [m]."""
+LOOK_AT = 0.6
+"""Height at which it is looked into, as a share of its own."""
+NARROWEST = 0.25
+"""Of a front that was looked at, and not its edge [m]."""
+AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
+"""From where a side is looked at: before it, and beside its middle [m]."""
+EDGE_CELL = 0.01
+TRAY = 0.5
+"""Height of the sides of a drawer, as a share of its front's."""
+
+
+@dataclass(frozen=True)
+class Front:
+    """A front in its own frame: the middle of the furniture's foot, x out of the front, z up, metres."""
+
+    name: str
+    label: str
+    """Class of the furniture."""
+    map_from_front: np.ndarray
+    size: tuple[float, float, float]
+    """Depth, width, height of the furniture."""
+    panel: tuple[float, float, float, float]
+    """What moves, from y to y and from z to z, as seen."""
+    bar: tuple[tuple[float, ...], tuple[float, ...]]
+    """Lower and upper corner of the handle."""
+    slides: bool
+    value: float = 0.0
+    """How far it is open, as felt [rad] or [m]."""
+    floor: float | None = None
+    """Height on which things inside lie, as seen [m]."""
+
+    @property
+    def joint(self) -> Joint:
+        """How it moves."""
+        x, (y0, y1, _, _) = self.size[0] / 2, self.panel
+        at = (np.array(self.bar[0]) + self.bar[1]) / 2
+        tall = self.bar[1][2] - self.bar[0][2] > self.bar[1][1] - self.bar[0][1]
+        hinge = y1 if at[1] < (y0 + y1) / 2 else y0
+        return Joint(
+            name=f"{self.name}__joint",
+            type="prismatic" if self.slides else "revolute",
+            part=f"{self.name}__front",
+            origin=(0.0, 0.0, 0.0) if self.slides else (x - LEAF, float(hinge), 0.0),
+            axis=(1.0, 0.0, 0.0) if self.slides else (0.0, 0.0, 1.0 if hinge > at[1] else -1.0),
+            lower=0.0,
+            upper=self.size[0] - STAYS if self.slides else WIDEST,
+            handle=as_vector(at),
+            handle_axis=(0.0, 0.0, 1.0) if tall else (0.0, 1.0, 0.0),
+        )
+
+    def urdf(self) -> str:
+        """Return URDF text of it: walls around a hollow, and what moves before it."""
+        x, w, h = self.size[0] / 2, self.size[1] / 2, self.size[2]
+        y0, y1, z0, z1 = self.panel
+        inner = x - LEAF
+        still = [
+            slab((-x, -w, 0.0), (THICK - x, w, h)),
+            slab((-x, -w, 0.0), (inner, THICK - w, h)),
+            slab((-x, w - THICK, 0.0), (inner, w, h)),
+            slab((-x, -w, 0.0), (inner, w, z0 if self.slides else THICK)),
+            slab((-x, -w, max(z1 if self.slides else 0.0, h - THICK)), (inner, w, h)),
+        ]
+        low, high = np.array(self.bar[0]) - ROOM, np.array(self.bar[1]) + ROOM
+        moving = [slab((inner, y0, z0), (x, y1, z1 + OVER)), slab(as_vector(low), as_vector(high))]
+        if self.slides:
+            edge = z0 + TRAY * (z1 - z0)
+            far = STAYS - x
+            moving += [
+                slab((far, y0 + THICK, z0), (inner, y1 - THICK, z0 + 0.005)),
+                slab((far, y0 + THICK, z0), (inner, y0 + THICK + 0.01, edge)),
+                slab((far, y1 - THICK - 0.01, z0), (inner, y1 - THICK, edge)),
+            ]
+        return jointed_text(self.name, tuple(still), tuple(moving), self.joint)
+
+    def local(self, points: np.ndarray) -> np.ndarray:
+        """Return points (N, 3) of the map in its own frame."""
+        return apply(inverse(self.map_from_front), points)
+
+    def inside(self, points: np.ndarray) -> np.ndarray:
+        """Return (N,) bool: points of the map that are within it, or within its drawer where that is now."""
+        own = self.local(points)
+        out = self.value if self.slides else 0.0
+        low = self.panel[2] - 0.03 if self.slides else 0.0
+        x, w = self.size[0] / 2, self.size[1] / 2
+        return (
+            (own[:, 0] > out - x)
+            & (own[:, 0] < x + out)
+            & (np.abs(own[:, 1]) < w)
+            & (own[:, 2] > low)
+            & (own[:, 2] < self.size[2] - 0.05)
+        )
+
+    def behind(self, at: np.ndarray) -> float:
+        """Return how far a point (3,) of the map is behind the open front of a shelf [m]; 0 in a drawer, which is open
+        from above."""
+        return 0.0 if self.slides else max(0.0, self.size[0] / 2 - float(self.local(at[None])[0, 0]))
+
+    def opening(self) -> Position:
+        """Return a place of the map in the middle of a shelf."""
+        x, y, z = apply(self.map_from_front, np.array([(0.0, 0.0, LOOK_AT * self.size[2])]))[0]
+        return float(x), float(y), float(z)
+
+    def of_part(self, points: np.ndarray, room: float) -> np.ndarray:
+        """Return (N,) bool: points of the map that are of what moves, where it is now, or within `room` [m] of it."""
+        shut = apply(inverse(body_from_moved(self.joint, self.value)), self.local(points))
+        y0, y1, z0, z1 = self.panel
+        back = STAYS - self.size[0] / 2 if self.slides else self.size[0] / 2 - LEAF
+        low, high = np.array([back, y0, z0]), np.array([max(self.size[0] / 2, self.bar[1][0]), y1, z1])
+        return np.all((shut > low - room) & (shut < high + room), axis=1)
+
+    def outline(self) -> np.ndarray:
+        """Return points (N, 2) of the map over which what moves stands now, 5 cm apart at most."""
+        x, (y0, y1, _, _) = self.size[0] / 2, self.panel
+        xs = np.arange(STAYS - x if self.slides else x - LEAF, x, 0.05)
+        grid = np.stack(np.meshgrid(xs, np.arange(y0, y1 + 0.04, 0.05), [0.5]), -1).reshape(-1, 3)
+        return apply(self.map_from_front @ body_from_moved(self.joint, self.value), grid)[:, :2]
+
+    def value_seen(self, points: np.ndarray) -> float:
+        """Return how far it is open by points (N, 3) of the map that were seen of what moves [rad] or [m]."""
+        own = self.local(points)
+        if self.slides:
+            return edges(own[:, :2])[1] - self.size[0] / 2
+        joint = self.joint
+        from_hinge = own[:, :2] - np.array(joint.origin)[:2]
+        far = from_hinge[np.hypot(*from_hinge.T) > NEAR_HINGE] * (1.0, -joint.axis[2])
+        return float(np.median(np.arctan2(far[:, 0], far[:, 1]))) if len(far) else self.value
+
+    def felt(self, tool: np.ndarray, contact: np.ndarray) -> float:
+        """Return the joint value at which a point that was at `contact` (3,), own frame, when it was shut is where the
+        tool (3,) of the map is now."""
+        at = self.local(tool[None])[0]
+        if self.slides:
+            return float(at[0] - contact[0])
+        hinge = np.array(self.joint.origin)[:2]
+        before, now = contact[:2] - hinge, at[:2] - hinge
+        turned = atan2(now[1], now[0]) - atan2(before[1], before[0])
+        return float((turned * self.joint.axis[2] + np.pi) % (2 * np.pi) - np.pi)
+
+
+def front_seen(
+    name: str, label: str, box: tuple[np.ndarray, np.ndarray], surfaces: Sequence[Surface], base: np.ndarray
+) -> Front | None:
+    """Return the front of furniture in a box (3,), (3,) of the map by what a look at it from a base pose (3,) showed;
+    None without a handle, or where a side was looked at: of a door that shows an edge."""
+    handles = [s.points for s in surfaces if s.label == "handle"]
+    panels = [s.points for s in surfaces if s.label in PARTS[1:]]
+    if not handles:
+        return None
+    low, high = box
+    handle, panel = max(handles, key=len), max([*panels, _facing(box, base)], key=len)
+    across = int(np.ptp(np.percentile(panel[:, :2], (5, 95), axis=0), axis=0).argmin())
+    normal = np.zeros(2)
+    normal[across] = 1.0 if base[across] > np.median(panel[:, across]) else -1.0
+    middle, half_depth, half_width = (low + high) / 2, (high - low)[across] / 2, (high - low)[1 - across] / 2
+    slides = label in WITH_DRAWERS
+    frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*middle[:2], 0.0]))
+    own = apply(inverse(frame), panel)
+    if not panels:
+        own[:, 0] = np.percentile(apply(inverse(frame), handle)[:, 0], 95) - 2 * HALF_BAR - BEHIND_BAR
+    plane = float(np.median(own[:, 0]))
+    (y0, y1), (z0, z1) = edges(own[:, 1:]), edges(own[:, :0:-1])
+    if y1 - y0 < NARROWEST:
+        return None
+    if slides:  # wider than a picture, perhaps
+        y0, y1 = min(y0, -half_width), max(y1, half_width)
+    shift = np.eye(4)
+    shift[:2, 3] = (plane - half_depth) / 2, (y0 + y1) / 2  # the back is where the box ends
+    frame, half_depth, half_width = frame @ shift, (half_depth + plane) / 2, (y1 - y0) / 2
+    bar = apply(inverse(frame), handle)
+    bar = bar[bar[:, 0] > half_depth + BEHIND_BAR / 2]  # what is farther back is the panel seen beside the bar
+    if len(bar) < 5:
+        return None
+    near, far = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)
+    near[0] = far[0] - 2 * HALF_BAR
+    extent = (-half_width, half_width, z0 if slides else LEAF, min(z1, float(high[2])))
+    size = (float(2 * half_depth), float(2 * half_width), float(high[2]))
+    return Front(name, label, frame, size, extent, (tuple(near.tolist()), tuple(far.tolist())), slides)
+
+
+def _facing(box: tuple[np.ndarray, np.ndarray], base: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) of the side of a box that faces a base pose (3,): few, for where no panel was seen."""
+    (low, high), across = box, int(np.argmax(np.maximum(box[0] - base, base - box[1])[:2]))
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 12).T, indexing="ij"), -1)
+    side = grid.take(-1 if base[across] > high[across] else 0, axis=across)
+    return side.reshape(-1, 3)
+
+
+def edges(points: np.ndarray) -> tuple[float, float]:
+    """Return from where to where a surface of points (N, 2) [m] reaches along the first axis: to the outermost
+    centimetres that hold at least half as much of it as the middle one does: beyond are strays."""
+    cells = np.unique(np.floor(points / EDGE_CELL).astype(int), axis=0)
+    columns, counts = np.unique(cells[:, 0], return_counts=True)
+    full = columns[counts >= np.median(counts) / 2]
+    return float(full.min() * EDGE_CELL), float((full.max() + 1) * EDGE_CELL)
+
+
+def footprint(front: Front, less: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (2,), (2,) of the map over which furniture with its drawer stands, `less` [m] of its front; a
+    leaf is left out."""
+    x, w, out = front.size[0] / 2, front.size[1] / 2, (front.value if front.slides else 0.0) - less
+    corners = apply(front.map_from_front, np.array([(-x, -w, 0.0), (x + out, w, 0.0)]))[:, :2]
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def bases_before(front: Front) -> list[np.ndarray]:
+    """Return base poses (3,) of the map from which the hand may get along with what moves, the likeliest first: before
+    a drawer, and beside the way of a leaf on the handle's side."""
+    at = np.array(front.joint.handle or (0.0, 0.0, 0.0))
+    x = front.size[0] / 2
+    if front.slides:
+        spots = [(away, at[1] + aside) for aside in (0.0, 0.35, -0.35, 0.5, -0.5) for away in AWAYS]
+    else:
+        side = -front.joint.axis[2]
+        offs = ((0.75, 0.15), (0.65, 0.25), (0.85, 0.1), (0.85, 0.3), (0.55, 0.35), (0.75, -0.05), (0.95, 0.15))
+        spots = [(away, at[1] + side * aside) for away, aside in offs]
+    made = []
+    for away, y in spots:
+        here, there = apply(front.map_from_front, np.array([(x + away, y, 0.0), (x, at[1], 0.0)]))
+        made.append(np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])]))
+    return made
+
+
+def sides_of(box: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the middles (2,) of the four sides of a box with their unit normals (2,)."""
+    centre, half = (box[0] + box[1])[:2] / 2, (box[1] - box[0])[:2] / 2
+    return [(centre + normal * half, normal) for normal in np.array([(1, 0), (-1, 0), (0, 1), (0, -1)], float)]
+
+
+def before(middle: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
+    """Return base poses (3,) from which a side (its middle and normal, (2,)) is looked at, the best first."""
+    left = np.array([-normal[1], normal[0]])
+    spots = (middle + away * normal + aside * left for aside in ASIDES for away in AWAYS)
+    return [np.array([*spot, atan2(*(middle - spot)[::-1])]) for spot in spots]
+
+
+def away_from(front: Front, base: np.ndarray) -> float:
+    """Return the distance [m] of a base (3,) from the middle of the front."""
+    own = front.local(np.array([[base[0], base[1], 0.0]]))[0]
+    return hypot(own[0] - front.size[0] / 2, own[1])

@@ -1,0 +1,328 @@
+"""Doors and drawers: the handle is looked for, gripped and driven along; what is open is pushed shut.
+
+All that is known of a front is what was seen of it and what the arm's joints felt (`fronts.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import atan2, pi
+
+import numpy as np
+
+from stages.agent.body import Base, Felt, FeltKind, Position
+from stages.agent.world.physics.driving import Driving
+from stages.agent.world.physics.fronts import PARTS, Front, away_from, bases_before, before, front_seen, sides_of
+from stages.agent.world.physics.looking import Looking
+from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.agent.world.physics.seen import Seen
+from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.motion.arcs import Arc, along_arc, arc_values
+from stages.kit.motion.arm_motion import ArmPlanner, Tally
+from stages.kit.motion.doors import (
+    ContactPoint,
+    body_from_moved,
+    closing_direction,
+    is_closed,
+    is_open,
+    open_value,
+    push_points,
+)
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import forward
+from stages.kit.motion.rrt_connect import SearchSpace
+from stages.kit.motion.segments import Manipulation, Segment
+from stages.kit.simulation.robot import base_pose
+from stages.kit.simulation.shapes import joined, link_shapes
+
+HEIGHT_OF_LOOK = 0.65
+"""At which share of its height a side is looked at."""
+PITCHES = (0.0, 0.5, 0.9)
+"""How far the hand comes down to a bar [rad]."""
+TILTS, WIDE_TILTS = (0.0, 0.35, -0.35, 0.7, -0.7), ((1.0, 0.0), (-1.0, 0.0), (0.5, -0.5), (-0.5, 0.5))
+"""Turns of the hand about the vertical [rad]: where it grips, and from the first to the last where it pushes."""
+FINE = 0.02
+"""Largest step of a joint between two checks [rad]: a bar is thinner than what the elbow sweeps in a larger one."""
+GRIP_OPENING = 0.06
+"""Of the fingers around a bar before they close [m]: there is little room behind it."""
+DEEPER = 0.008
+"""Of the tool point behind the middle of a bar [m]: held by their ends alone, the fingers slide off it."""
+NOTHING_GRIPPED = 0.01
+"""Opening of the fingers below which they hold no bar [m]."""
+PRESS, OVERSHOOT = 0.006, 0.02
+"""The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
+SHARES = (1.0, 0.75)
+"""Of what a door opens to, tried one after the other."""
+SAMPLES = 500
+HERE = 0.12
+"""A base this near to one that is asked for stands there [m]."""
+LOOKS_IN = ((0.6, 0.15), (0.6, 0.28), (0.6, 0.02))
+"""Base poses from which an open leaf's inside is seen: before the front and to the handle's side [m]."""
+
+
+class Pulling:
+    """The doors of a robot."""
+
+    def __init__(self, robot: RobotInRoom, seen: Seen, looking: Looking, driving: Driving) -> None:
+        self._robot, self._seen, self._looking, self._driving = robot, seen, looking, driving
+
+    def pull(self, at: Position, *, opening: bool) -> Felt:
+        """Open or close the door or drawer of the furniture at a position."""
+        number = self._seen.piece_at(at)
+        piece = None if number is None else self._seen.pieces[number]
+        step = f"{'open' if opening else 'close'} {piece.label if piece else 'nothing'}"
+        if number is None or self._robot.hold is not None:
+            self._robot.log.done("pull", step, False, "grasp", "")
+            return Felt(False, "out_of_reach")
+        name = f"furniture_{number}"
+        try:
+            value = self._open(name, number) if opening else self._shut(name)
+            self._seen.moved(name, value)
+            self._check(self._seen.fronts[name], opening)
+        except MotionFailed as failed:
+            self._robot.draw_in()
+            self._robot.log.done("pull", step, False, "grasp", "")
+            return Felt(False, _felt_kind(failed), failed.failure)
+        self._robot.log.done("pull", step, True, "", "")
+        if opening:
+            self._stand_before(self._seen.fronts[name])
+        return Felt(True, furniture=self._seen.piece_seen(number))
+
+    def _check(self, front: Front, opening: bool) -> None:
+        joint, value = front.joint, front.value
+        if not (is_open(joint, value) if opening else is_closed(joint, value)):
+            raise MotionFailed(
+                "door_stuck",
+                f"the {'drawer' if front.slides else 'door'} stands at {value:.2f} of {joint.upper:.2f}",
+                (front.name,),
+                {"value": value, "upper": joint.upper},
+            )
+
+    # ---- the handle ----
+
+    def _find(self, number: int) -> Front:
+        """Return the front of furniture with its handle, looked for from before its sides, those with most room first.
+        Raises MotionFailed `no_grasp`."""
+        label, fits = self._seen.pieces[number].label, self._seen.obstacles.fits
+        looked, sides = 0, sides_of(self._seen.pieces[number].box)
+        for middle, normal in sorted(sides, key=lambda side: -self._room_before(*side)):
+            pose = next((pose for pose in before(middle, normal) if fits(pose[0], pose[1])), None)
+            if pose is not None and self._go(pose, label):
+                looked += 1
+                front = self._look(number, middle)
+                if front is not None:
+                    return front
+        raise MotionFailed(
+            "no_grasp", f"no handle of the {label} was seen from {looked} sides", (label,), {"sides": looked}
+        )
+
+    def _room_before(self, middle: np.ndarray, normal: np.ndarray) -> int:
+        """Return at how many of 40 distances, 10 cm apart, the base fits before a side."""
+        return sum(self._seen.obstacles.fits(*(middle + 0.1 * k * normal)) for k in range(1, 41))
+
+    def _look(self, number: int, middle: np.ndarray | None = None) -> Front | None:
+        """Look at the handle of furniture where it was seen before, or at the `middle` (2,) of a side; keep the front,
+        if its handle is there."""
+        piece, base = self._seen.pieces[number], self._robot.believed
+        low, high = piece.box
+        known = self._seen.fronts.get(f"furniture_{number}")
+        if known is not None and known.value > 0:
+            return known  # half open, the handle does not tell where the front is
+        if known is not None:
+            at = apply(known.map_from_front, np.array([known.joint.handle]))[0]
+        else:
+            assert middle is not None
+            at = np.array([*middle, HEIGHT_OF_LOOK * high[2]])
+        front = front_seen(
+            f"furniture_{number}", piece.label, (low, high), self._looking.look_at_front(_position(at)), base
+        )
+        if front is not None:
+            self._seen.fronts[front.name] = front
+        return front
+
+    def _go(self, pose: np.ndarray, label: str) -> bool:
+        """Drive to a base pose (3,) before furniture of a class, if the robot does not stand there."""
+        here = self._robot.believed
+        turn = (pose[2] - here[2] + pi) % (2 * pi) - pi
+        if np.hypot(*(pose[:2] - here[:2])) < HERE and abs(turn) < 0.6:
+            return True
+        base = Base(float(pose[0]), float(pose[1]), float(pose[2]))
+        length = self._seen.obstacles.way(self._robot.base, (base.x, base.y))
+        return bool(np.isfinite(length)) and self._driving.drive(base, length, f"{label}_0").ok
+
+    # ---- open ----
+
+    def _open(self, name: str, number: int) -> float:
+        """Open a front; return how far it is open by the arm's joints. Raises MotionFailed."""
+        front = self._seen.fronts.get(name) or self._find(number)
+        tally = Tally()
+        for base in self._bases(front):
+            if self._drag(front, base, tally) is None or not self._go(base, front.label):
+                continue
+            front = self._look(number) or front  # what was measured from another stop is off by both stops' errors
+            motion = self._drag(front, self._robot.believed, tally)
+            if motion is not None:
+                return self._carry_out(front, motion)
+        tally.raise_for(f"open({front.name})", (front.name,))
+        raise AssertionError("unreachable")
+
+    def _bases(self, front: Front) -> Iterator[np.ndarray]:
+        """Yield base poses (3,) for a front that the robot can get to: where it stands first, if that is before it."""
+        if away_from(front, self._robot.believed) < 1.2:
+            yield self._robot.believed.copy()
+        for pose in bases_before(front):
+            if self._seen.obstacles.fits(pose[0], pose[1]):
+                yield pose
+
+    def _drag(self, front: Front, base: np.ndarray, tally: Tally) -> Manipulation | None:
+        """Return the motion that grips the handle and opens the front from a base pose (3,), or None (tallied)."""
+        planner = self._planner()
+        joint = front.joint
+        handle = np.array(joint.handle)
+        bar = np.array(joint.handle_axis)
+        inward = closing_direction(joint, handle)
+        for share in SHARES:
+            values = arc_values(front.value, share * open_value(joint))
+            for pitch in PITCHES:
+                contact = ContactPoint(handle, np.array([*(np.cos(pitch) * inward[:2]), -np.sin(pitch)]))
+                for roll in (0.0, pi) if abs(bar[2]) > 0.5 else (pi / 2, -pi / 2):
+                    for tilt in TILTS:
+                        turns = np.full(len(values), tilt)
+                        arc = Arc(front.name, joint, contact, values, turns, roll, -DEEPER, GRIP_OPENING, 0.0)
+                        motion = along_arc(self._robot.beliefs, self._robot.arm, arc, base, planner, tally)
+                        if motion is not None:
+                            return motion
+        return None
+
+    def _planner(self) -> ArmPlanner:
+        beliefs = self._robot.beliefs
+        beliefs.hold(None)
+        beliefs.show(self._seen.boxes())
+        planner = ArmPlanner(beliefs, self._robot.random, SAMPLES)
+        planner.space = SearchSpace(beliefs.chain.lower, beliefs.chain.upper, np.full(len(self._robot.arm), FINE))
+        return planner
+
+    def _carry_out(self, front: Front, motion: Manipulation) -> float:
+        """Carry out a motion along with a front; return where the arm's joints say that it is then.
+
+        Where the bar is no longer between the fingers, and of a leaf, which swings on, the eyes say it. Raises
+        MotionFailed.
+        """
+        robot = self._robot
+        *there, away, home = motion.segments
+        start = next(k for k, segment in enumerate(there) if segment.label in ("pull", "push"))
+        robot.room.world.wake()
+        robot.driver.robot.finger_force = robot.description.firm_finger_force
+        try:
+            value, slipped = self._along(front, there, start)
+        finally:
+            robot.driver.robot.finger_force = robot.description.finger_force
+        try:
+            robot.carry_out((away, home))
+        except MotionFailed:
+            robot.draw_in()  # it let go already
+        robot.driver.wait(0.5)
+        if not front.slides or slipped:
+            value = self._seen_open(front, value)
+        return value
+
+    def _along(self, front: Front, there: list[Segment], start: int) -> tuple[float, bool]:
+        """Carry out the segments of which number `start` is the first that moves a front; return where the arm's joints
+        say that it is then, and whether the bar slipped out of the fingers."""
+        robot = self._robot
+        robot.carry_out(tuple(there[:start]))
+        before = front.local(self._tool(there[start].path[0, 3:])[None])
+        shut = apply(inverse(body_from_moved(front.joint, front.value)), before)[0]
+        robot.carry_out(tuple(there[start:]))
+        if there[start].label == "pull" and robot.driver.robot.configuration().opening < NOTHING_GRIPPED:
+            return front.value, True
+        return max(0.0, front.felt(self._tool(robot.measured_arm()), shut)), False
+
+    def _seen_open(self, front: Front, value: float) -> float:
+        """Return how far a front is open as seen from here; where it is not seen, the `value` that was felt."""
+        handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
+        seen = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
+        return max(0.0, front.value_seen(max(seen, key=lambda s: len(s.points)).points)) if seen else value
+
+    def _tool(self, arm: np.ndarray) -> np.ndarray:
+        """Return the tool point (3,) of the map for joint values (7,)."""
+        robot = self._robot
+        pose: np.ndarray = base_pose(robot.believed, robot.description) @ forward(robot.beliefs.chain, arm)
+        return pose[:3, 3]
+
+    def _stand_before(self, front: Front) -> None:
+        """Drive to where the inside of an open leaf is seen; a drawer's is, from where it was pulled."""
+        if front.slides:
+            return
+        side = -front.joint.axis[2]
+        x = front.size[0] / 2
+        for away, aside in LOOKS_IN:
+            here, there = apply(front.map_from_front, np.array([(x + away, side * aside, 0.0), (0.0, 0.0, 0.0)]))
+            pose = np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])])
+            if self._seen.obstacles.fits(pose[0], pose[1]) and self._go(pose, front.label):
+                return
+
+    # ---- shut ----
+
+    def _shut(self, name: str) -> float:
+        """Push a front shut; return how far it is still open by the arm's joints. Raises MotionFailed."""
+        front = self._seen.fronts.get(name)
+        if front is None:
+            raise MotionFailed("no_grasp", "the robot knows of no open door there", (name,))
+        tally = Tally()
+        for end in (-OVERSHOOT, 0.4 * front.value):
+            for base in self._bases(front):
+                if self._push(front, base, end, tally) is None or not self._go(base, front.label):
+                    continue
+                motion = self._push(front, self._robot.believed, end, tally)
+                if motion is None:
+                    continue
+                value = self._carry_out(front, motion)
+                if end < 0 or is_closed(front.joint, value):
+                    return value
+                self._seen.moved(name, value)
+                return self._shut_rest(self._seen.fronts[name], value, tally)
+        tally.raise_for(f"close({front.name})", (front.name,))
+        raise AssertionError("unreachable")
+
+    def _shut_rest(self, front: Front, value: float, tally: Tally) -> float:
+        """Push what was pushed half shut the rest of the way."""
+        for base in self._bases(front):
+            if self._push(front, base, -OVERSHOOT, tally) is not None and self._go(base, front.label):
+                motion = self._push(front, self._robot.believed, -OVERSHOOT, tally)
+                if motion is not None:
+                    return self._carry_out(front, motion)
+        return value
+
+    def _push(self, front: Front, base: np.ndarray, end: float, tally: Tally) -> Manipulation | None:
+        """Return the motion that pushes a front from where it is to a value, from a base pose (3,), or None."""
+        planner = self._planner()
+        joint = front.joint
+        part = joined(link_shapes(front.urdf())[joint.part])
+        part.apply_translation(joint.origin)
+        z0, z1 = front.panel[2:]
+        contacts = push_points(joint, part, np.random.default_rng(5), 4, (max(0.45, z0), z1))
+        values = arc_values(front.value, end)
+        gap = self._robot.description.tip_overhang - PRESS
+        for contact in contacts:
+            for start, last in (*((t, t) for t in TILTS), *WIDE_TILTS):
+                for roll in (0.0, pi / 2):
+                    turns = np.linspace(start, last, len(values))
+                    arc = Arc(front.name, joint, contact, values, turns, roll, gap, 0.0, 0.0)
+                    motion = along_arc(self._robot.beliefs, self._robot.arm, arc, base, planner, tally)
+                    if motion is not None:
+                        return motion
+        return None
+
+
+def _position(at: np.ndarray) -> Position:
+    return (float(at[0]), float(at[1]), float(at[2]))
+
+
+def _felt_kind(failed: MotionFailed) -> FeltKind:
+    kinds: dict[str, FeltKind] = {
+        "no_grasp": "no_grasp",
+        "no_inverse_kinematics": "out_of_reach",
+        "door_stuck": "door_stuck",
+    }
+    return kinds.get(failed.failure.kind, "no_trajectory")
