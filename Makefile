@@ -281,6 +281,7 @@ stitch-train: setup ## Train the needle and thread network anew, an hour of a co
 	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)
 	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --steps 3000 --start $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)
 	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --cluttered --start $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-cluttered$(if $(QUICK),-quick)
+	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --cluttered --trials --steps 3000 --start $(OUTPUTS)/experiments/stitch-train-cluttered$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-trials$(if $(QUICK),-quick)
 
 stitch-segmentation: setup ## The network's masks on held-out views, and the needle's pose from them (QUICK=1: four views)
 	$(EXPERIMENT) stitch_segmentation --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-segmentation$(if $(QUICK),-quick) $(ASKED)

@@ -1,7 +1,8 @@
 """Suture trials that see by rendered views of the trial itself, beside the same seeds seen by the error model.
 
 `geometry`: masks spoiled as a learned mask's, 15 s of one core a trial; `pictures`: rendered pictures and the network's
-masks, 80 s. What became of the looks by place is what the error model's shares say.
+masks, 80 s; `error_model` and `network_model` are the error models of either. What became of the looks by place is what
+the error model's shares say.
 """
 
 from __future__ import annotations
@@ -12,19 +13,24 @@ from collections.abc import Iterator, Sequence
 import cv2
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
-from benchmarks.experiments.stitch_trials.experiment import REPORTING, TUNING, over, rate
+from benchmarks.experiments.stitch_trials.arms import NETWORK_EYES
+from benchmarks.experiments.stitch_trials.experiment import TUNING, over, rate
 from benchmarks.stitch.eyes import drawn_looks
 from benchmarks.tabulation import markdown
 from schemas.suture_trial import SutureRun
 from stages.suture.options import ARM_NAMES
+from stages.suture.segmentation.checkpoint import BUNDLED
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
 from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.records import run_of
 from stages.suture.trials.sight import LookingEyes
 
-TRIALS = {"geometry": 30, "pictures": 8, "error_model": 30}
+TRIALS = {"geometry": 20, "pictures": 20, "error_model": 20, "network_model": 20}
 """Case -> trials."""
+REPORTING = range(1800, 1900)
+"""None that any trial threw before: the first of them were looked at after the network's last training."""
+BY_NETWORK = ("pictures", "network_model")
 FATED = ("geometry", "pictures")
 FATES = ("right", "swapped", "abstained", "wrong")
 
@@ -36,15 +42,17 @@ class Look(SutureRun):
     places: dict[str, dict[str, int]] = {}
 
 
-def model_of(arm: str) -> PerceptionModel:
-    """Return the error model that an arm sees by."""
+def model_of(arm: str, case: str) -> PerceptionModel:
+    """Return the error model that an arm sees by; of looks at views, what they are held against."""
+    if arm == "ours" and case in BY_NETWORK:
+        return perception_model(NETWORK_EYES)
     return perception_model(FOLDER / f"perception_{POLICIES[arm].perception}.toml")
 
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Look]]:
     """Yield trials."""
     for trial in trials:
-        seed, model = int(trial.seed), model_of(trial.arm)
+        seed, model = int(trial.seed), model_of(trial.arm, trial.case)
         eyes = LookingEyes(model, seed, trial.case == "pictures") if trial.case in FATED else None
         started = time.process_time()
         run = run_of(trial.arm, seed, run_trial(POLICIES[trial.arm], seed, model=model, eyes=eyes))
@@ -59,7 +67,7 @@ def looks(results: Results) -> str:
     rows, ended = [], []
     for case in (case for case in FATED if case in results.cases):
         for arm in results.arms(case):
-            runs, model = results.of(arm, case), model_of(arm)
+            runs, model = results.of(arm, case), model_of(arm, case)
             for place in sorted({place for run in runs for place in run.places}):
                 counts = [sum(run.places.get(place, {}).get(fate, 0) for run in runs) for fate in FATES]
                 right = model.right_share.at(place)
@@ -94,8 +102,10 @@ EXPERIMENT = Experiment(
     tuning=tuple(map(str, TUNING)),
     reporting=tuple(map(str, REPORTING)),
     seeds_of=lambda bench, case: tuple(map(str, (TUNING if bench.tuning else REPORTING)[: TRIALS[case]])),
+    runs=lambda arm, case: arm == "ours" or case != "network_model",
     measure=measure,
     record=Look,
+    inputs=lambda bench, trial: [NETWORK_EYES, BUNDLED] if trial.case in BY_NETWORK else [],
     measures={
         "sutures_to_failure": mean("sutures"),
         "seconds_per_suture": over(lambda run: run.seconds, lambda run: run.attempts),

@@ -3,9 +3,11 @@
     python -m benchmarks.stitch.segmentation_train --out FOLDER [--quick] [--steps N] [--batch N] [--seed N]
     python -m benchmarks.stitch.segmentation_train --out OTHER --views FOLDER/views --start CHECKPOINT [--steps N]
     python -m benchmarks.stitch.segmentation_train --out THIRD --views FOLDER/views --start OTHER/... --cluttered
+    python -m benchmarks.stitch.segmentation_train --out END --views FOLDER/views --start THIRD/... --cluttered --trials
 
 Views that are not in FOLDER/views yet are rendered first (seeds 0 to 99 before the two cameras, in the second run to
-149; 200 to 211 before the endoscope, in the third to 249; 450 to 455 validate). A step's samples depend on the seed and
+149; 200 to 211 before the endoscope, in the third to 249; in the fourth 250 to 299 too, and views of the trials 800 to
+849; 450 to 455 validate, and the trials 850 to 853). A step's samples depend on the seed and
 on the number of the step alone, and the state is written every few minutes, so that a run that was stopped ends with
 the bytes of one that was not, on the same machine. The result is `segmentation.safetensors`, the moving average of the
 weights.
@@ -25,6 +27,7 @@ from torch.nn import functional
 from benchmarks.options import Recipe, asked
 from benchmarks.stitch.segmentation_samples import Views, masks_of, sample
 from benchmarks.stitch.segmentation_views import kept_view
+from benchmarks.stitch.trial_views import kept_trial
 from benchmarks.training.run import TrainingRun, rate_at, train
 from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
 from stages.suture.segmentation.checkpoint import load_network, save_network
@@ -36,7 +39,9 @@ FILE = "segmentation.safetensors"
 SAMPLES_A_PICTURE = 2
 CAMERAS, ENDOSCOPES, VALIDATION = range(100), range(200, 212), range(450, 456)
 CAMERAS_REFINED, ENDOSCOPES_CLUTTERED = range(150), range(200, 250)
-"""The refinement sees more views of the two cameras, the last run more of the endoscope's."""
+"""The refinement sees more views of the two cameras, the third run more of the endoscope's."""
+CAMERAS_OF_TRIALS, TRIALS, TRIALS_VALIDATION = range(250, 300), range(800, 850), range(850, 854)
+"""The fourth sees more of the two cameras, and whole suture trials (trial_views.py)."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ class Phase:
 FIRST, REFINED = Phase(4e-3, (1.0, 1.0, 0.3), 0.35), Phase(2e-3, (2.0, 1.0, 0.3), 0.55)
 CLUTTERED = Phase(2e-3, (2.0, 1.0, 0.3), 0.5, before_jaws=0.5, clutter=0.6)
 """The needle is the rarest class and bright jaws the hardest background: a second run goes on with more of it. A third
-learns what is thin and bright and no needle, and needles and jaws under blood."""
+learns what is thin and bright and no needle, and needles and jaws under blood; a fourth sees trials as well."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,7 @@ class Plan:
     pictures: int
     start: str = ""
     cluttered: bool = False
+    trials: bool = False
 
     @property
     def phase(self) -> Phase:
@@ -158,6 +164,7 @@ class Options(Recipe):
     cluttered: bool = Field(
         False, description="Refine it with blood and highlights, needles before jaws, more endoscopes"
     )
+    trials: bool = Field(False, description="Learn views of whole suture trials too")
     steps: int = Field(2000, description="Steps")
     batch: int = Field(8, description="Crops a step")
     seed: int = Field(0, description="Seed")
@@ -175,11 +182,21 @@ def main() -> None:
     stems += [
         kept_view(folder, ENDOSCOPE, seed) for seed in (ENDOSCOPES_CLUTTERED if options.cluttered else ENDOSCOPES)[:few]
     ]
-    validation = Views([kept_view(folder, TWO_CAMERAS, seed) for seed in VALIDATION[:few]])
+    validations = {"overlap": Views([kept_view(folder, TWO_CAMERAS, seed) for seed in VALIDATION[:few]])}
+    if options.trials:
+        stems += [kept_view(folder, TWO_CAMERAS, seed) for seed in CAMERAS_OF_TRIALS[:few]]
+        stems += [stem for seed in TRIALS[:few] for stem in kept_trial(folder, seed)]
+        validations["trials"] = Views([stem for seed in TRIALS_VALIDATION[:few] for stem in kept_trial(folder, seed)])
     views = Views(stems)
     digest = "" if options.start is None else hashlib.sha256(options.start.read_bytes()).hexdigest()[:16]
     plan = Plan(
-        40 if options.quick else options.steps, options.batch, options.seed, len(views), digest, options.cluttered
+        40 if options.quick else options.steps,
+        options.batch,
+        options.seed,
+        len(views),
+        digest,
+        options.cluttered,
+        options.trials,
     )
     run = Run(plan, options.out, options.start)
     train(
@@ -187,7 +204,7 @@ def main() -> None:
         plan.steps,
         lambda: {"loss": run.train_step(views)},
         options.save_every,
-        lambda: {"overlap": overlap(run.averaged(), validation)},
+        lambda: {name: overlap(run.averaged(), seen) for name, seen in validations.items()},
         600,
     )
 

@@ -17,7 +17,7 @@ from schemas.errors import BadInput
 from stages.kit.stage import Parameters
 from stages.suture.rig import StereoRig
 from stages.suture.segmentation.checkpoint import BUNDLED
-from stages.suture.world.render import render
+from stages.suture.world.render import StereoView, render
 from stages.suture.world.sampling import seen_scene
 
 CALIBRATION_ERROR = 0.15
@@ -45,14 +45,23 @@ def view_name(rig: StereoRig, seed: int) -> str:
 def kept_view(folder: Path, rig: StereoRig, seed: int) -> Path:
     """Return the stem (without `_left.png`, ...) of the view of `seed`; it is rendered if it is not there yet."""
     stem = folder / view_name(rig, seed)
-    if not _file(stem, EYES[-1], "bodies").is_file():
-        folder.mkdir(parents=True, exist_ok=True)
-        view = render(seen_scene(seed, rig, calibration_error=CALIBRATION_ERROR)[0])
-        for eye, seen in zip(EYES, (view.left, view.right), strict=True):
-            assert seen.image is not None
-            _write(_file(stem, eye, "rgb"), seen.image[..., ::-1])
-            _write(_file(stem, eye, "bodies"), seen.bodies)
+    if not is_kept(stem):
+        keep_view(stem, render(seen_scene(seed, rig, calibration_error=CALIBRATION_ERROR)[0]))
     return stem
+
+
+def is_kept(stem: Path) -> bool:
+    """Whether the view of this stem is there, whole."""
+    return _file(stem, EYES[-1], "bodies").is_file()
+
+
+def keep_view(stem: Path, view: StereoView) -> None:
+    """Write both eyes' pictures and bodies of a view."""
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    for eye, seen in zip(EYES, (view.left, view.right), strict=True):
+        assert seen.image is not None
+        _write(_file(stem, eye, "rgb"), seen.image[..., ::-1])
+        _write(_file(stem, eye, "bodies"), seen.bodies)
 
 
 def read_eye(stem: Path, eye: str) -> tuple[np.ndarray, np.ndarray]:

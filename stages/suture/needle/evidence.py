@@ -1,7 +1,8 @@
 """How probable each of several fitted outlines is, by what it explains of both masks and what it leaves.
 
 Log-weights are linear in a few counts; their factors were fitted by conditional logistic regression (which of a view's
-outlines is the right one) on 300 tuning views, so that the shares they give are probabilities.
+outlines is the right one) on 300 tuning views of spoiled masks, those of thread on others and on states of trials,
+of the network's masks too (benchmarks/training/needle_evidence.py), so that the shares they give are probabilities.
 """
 
 from __future__ import annotations
@@ -32,17 +33,22 @@ COVERED = 2.0
 LEAST_WIDTH = 1.3
 """Masks need not show a wire thinner than this [px]."""
 MOST_LEFT_OVER = 150
-PER_MISFIT, PER_LEFT_OVER, PER_LOST, PER_HIDDEN, PER_MISSING, PER_TAPER = -0.071, -0.076, -0.039, -0.043, -0.072, -0.030
-PER_THREAD = np.array([1.45, -0.68, -0.20])
+WEIGHTS = np.array([-0.071, -0.076, -0.039, -0.043, -0.072, -0.030, 1.296, -0.148, -0.230, 0.696, -0.502, 0.183, 0.321])
 """Log-weights: of a pixel of misfit but for the lost; of a pixel of mask that is left over (at most MOST_LEFT_OVER); of
 a pixel's misfit for mask lost by one eye, or by both as in tissue; of a piece that one eye alone misses; of the
 squared width (in units of WIDTH_SIGMA, at most 9 a piece) that the mask is off by near the ends; of thread in one eye
-beyond the swage, beyond the tip, and along the arc before the tip."""
+beyond the swage, beyond the tip, and along the arc before the tip; of an eye in which thread begins at the swage, or
+at the tip, or passes by the swage, or by the tip."""
 WIDTH_SIGMA = 0.8
 """Standard deviation [px] of the mask's width along a piece."""
 TAPERED = np.flatnonzero((ANGLES[:-1] < TAPER_ANGLE) | (ANGLES[1:] > np.pi - TAPER_ANGLE))
 BEYOND = np.linspace(0.0005, 0.0035, 7)
 """Where beyond an end thread is looked for [m], along the arc's tangent."""
+AROUND = 0.0025
+"""On a circle of this radius [m] about an end, thread that begins there is seen once, and thread that passes by twice:
+it is tied to the swage, whichever way it leaves it, and may cross the tip."""
+ANGLES_AROUND = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
+ON_UNIT_CIRCLE = np.stack([np.cos(ANGLES_AROUND), np.sin(ANGLES_AROUND)], axis=1)
 CLOSE = 3
 """Thread within so many pixels of a place counts; mask farther than this from the outline is not the needle's."""
 
@@ -51,7 +57,8 @@ CLOSE = 3
 class Evidence:
     """What an outline leaves: pixels of mask `left_over`; `lost`, `hidden`: the misfit for mask that one eye or both do
     not have; which of PIECES each eye sees (2, PIECES); pieces that one eye alone misses; how far widths near the ends
-    are off; thread beyond the swage, beyond the tip and before it (3,), both eyes together (0 to 2)."""
+    are off; of thread, both eyes together (0 to 2): beyond the swage, beyond the tip and before it, whether it begins
+    at the swage and at the tip, and passes by the swage and by the tip (7,)."""
 
     misfit: float
     left_over: float
@@ -63,18 +70,16 @@ class Evidence:
     threads: np.ndarray
 
     @property
+    def terms(self) -> np.ndarray:
+        """What WEIGHTS (13,) weigh."""
+        rest = self.misfit - self.lost - self.hidden
+        left = min(self.left_over, MOST_LEFT_OVER)
+        return np.array([rest, left, self.lost, self.hidden, self.missing, self.taper, *self.threads])
+
+    @property
     def log_weight(self) -> float:
         """How probable the outline is: the logarithm, up to what is the same for all of a view."""
-        rest = self.misfit - self.lost - self.hidden
-        return (
-            PER_MISFIT * rest
-            + PER_LEFT_OVER * min(self.left_over, MOST_LEFT_OVER)
-            + PER_LOST * self.lost
-            + PER_HIDDEN * self.hidden
-            + PER_MISSING * self.missing
-            + PER_TAPER * self.taper
-            + float(PER_THREAD @ self.threads)
-        )
+        return float(WEIGHTS @ self.terms)
 
 
 @numba.njit(cache=True, fastmath=True)
@@ -143,22 +148,36 @@ def evidence_of(
 
 
 def _threads(rig: StereoRig, eye: EyeMask, outline: Outline, which: int) -> np.ndarray:
-    """Return the shares (3,) of places where an eye has thread: beyond the swage, beyond the tip, on the arc before the
-    tip."""
+    """Return what Evidence says of thread (7,), of one eye (0 to 1): shares of places that have thread, and 0 or 1."""
     if not eye.thread.any():
-        return np.zeros(3)
+        return np.zeros(7)
     pose = outline.pose
     beyond = -BEYOND[:, None] * pose.camera_from_needle[:3, 1]
     places = np.concatenate([pose.swage + beyond, pose.tip + beyond, pose.points(BEYOND / NEEDLE_RADIUS)])
-    pixels = rig.right(places) + outline.shift if which else rig.left(places)
-    if not np.isfinite(pixels).all():
-        return np.zeros(3)
+    ends = np.stack([pose.swage, pose.tip])
+    pixels, of_ends = (rig.right(p) + outline.shift if which else rig.left(p) for p in (places, ends))
+    if not (np.isfinite(pixels).all() and np.isfinite(of_ends).all()):
+        return np.zeros(7)
     has_thread = []
     for column, row in np.round(pixels - eye.corner).astype(int):
         rows = slice(max(row - CLOSE, 0), max(row + CLOSE + 1, 0))
         columns = slice(max(column - CLOSE, 0), max(column + CLOSE + 1, 0))
         has_thread.append(bool(eye.thread[rows, columns].any()))
-    return np.array(has_thread).reshape(3, -1).mean(axis=1)
+    radii = AROUND * rig.focal / ends[:, 2]
+    times = np.array([_crossings(eye.thread, *end) for end in zip(of_ends - eye.corner, radii, strict=True)])
+    return np.array([*np.array(has_thread).reshape(3, -1).mean(axis=1), *(times == 1), *(times > 1)])
+
+
+def _crossings(thread: np.ndarray, middle: np.ndarray, radius: float) -> int:
+    """Return how often thread (h, w) bool crosses a circle about a place (column, row) [px]."""
+    there = np.zeros(len(ON_UNIT_CIRCLE), dtype=bool)
+    # two circles, as a line of pixels may slip through one
+    for reach in (radius, radius + 1.0):
+        columns, rows = np.round(middle + reach * ON_UNIT_CIRCLE).astype(int).T
+        inside = (columns >= 0) & (rows >= 0) & (columns < thread.shape[1]) & (rows < thread.shape[0])
+        there[inside] |= thread[rows[inside], columns[inside]]
+    there |= np.roll(there, 1) & np.roll(there, -1)
+    return int((there & ~np.roll(there, 1)).sum())
 
 
 def left_over(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from schemas.errors import BadInput
 from stages.suture.needle.estimate import estimate
+from stages.suture.needle.evidence import _crossings
 from stages.suture.needle.filter import difference, fuse
 from stages.suture.needle.filter import moved as moved_pose
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation, violet
@@ -174,3 +176,28 @@ def test_violet_is_thread_and_steel_is_not():
         picture[:, column - 1 : column + 2] = colour
     found = violet(picture)
     assert found[:, 20].all() and not found[:, 30:].any() and not found[:, :17].any()
+
+
+@pytest.mark.parametrize(("to", "times"), [(None, 0), ((50, 50), 1), ((90, 62), 2)])
+@pytest.mark.parametrize("radius", [7.0, 11.1, 20.5])
+def test_thread_that_begins_at_a_place_crosses_a_circle_about_it_once_and_one_that_passes_twice(to, times, radius):
+    thread = np.zeros((100, 100), np.uint8)
+    if to is not None:
+        cv2.line(thread, (5, 37), to, 1, 1)
+    assert _crossings(thread > 0, np.array([50.0, 50.0]), radius) == times
+
+
+def test_thread_that_crosses_the_tip_does_not_make_it_the_swage():
+    """The thread leaves the swage askew, as one that hangs taut does, and runs over the wire near the tip."""
+    truth = pose_at()
+    observation = observed(truth)
+    threads = []
+    for project in (TWO_CAMERAS.left, TWO_CAMERAS.right):
+        thread = np.zeros(observation.left_mask.shape, np.uint8)
+        swage, near_tip = project(np.stack([truth.swage, truth.points(np.array([0.05]))[0]]))
+        ends = np.stack([swage, near_tip + 0.8 * (near_tip - swage)])
+        cv2.line(thread, *np.round(ends).astype(int).tolist(), 1, 2)
+        threads.append(thread > 0)
+    answer = estimate(replace(observation, disparity=None, left_thread=threads[0], right_thread=threads[1]))
+    assert not answer.abstained and answer.tip_probability > 0.9
+    assert np.linalg.norm(answer.pose.tip - truth.tip) < 0.002

@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.stitch.trial_views import PLACES, Keeping, trial_scenes
 from cli.main import run
 from stages.kit.geometry.transforms import apply, inverse
 from stages.suture.motion.needle import point_at
 from stages.suture.robot.arms import REMOTE_CENTRES
 from stages.suture.trials.bench import CORNER, Bench, loaded
+from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, perception_model
+from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.settings import World
 from stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes, driver, pictured
 from stages.suture.trials.thread import Thread
@@ -63,6 +66,20 @@ def test_what_is_seen_of_a_rendered_trial_is_where_the_needle_is() -> None:
         ends = sorted((seen.tip, seen.swage), key=lambda end: float(np.linalg.norm(end - CORNER[:3, 3])))
         found += bool(np.linalg.norm(ends[1] - point_at(bench.needle, 0.0)) < 0.003)
     assert found >= 2
+
+
+def test_keeping_what_is_looked_at_changes_no_trial() -> None:
+    eyes = Keeping(5)
+    assert run_trial(POLICIES["ours"], 5, eyes=eyes) == run_trial(POLICIES["ours"], 5)
+    assert len(eyes.scenes) <= eyes.looks
+    assert len({scene.pose.camera_from_needle.tobytes() + scene.thread.tobytes() for scene in eyes.scenes}) > 1
+
+
+def test_a_trial_gives_one_scene_of_each_place_and_always_the_same() -> None:
+    scenes, again = trial_scenes(5), trial_scenes(5)
+    places = [scene.place for scene in scenes]
+    assert len(set(places)) == len(places) and set(places) <= set(PLACES) and "corner_right" in places
+    assert all(np.array_equal(one.thread, other.thread) for one, other in zip(scenes, again, strict=True))
 
 
 def test_an_error_model_is_not_for_rendered_views(tmp_path: Path) -> None:
