@@ -6,7 +6,7 @@ from math import hypot
 
 import numpy as np
 
-from stages.agent.body import Base, Felt, FeltKind, Position
+from stages.agent.body import Base, Felt, Position
 from stages.agent.world.physics.hands import (
     DROP,
     JUST_OVER,
@@ -20,7 +20,7 @@ from stages.agent.world.physics.hands import (
     reachable,
 )
 from stages.agent.world.physics.looking import Looking
-from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.agent.world.physics.robot_in_room import RobotInRoom, felt
 from stages.agent.world.physics.seen import FLOOR, FOUND_WITHIN, Seen
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.failures import MotionFailed
@@ -61,7 +61,7 @@ class Handling:
         except MotionFailed as failed:
             self._robot.draw_in()
             self._robot.log.done("grasp", step, False, "grasp", "")
-            return Felt(False, _felt_kind(failed), failed.failure)
+            return felt(failed)
         held = self._robot.driver.held or self._between_the_fingers()
         self._robot.carried = held
         right = held is not None and self._robot.room.things[held].label == label
@@ -221,8 +221,3 @@ class Handling:
             for x, y, _ in [self._robot.room.lies(name)]
         ]
         return min(near)[1] if near and min(near)[0] <= FOUND_WITHIN else ""
-
-
-def _felt_kind(failed: MotionFailed) -> FeltKind:
-    kinds: dict[str, FeltKind] = {"no_grasp": "no_grasp", "no_inverse_kinematics": "out_of_reach"}
-    return kinds.get(failed.failure.kind, "no_trajectory")

@@ -10,11 +10,11 @@ from math import atan2, pi
 
 import numpy as np
 
-from stages.agent.body import Base, Felt, FeltKind, Position
+from stages.agent.body import Base, Felt, Position
 from stages.agent.world.physics.driving import Driving
 from stages.agent.world.physics.fronts import PARTS, Front, away_from, bases_before, before, front_seen, sides_of
 from stages.agent.world.physics.looking import Looking
-from stages.agent.world.physics.robot_in_room import RobotInRoom
+from stages.agent.world.physics.robot_in_room import RobotInRoom, felt
 from stages.agent.world.physics.seen import Seen
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.arcs import Arc, along_arc, arc_values
@@ -82,7 +82,7 @@ class Pulling:
         except MotionFailed as failed:
             self._robot.draw_in()
             self._robot.log.done("pull", step, False, "grasp", "")
-            return Felt(False, _felt_kind(failed), failed.failure)
+            return felt(failed)
         self._robot.log.done("pull", step, True, "", "")
         if opening:
             self._stand_before(self._seen.fronts[name])
@@ -317,12 +317,3 @@ class Pulling:
 
 def _position(at: np.ndarray) -> Position:
     return (float(at[0]), float(at[1]), float(at[2]))
-
-
-def _felt_kind(failed: MotionFailed) -> FeltKind:
-    kinds: dict[str, FeltKind] = {
-        "no_grasp": "no_grasp",
-        "no_inverse_kinematics": "out_of_reach",
-        "door_stuck": "door_stuck",
-    }
-    return kinds.get(failed.failure.kind, "no_trajectory")

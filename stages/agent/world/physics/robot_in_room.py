@@ -12,7 +12,7 @@ from math import cos, sin
 
 import numpy as np
 
-from stages.agent.body import Base
+from stages.agent.body import Base, Felt, FeltKind
 from stages.agent.world.events import EventLog
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.hands import Beliefs, Hold
@@ -34,6 +34,19 @@ ROOM_IN_HAND = 0.04
 """What is held may have turned or slid so far between the fingers [m]."""
 NEARER = 0.1
 """The arm is shorter than the one of the fast world: it starts so much nearer to a table before it [m]."""
+
+
+FELT: dict[str, FeltKind] = {
+    "no_grasp": "no_grasp",
+    "no_inverse_kinematics": "out_of_reach",
+    "door_stuck": "door_stuck",
+}
+"""What planning or control said -> what the robot feels; all else is a motion that was not found."""
+
+
+def felt(failed: MotionFailed) -> Felt:
+    """Return what a motion that failed feels like, with what planning or control said of it."""
+    return Felt(False, FELT.get(failed.failure.kind, "no_trajectory"), failed.failure)
 
 
 class RobotInRoom:
