@@ -41,6 +41,9 @@ def why_not_pulled(kinds: tuple[Kind, ...], setting: Setting) -> NotPulled | Non
 
 
 def _tips(pile: Table, pushes: list[Push]) -> bool:
+    """Whether a pile rocks over the edge of its foot. The lever that is left there, radius of the foot less friction
+    times height of the push, must be longer than the lean asks for: with it as barrier, g lever^2 / (2 centre), against
+    the energy with which the hand's speed makes the pile turn."""
     lowest, top = pile.items[0].measures, max(item.lip for item in pile.items)
     high, centre = max(push.tip for push in pushes), centre_height(pile)
     above = max(0.0, high - centre)

@@ -220,6 +220,13 @@ def test_reasons_are_given_exactly_where_rules_forbid(tier: str, rules: Rules) -
             assert (("multi_grasp", one, other) in given_for) == (not can_grasp_two(table, one, other, rules))
 
 
+def test_a_pull_that_a_pile_does_not_bear_is_said_so() -> None:
+    cups = [make_item(f"cup_{n}", "cup", 0.0, 0.0, z=0.0183 * n, on=f"cup_{n - 1}" if n else None) for n in range(3)]
+    table = Table((*cups, make_item("far", "cup", 0.25, 0.0)))
+    pulls = {one.first: one.kind for one in impossible_pairs(table, BOLD) if one.primitive == "pull"}
+    assert pulls == {"cup_0": "tips"}
+
+
 def test_actions_survive_their_records() -> None:
     table = Table((make_item("a", "cup", -0.2, 0.0), make_item("b", "cup", 0.1, 0.0), make_item("c", "bowl", 0.1, 0.2)))
     chances = with_thesis_failures()
