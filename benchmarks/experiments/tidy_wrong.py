@@ -26,7 +26,7 @@ from stages.tableware.simulation.fast import run_trial
 from stages.tableware.world.scenes import make_table
 
 DEAR, CHEAP = 1.3, 0.7
-TUNING, REPORTING = range(60), range(2200, 2212)
+TUNING, REPORTING = range(60), range(2100, 2160)
 DELAYS = (0, 5)
 
 
