@@ -101,7 +101,7 @@ def fitted(
             "right_share": type(other.right_share)(**{p: _share(f, right) for p, f in places.items()}),
             "abstained_share": type(other.abstained_share)(**{p: _abstained(f, seen) for p, f in places.items()}),
             "right": _errors(good, other, False),
-            "wrong": _errors(bad, other, True).model_copy(
+            "wrong": _errors(bad, other, True, swapped).model_copy(
                 update={"swapped_share": round(len(swapped) / max(1, len(bad) + len(swapped)), 3)}
             ),
         }
@@ -120,14 +120,17 @@ def _abstained(records: list[Estimate], every: list[Estimate]) -> float:
     return round(float(np.mean([not record.answered for record in failed])), 3) if failed else 0.0
 
 
-def _errors(records: list[Estimate], other: PerceptionModel, strays: bool) -> Errors:
-    """Return the spreads: per axis of the normal (two), of the ends (three); strays apart."""
+def _errors(records: list[Estimate], other: PerceptionModel, strays: bool, swapped: Sequence[Estimate] = ()) -> Errors:
+    """Return the spreads: per axis of the normal (two), of the ends (three; of a swapped needle both are as far off as
+    the worse one); strays apart."""
     errors = other.wrong if strays else other.right
-    if not records:
+    if not records and not swapped:
         return errors
-    ends = np.array([max(r.tip_error_mm, r.swage_error_mm) for r in records])
+    ends = np.array([max(r.tip_error_mm, r.swage_error_mm) for r in records] or [0.0])
     near = [e for r in records for e in (r.tip_error_mm, r.swage_error_mm) if not strays or e < STRAY]
-    normal = np.array([r.normal_error_deg for r in records if not strays or r.normal_error_deg < 45.0] or [10.0])
+    near += [r.end_error_mm for r in swapped for _ in range(2)]
+    turned = [r.normal_error_deg for r in (*records, *swapped)]
+    normal = np.array([angle for angle in turned if not strays or angle < 45.0] or [10.0])
     update = {
         "normal_degrees": round(float(np.sqrt((normal**2).mean() / 2.0)), 3),
         "end_millimetres": round(float(np.sqrt((np.array(near or [1.0]) ** 2).mean() / 3.0)), 3),

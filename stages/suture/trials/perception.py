@@ -38,7 +38,7 @@ class Shares(Model):
 
 class Errors(Model):
     """Standard deviations per axis; `stray_end_share` of the estimates have one end farther off along a direction.
-    `swapped_share` of them are off as right ones are, but for tip and swage, which are taken for each other."""
+    In `swapped_share` of them tip and swage are taken for each other, and no end strays."""
 
     normal_degrees: float = Field(ge=0)
     end_millimetres: float = Field(ge=0)
@@ -146,7 +146,7 @@ class Eyes:
             self.abstained += 1
             return None
         self.right += self._fate == "right"
-        errors = self.model.wrong if self._fate == "wrong" else self.model.right
+        errors = self.model.right if self._fate == "right" else self.model.wrong
         shared = self.model.systematic
         draw = np.sqrt(shared) * self._shared + np.sqrt(1.0 - shared) * self.random.standard_normal((3, 3))
         normal = needle[:3, 2] + np.tan(np.radians(errors.normal_degrees)) * draw[0]

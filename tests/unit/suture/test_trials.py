@@ -250,10 +250,10 @@ def test_estimates_are_as_often_right_as_the_model_says() -> None:
     assert np.isclose(np.std(errors), model.right.end_millimetres / 1000, rtol=0.1)
 
 
-def test_an_end_taken_for_the_other_is_off_as_a_right_one() -> None:
+def test_ends_that_are_taken_for_each_other_do_not_stray() -> None:
     model = perfect()
     never = Shares(corner_left=0, corner_right=0, elsewhere=0, tissue=0)
-    swaps = model.wrong.model_copy(update={"swapped_share": 1.0})
+    swaps = model.right.model_copy(update={"swapped_share": 1.0})
     eyes = Eyes(
         model.model_copy(update={"right_share": never, "abstained_share": never, "wrong": swaps}),
         np.random.default_rng(1),
