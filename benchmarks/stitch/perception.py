@@ -86,6 +86,7 @@ def fitted(
     for place, found in places.items():
         if len(found) < FEWEST:
             raise ValueError(f"{place}: {len(found)} views, {FEWEST} are needed")
+    # A record that stands for several places counts once.
     seen = list({id(record): record for found in places.values() for record in found}.values())
     good = [record for record in seen if right(record)]
     bad = [record for record in seen if record.answered and not record.within]
