@@ -231,7 +231,7 @@ bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 
 	$(EXPERIMENT) gather $(PLANNING)
 
 .PHONY: tidy
-# Fast: 200 reporting seeds a tier, about 20 minutes of one core; seen: images before each action, a second each;
+# Fast: 100 reporting seeds a tier, about ten minutes of one core; seen: images before each action, a second each;
 # physics and detect: docs/TIDY.md. Stopped runs go on where they were. PARTS="fast seen" runs some of them.
 PARTS ?= fast wrong seen physics detect
 TIDY := $(OUTPUTS)/experiments/tidy$(if $(QUICK),-quick)

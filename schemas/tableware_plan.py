@@ -143,8 +143,8 @@ class ImpossiblePair(Model):
     first: Name
     second: Name
     kind: str
-    """`too_far_apart`, `turned`, `heights_differ`, `too_tall`, `unlike`, `in_the_way`, `off_table`, `loaded`, `wider`,
-    `on_utensil`, `too_many_utensils`, `sizes_estimated`."""
+    """`too_far_apart`, `turned`, `heights_differ`, `too_tall`, `unlike`, `in_the_way`, `off_table`, `loaded`,
+    `no_room`, `tips`, `wider`, `on_utensil`, `too_many_utensils`, `sizes_estimated`."""
     message: str
     objects: tuple[Name, ...] = ()
     """What is in the way."""

@@ -27,7 +27,7 @@ PLURAL: dict[str, Kind] = {"cups": "cup", "bowls": "bowl"}
 LENGTHS = (20, 30, 40)
 PRINTED = {"cups": (0.19, 0.13, 0.07), "bowls": (0.21, 0.24, 0.16)}
 """Expected divergence by LENGTHS, as the thesis prints it."""
-LOADS = ("c", "b", "cc", "bb", "bc", "bu", "bcc", "ccc", "bbb")
+LOADS = ("c", "b", "cc", "bb", "bc", "bu", "bcc", "ccc", "bbb", "bbc")
 SPEEDS = (0.1, 0.2, 0.3)
 KINDS: dict[str, Kind] = {"c": "cup", "b": "bowl", "u": "fork"}
 INSIDE = 0.030

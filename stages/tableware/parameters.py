@@ -111,7 +111,7 @@ SCENE = Stage(
 )
 PLAN = Stage(
     name="tableware plan",
-    version=6,
+    version=7,
     summary="Plan how to clear a table: pulls, stackings, multi-object and single grasps (TIDY)",
     parameters=PlanParameters,
     reads={"detections": Optionally(TablewareDetections), "scene": Optionally(TablewareScene)},
@@ -134,7 +134,7 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="tableware simulate",
-    version=6,
+    version=7,
     summary="Let a policy, or a plan, clear a table in the fast simulator or in physics",
     parameters=SimulateParameters,
     reads={"scene": TablewareScene, "plan": Optionally(TablewarePlan)},
@@ -151,7 +151,7 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="tableware evaluate",
-    version=4,
+    version=5,
     summary="Compare policies over many seeded tables in the fast simulator, with intervals",
     parameters=EvaluateParameters,
     reads={},

@@ -13,7 +13,6 @@ from stages.tableware.planning.choice import declared_policy
 from stages.tableware.planning.joint import JointPolicy, plan, rules_in
 from stages.tableware.planning.optimum import Optimum
 from stages.tableware.planning.policy import Policy
-from stages.tableware.planning.rules import Rules
 from stages.tableware.planning.time_model import (
     EXACT,
     Chances,
@@ -129,7 +128,7 @@ def _draws(table: Table, model: TimeModel, chances: Chances, seed: int, policy: 
 def _optimum(table: Table, model: TimeModel, chances: Chances, delay: int) -> Run:
     """Return what the optimum expects by its own account: exact where nothing slips."""
     began = process_time()
-    optimum = Optimum(table, rules_in(Rules(), chances), model, chances)
+    optimum = Optimum(table, rules_in(OURS["ours_bold"], chances), model, chances)
     best = optimum.solve()
     planning = process_time() - began
     trips, everything = optimum.trips(best), optimum.everything

@@ -33,6 +33,9 @@ CASES = tuple(
     for world in WORLDS_OF[tier]
     if not (tag and tier == "tier3")
 )
+SHOWN = tuple(case for case in CASES if not case.endswith(FIFTEEN) and not ("tier0" in case and "exact" in case))
+SHOWN_ARMS = tuple(arm for arm in ARMS if arm not in ("random_piles", "ours_without_loaded_pulls"))
+"""What the page shows, by default."""
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
@@ -112,6 +115,8 @@ EXPERIMENT = Experiment(
     does_not_show="What an arm does: no physics, no sight.",
     arms={arm: arm for arm in ARMS},
     cases=CASES,
+    default_arms=lambda bench: SHOWN_ARMS,
+    default_cases=lambda bench: SHOWN,
     runs=lambda arm, case: not (arm == "optimum" and "fast/drops" in case),
     tuning=tuple(map(str, TUNING)),
     reporting=tuple(map(str, REPORTING)),

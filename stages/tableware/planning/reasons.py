@@ -15,10 +15,17 @@ from stages.tableware.planning.rules import (
     obstructed,
     pull_end,
     sweep,
+    why_not_pulled,
     within_jaws,
 )
 from stages.tableware.world.footprints import Footprint, footprint, gap
 from stages.tableware.world.items import Item, Table
+
+NOT_PULLED = {
+    "loaded": "carries others and loaded pulls are off",
+    "no_room": "leaves the fingers no room beside what it carries",
+    "tips": "would tip over with what it carries",
+}
 
 
 def impossible_pairs(table: Table, rules: Rules) -> tuple[ImpossiblePair, ...]:
@@ -82,8 +89,9 @@ def _multi_grasp(table: Table, pile: tuple[Item, ...], other: tuple[Item, ...], 
 def _pull(table: Table, pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> ImpossiblePair | None:
     first, second = pile[0], other[0]
     why: tuple[str, str] | tuple[str, str, tuple[str, ...]] | None = _two_piles(pile, other, rules)
-    if why is None and len(pile) > 1 and not rules.loaded_pulls:
-        why = "loaded", f"{first.name} carries others and loaded pulls are off"
+    unborne = why_not_pulled(letters(pile), rules)
+    if why is None and unborne is not None:
+        why = unborne, f"{first.name} {NOT_PULLED[unborne]}"
     if why is None and not footprint(first, *pull_end(first, second, rules)).on_table:
         why = "off_table", f"beside {second.name} it would hang over the table's edge"
     if why is None:

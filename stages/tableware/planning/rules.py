@@ -10,9 +10,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from math import atan2, cos, hypot, pi, sin
+from typing import Literal
 
 import numpy as np
 
+from stages.tableware.planning import pulled_load
+from stages.tableware.planning.pulled_load import NotPulled
 from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
 from stages.tableware.world.items import Item, Kind, Measures, Table, rise
 from stages.tableware.world.setting import Setting
@@ -42,6 +45,8 @@ class Rules:
     """Whether a plate is lifted only with nothing on it (ours)."""
     loaded_pulls: bool = True
     """Whether a dish that carries others may be pulled."""
+    steady_pulls: bool = False
+    """Whether only what bears it is pulled (pulled_load.py, ours); the thesis pulls whatever one grasp takes then."""
     both_piles: bool = True
     """Whether more is stacked onto a pair of dishes that stand side by side, before one grasp takes all (ours)."""
     beside: frozenset[tuple[str, str]] | None = None
@@ -112,6 +117,16 @@ def can_hold_two(first: str, second: str, rules: Rules) -> bool:
         abs(lips_of_first[0] - lips_of_second[0]) <= rules.similar
         and max(heights) - min(heights) <= rules.setting.gripper.jaw_height
     )
+
+
+@lru_cache(maxsize=4096)
+def why_not_pulled(pile: str, rules: Rules) -> Literal["loaded"] | NotPulled | None:
+    """Return why a pile may not be pulled, whereto ever; None where it may. A utensil is carried, and always may."""
+    if len(pile) > 1 and not rules.loaded_pulls:
+        return "loaded"
+    if not rules.steady_pulls or pile[0] == "u":
+        return None
+    return pulled_load.why_not_pulled(tuple(_KINDS[letter] for letter in pile), rules.setting)
 
 
 @lru_cache(maxsize=65536)
@@ -287,10 +302,10 @@ def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
     pulled, aim = table.by_name[item], table.by_name[target]
     if item == target or pulled.on is not None or aim.on is not None or pulled.is_dish != aim.is_dish:
         return False
-    load = table.load(item)
-    if load and not rules.loaded_pulls:
+    pile = letters((pulled, *table.load(item)))
+    if why_not_pulled(pile, rules) is not None:
         return False
-    if not can_hold_two(letters((pulled, *load)), letters((aim, *table.load(target))), rules):
+    if not can_hold_two(pile, letters((aim, *table.load(target))), rules):
         return False
     x, y, yaw = pull_end(pulled, aim, rules)
     if not footprint(pulled, x, y, yaw).on_table:

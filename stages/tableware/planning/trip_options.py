@@ -24,6 +24,7 @@ from stages.tableware.planning.rules import (
     pull_end,
     split_over_two,
     sweep,
+    why_not_pulled,
     within_jaws,
 )
 from stages.tableware.planning.time_model import Chances, TimeModel
@@ -97,7 +98,6 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
         float(chances.drop_two),
         float(chances.drop_loaded_pull),
         float(worth),
-        rules.loaded_pulls,
     )
     columns = _Parts(
         np.array([part.lowest for part in parts], np.int64),
@@ -105,6 +105,7 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
         np.array([len(part.items) for part in parts], np.int64),
         np.array([part.mask for part in parts], np.int64),
         type_of,
+        np.array([why_not_pulled(part.kinds, rules) is None for part in parts], np.bool_),
     )
     choices = _Choices(rows, masks, signatures)
     ways = _ways_of(choices, _Signatures(bases, two), columns, _pairs(table, rules, model, chances, worth), costs)
@@ -285,13 +286,14 @@ class _Signatures(NamedTuple):
 
 class _Parts(NamedTuple):
     """Of each part (P,): row of its lowest item, whether that stands on the table, number of items, these as bits, its
-    type."""
+    type, whether it may be pulled."""
 
     lowest: np.ndarray
     whole: np.ndarray
     length: np.ndarray
     masks: np.ndarray
     types: np.ndarray
+    pullable: np.ndarray
 
 
 class _Pairs(NamedTuple):
@@ -309,7 +311,7 @@ class _Pairs(NamedTuple):
 
 
 class _Costs(NamedTuple):
-    """Seconds, chances of a loss, what a loss counts for [s], and whether dishes that carry others may be pulled."""
+    """Seconds, chances of a loss, what a loss counts for [s]."""
 
     whole_trip: float
     stack: float
@@ -318,7 +320,6 @@ class _Costs(NamedTuple):
     drop_two: float
     drop_loaded: float
     worth: float
-    loaded_pulls: bool
 
 
 @njit(cache=True)
@@ -326,9 +327,9 @@ def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-de
     """Return starts (C + 1,) and the options of all choices, see TripOptions; `kinds` are _Signatures."""
     rows, masks, signatures = choices
     bases, two = kinds
-    lowest, whole, length, part_mask, type_of = parts
+    lowest, whole, length, part_mask, type_of, pullable = parts
     pair_first, pair_second, pair_blockers, pair_seconds, pair_lost, pair_slips, pair_pulled = pairs
-    whole_trip, stack, drop_stack, drop_single, drop_two, drop_loaded, worth, loaded_pulls = costs
+    whole_trip, stack, drop_stack, drop_single, drop_two, drop_loaded, worth = costs
     starts = np.zeros(len(rows) + 1, np.int64)
     seconds, lost, slips = [0.0], [0.0], [0.0]
     stays, blockers, first, second, pulled = [0], [0], [0], [0], [False]
@@ -387,7 +388,7 @@ def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-de
                 ):
                     continue
                 loaded = length[pulled_part] > 1
-                if pair_pulled[pair] and (pair_blockers[pair] & mask or (loaded and not loaded_pulls)):
+                if pair_pulled[pair] and (pair_blockers[pair] & mask or not pullable[pulled_part]):
                     continue
                 block = pair_blockers[pair] & ~mask
                 time = start + pair_seconds[pair]

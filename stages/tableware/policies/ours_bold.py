@@ -1,4 +1,4 @@
-"""Ours with all that the jaws allow, whether physics bears it or not."""
+"""Ours with all that the jaws and a pull allow, whether physics holds it in the air or not."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from stages.tableware.planning.policy import DeclaredPolicy
 from stages.tableware.planning.rules import Rules
 from stages.tableware.policies import ours
 
-RULES = Rules()
+RULES = Rules(steady_pulls=True)
 POLICY = DeclaredPolicy(JointPolicy, RULES, rivals=ours.RIVALS)

@@ -15,6 +15,7 @@ import numpy as np
 from stages.tableware.simulation.pieces import solid
 from stages.tableware.world.footprints import Footprint, footprint, gap
 from stages.tableware.world.items import Item, Table
+from stages.tableware.world.setting import Gripper
 
 JAW_HEIGHT, PAD, PAD_WIDTH, KNUCKLE = 0.045, 0.007, 0.022, 0.014
 """Height of the fingertips, their thickness and width, thickness of the knuckles above them [m]; see ur5.urdf."""
@@ -34,6 +35,8 @@ FREE = 0.003
 """What open jaws keep from others [m]."""
 ABOVE = 0.0005
 """Of the fingertips over the table when they take a utensil [m]."""
+HAND = Gripper()
+"""The standard one, whose measures the constants above are."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ def rim_hold(
     return best
 
 
-def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: list[Item]) -> float:
+def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: list[Item], hand: Gripper = HAND) -> float:
     """Return the least distance [m] between open jaws and other things, seen from above at the height of each thing's
     upper edge; of the own pile's cargo the inner pad only has to keep clear. A utensil in a dish counts however low its
     middle is: one that slid from the rim leans there, an end of it above the rim."""
@@ -132,14 +135,14 @@ def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: lis
         if item.lip < tip - 0.002 and (item.is_dish or number >= len(own)):
             continue
         top = max(tip, min(item.lip, tip + 0.10))
-        knuckles = item.lip > tip + JAW_HEIGHT
+        knuckles = item.lip > tip + hand.jaw_height
         thickness = KNUCKLE if knuckles else PAD
         backwards = (top - tip) / max(-pose[2, 2], 0.5)
         place = footprint(item)
         for side in (-1.0, 1.0):
             for back in (0.0, backwards):
                 middle = pose[:3, 3] - back * pose[:3, 2] + side * (opening / 2 + thickness / 2) * pose[:3, 1]
-                half = PAD_WIDTH / 2 - thickness / 2
+                half = hand.finger - thickness / 2
                 across = half * pose[:3, 0]
                 print_ = Footprint(
                     (float(middle[0] - across[0]), float(middle[1] - across[1])),

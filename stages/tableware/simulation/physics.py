@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin
+from math import cos, hypot, pi, sin
 from typing import Any
 
 import numpy as np
@@ -21,9 +21,6 @@ from stages.tableware.planning.action import Action, Primitive
 from stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
 from stages.tableware.simulation.holds import (
     FREE,
-    JAW_HEIGHT,
-    PAD,
-    PAD_WIDTH,
     Hold,
     bar_hold,
     cargo,
@@ -33,6 +30,7 @@ from stages.tableware.simulation.holds import (
     tool_pose,
     walls,
 )
+from stages.tableware.simulation.push_place import PULL_SPEED, push_place
 from stages.tableware.simulation.tabletop import BIN_CENTER, Tabletop
 from stages.tableware.simulation.trial import Trial
 from stages.tableware.world.items import Item, Table, rise
@@ -40,8 +38,6 @@ from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_cam
 
 TRAVEL = 0.17
 """Height of the fingertips on the way above everything [m]."""
-SPREAD = 0.72
-"""Share of a dish's inner radius to which the fingers open when they pull it from inside."""
 HOVER = 0.015
 """Height [m] over the table at which a utensil is carried to another."""
 EMPTY = 0.0008
@@ -58,7 +54,7 @@ class Speeds:
     descend: float = 0.25
     touch: float = 0.10
     lift: float = 0.15
-    pull: float = 0.15
+    pull: float = PULL_SPEED
     carry: float = 0.7
     force: float = 40.0
     """For bowls and plates."""
@@ -388,54 +384,6 @@ class PhysicsTable:
         if best is None:
             raise MotionFailed("no_inverse_kinematics", "the arm does not reach the place")
         return best[1]
-
-
-@dataclass(frozen=True)
-class Push:
-    """Where fingers push a dish from inside, from its middle along the pull [m]."""
-
-    start: float
-    reach: float
-    tip: float
-    closing: float
-    opening: float
-    spread: bool = False
-    """Whether the fingers go down closed and open inside."""
-
-
-def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
-    """Return where the fingers go into the top of a pile that is pulled along `direction` (2,), or None where its load
-    leaves no room. In an empty dish they open across the pull, so that both push the wall ahead and the dish comes to
-    lie right behind them; beside a load they go in closed near the wall, or astride of a utensil."""
-    family = walls(seen, name)
-    dish, load = family[-1], cargo(seen, name)
-    angle = atan2(direction[1], direction[0])
-    if not load:
-        height = 0.025
-        inner = dish.measures.inner_radius(dish.measures.wall + height)
-        aside = min(0.0425 + PAD, SPREAD * inner)
-        ahead = float(np.sqrt(inner**2 - aside**2)) - PAD_WIDTH / 2
-        tip = dish.position[2] + dish.measures.wall + height
-        return Push(0.0, ahead, tip, angle + pi / 2, 2.0 * (aside - PAD), True)
-    heights = [0.02, 0.03, 0.04]
-    center = np.array(dish.position[:2])
-    for height in heights:
-        height = max(height, dish.measures.height - JAW_HEIGHT + 0.002)
-        tip = dish.position[2] + dish.measures.wall + height
-        inner = dish.measures.inner_radius(dish.measures.wall + height)
-        shapes = [(angle, 0.0, PAD, PAD_WIDTH / 2), (angle + pi / 2, 0.036, PAD_WIDTH / 2, 0.018 + PAD)]
-        for closing, opening, ahead, aside in shapes:
-            if aside >= inner - 0.004:
-                continue
-            reach = float(np.sqrt(inner**2 - aside**2)) - ahead
-            if reach < 0.003:
-                continue
-            for start in (reach * 0.5, reach - 0.006, reach - 0.003):
-                point = np.append(center + start * direction, tip)
-                clearance = jaw_clearance(tool_pose(point, closing), opening, [], load)
-                if clearance > 0.002:
-                    return Push(start, reach, tip, closing, opening)
-    return None
 
 
 def finger_force(seen: Table, names: list[str], speeds: Speeds) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import count
 from math import cos, hypot, pi, sin
 
@@ -21,7 +22,18 @@ from stages.tableware.actions.stack import after_stack, stack
 from stages.tableware.actions.stack_grasp import stack_grasp
 from stages.tableware.planning.joint import JointPolicy
 from stages.tableware.planning.optimum import Optimum, clear, seconds
-from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, can_pull, can_put, can_stack, letters
+from stages.tableware.planning.policy import STANDARD_SETTING, THESIS
+from stages.tableware.planning.pulled_load import centre_height
+from stages.tableware.planning.rules import (
+    Rules,
+    can_grasp_two,
+    can_hold,
+    can_pull,
+    can_put,
+    can_stack,
+    letters,
+    why_not_pulled,
+)
 from stages.tableware.planning.time_model import (
     EXACT,
     Chances,
@@ -37,9 +49,11 @@ from stages.tableware.policies.random import RandomOne
 from stages.tableware.policies.random_piles import RandomPile
 from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.simulation.fast import FastWorld, run_trial
+from stages.tableware.simulation.pieces import solid
 from stages.tableware.world.footprints import Footprint, footprint, gap
 from stages.tableware.world.items import STANDARD, Item, Table, make_item, rise
 from stages.tableware.world.scenes import TIERS, make_table
+from stages.tableware.world.setting import Gripper, Setting
 
 MODEL = TimeModel(trip=10.1, stack=8.45, pull=5.7)
 DISHES = st.sampled_from(["cup", "bowl", "plate"])
@@ -164,6 +178,38 @@ def test_what_lies_between_forbids_a_pull() -> None:
     assert not can_pull(Table((*ends, between)), "a", "b", Rules())
     loaded = Table((*ends, make_item("d", "cup", -0.3, 0.0, z=0.0187, on="a")))
     assert can_pull(loaded, "a", "b", Rules()) and not can_pull(loaded, "a", "b", Rules(loaded_pulls=False))
+    three = Table((*loaded.items, make_item("e", "cup", -0.3, 0.0, z=0.0373, on="d")))
+    assert can_pull(three, "a", "b", Rules()) and not can_pull(three, "a", "b", Rules(steady_pulls=True))
+    pulled = [
+        {trip.pull for trip in clear(three, Rules(steady_pulls=steady), MODEL, EXACT)} for steady in (False, True)
+    ]
+    assert pulled == [{("a", "b")}, {("b", "a")}]
+
+
+def _pulled(pile: str, setting: Setting = STANDARD_SETTING) -> str | None:
+    return why_not_pulled(pile, Rules(setting=setting, steady_pulls=True))
+
+
+def test_what_a_pulled_dish_may_carry_follows_from_shapes() -> None:
+    borne = {pile: _pulled(pile) for pile in ("c", "cc", "ccc", "b", "bb", "bbb", "bc", "bbc", "bcc", "bu", "u")}
+    assert {pile: why for pile, why in borne.items() if why} == {"ccc": "tips", "bcc": "no_room"}
+    assert why_not_pulled("ccc", Rules()) is None and why_not_pulled("bcc", THESIS) is None
+
+
+def test_a_wider_foot_bears_more_and_a_broader_finger_finds_less_room() -> None:
+    cup, bowl = STANDARD["cup"], STANDARD["bowl"]
+    broad = replace(STANDARD, cup=replace(cup, foot_radius=0.042, rim_radius=0.055))
+    small = replace(STANDARD, bowl=replace(bowl, foot_radius=0.045, rim_radius=0.070))
+    assert _pulled("ccc", Setting(broad)) is None
+    assert _pulled("bc", Setting(small)) == "no_room"
+    assert _pulled("bc", Setting(gripper=Gripper(finger=0.03))) == "no_room"
+    assert _pulled("bcc", Setting(gripper=Gripper(jaw_height=0.07))) is None, "the knuckles stay above the cups"
+
+
+def test_the_centre_of_mass_is_that_of_the_bodies() -> None:
+    for kind in STANDARD.dishes:
+        alone = Table((make_item("0", kind, 0.0, 0.0),))
+        assert centre_height(alone) == pytest.approx(solid(kind, STANDARD[kind]).center[2], rel=1e-3)
 
 
 def _small(seed: int) -> Table:

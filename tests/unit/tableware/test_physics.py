@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.experiments.tidy_holds import held
 from benchmarks.experiments.tidy_physics import Run
-from benchmarks.experiments.tidy_pulls import divergence
+from benchmarks.experiments.tidy_pulls import divergence, pair
 from benchmarks.tidy.physics_times import fit
 from stages.kit.motion.kinematics import arm_chain, forward
 from stages.kit.simulation.robot_description import load_robot
@@ -19,6 +19,7 @@ from stages.tableware.actions.grasp import Grasp, grasp, grasp_two
 from stages.tableware.actions.stack import stack
 from stages.tableware.parameters import SimulateParameters
 from stages.tableware.planning.action import Action
+from stages.tableware.planning.rules import Rules, why_not_pulled
 from stages.tableware.planning.time_model import TimeModel
 from stages.tableware.simulation.arm_times import FILE, ArmTimes, arm_times
 from stages.tableware.simulation.holds import Hold, pair_hold, rim_hold, unevenness
@@ -299,6 +300,12 @@ def test_a_cup_is_stacked_into_another() -> None:
 def test_a_pull_ends_where_it_should_though_the_cup_stood_elsewhere() -> None:
     found = divergence("cups", 20, 2)
     assert found["initial"] > 0.3 and found["final"] < 0.3
+
+
+@pytest.mark.parametrize(("pile", "borne"), [("cc", True), ("ccc", False), ("bcc", False)])
+def test_physics_bears_the_pulls_that_the_rule_allows(pile: str, borne: bool) -> None:
+    assert (why_not_pulled(pile, Rules(steady_pulls=True)) is None) == borne
+    assert pair(pile, 0)["kept"] == borne
 
 
 def test_a_knocked_cup_is_counted_and_no_longer_on_the_table() -> None:

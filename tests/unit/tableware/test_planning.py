@@ -35,6 +35,7 @@ from stages.tableware.planning.time_model import (
     with_spills,
     with_thesis_failures,
 )
+from stages.tableware.policies import ours_bold
 from stages.tableware.sight import named_as, understood, without_places
 from stages.tableware.simulation.fast import FastWorld, run_trial
 from stages.tableware.simulation.trial import run_in
@@ -46,7 +47,7 @@ from stages.tableware.world.scenes import make_table
 from stages.tableware.world.setting import Setting
 
 MODEL = TimeModel(trip=10.0, stack=8.0, pull=5.0)
-RULES = Rules()
+RULES, BOLD = Rules(), ours_bold.RULES
 
 
 def test_two_cups_side_by_side_cost_what_their_slips_say() -> None:
@@ -206,17 +207,24 @@ def test_detections_of_unknown_kind_and_low_confidence_are_not_planned_for() -> 
     assert [one.reason for one in seen.refused] == ["unknown_object", "unsure"]
 
 
-@pytest.mark.parametrize("tier", ["tier1", "tier3"])
-def test_reasons_are_given_exactly_where_rules_forbid(tier: str) -> None:
+@pytest.mark.parametrize(("tier", "rules"), [("tier1", RULES), ("tier3", RULES), ("tier3", BOLD)])
+def test_reasons_are_given_exactly_where_rules_forbid(tier: str, rules: Rules) -> None:
     table = make_table(tier, 1)
-    given_for = {(one.primitive, one.first, one.second) for one in impossible_pairs(table, RULES)}
+    given_for = {(one.primitive, one.first, one.second) for one in impossible_pairs(table, rules)}
     bases = [pile[0].name for pile in table.stacks]
     for one, other in permutations(bases, 2):
-        assert (("pull", one, other) in given_for) == (not can_pull(table, one, other, RULES))
-        assert (("stack", one, other) in given_for) == (not can_put(table, one, other, RULES))
+        assert (("pull", one, other) in given_for) == (not can_pull(table, one, other, rules))
+        assert (("stack", one, other) in given_for) == (not can_put(table, one, other, rules))
     for row, one in enumerate(bases):
         for other in bases[row + 1 :]:
-            assert (("multi_grasp", one, other) in given_for) == (not can_grasp_two(table, one, other, RULES))
+            assert (("multi_grasp", one, other) in given_for) == (not can_grasp_two(table, one, other, rules))
+
+
+def test_a_pull_that_a_pile_does_not_bear_is_said_so() -> None:
+    cups = [make_item(f"cup_{n}", "cup", 0.0, 0.0, z=0.0183 * n, on=f"cup_{n - 1}" if n else None) for n in range(3)]
+    table = Table((*cups, make_item("far", "cup", 0.25, 0.0)))
+    pulls = {one.first: one.kind for one in impossible_pairs(table, BOLD) if one.primitive == "pull"}
+    assert pulls == {"cup_0": "tips"}
 
 
 def test_actions_survive_their_records() -> None:
