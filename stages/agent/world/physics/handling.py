@@ -76,7 +76,7 @@ class Handling:
             return
         before = self._seen.surfaces
         self._looking.look(at, close=True)
-        if not any(hypot(s.middle[0] - at[0], s.middle[1] - at[1]) <= FOUND_WITHIN for s in self._seen.surfaces):
+        if self._seen.nearest(at) is None:
             self._seen.surfaces = before
 
     def _take(self, at: Position, candidate: int) -> None:
@@ -104,10 +104,9 @@ class Handling:
     def _target(self, at: Position, rank: int, base: Base | None = None) -> Target | None:
         """Return what was seen nearest to a position, and show the arm what is around a base pose, the robot's own if
         none is given; None where nothing was seen."""
-        away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._seen.surfaces]
-        if not away or min(away) > FOUND_WITHIN:
+        surface = self._seen.nearest(at)
+        if surface is None:
             return None
-        surface = self._seen.surfaces[int(np.argmin(away))]
         self._seen.surfaces = [s for s in self._seen.surfaces if s is surface or not s.same_as(surface)]
         number = next(k for k, s in enumerate(self._seen.surfaces) if s is surface)
         self._robot.beliefs.show(self._seen.boxes(None, base))

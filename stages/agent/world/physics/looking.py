@@ -27,7 +27,7 @@ STEEP, OVER = (1.5, 1.3, 1.1), 0.45
 """How far down the wrist camera looks at a thing from above, the steepest first [rad], and from how far [m]."""
 FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
-INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8), (0.0, 0.12, -0.12)
+INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
 """The same of looks into a shelf."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
@@ -83,12 +83,14 @@ class Looking:
             arms += self._arms_over(at)
         if not arms:
             return Look((), sector, close, in_view=False)
+        known = self._seen.nearest(at) if close and shelf is not None else None
+        aim = at if known is None else (at[0], at[1], float(known.middle[2]))  # tall, it would be cut
         for arm in arms:
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
-            picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, at, close), self._robot.random)
-            camera = self._aimed(seen_pose, at, close)
+            picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, aim, close), self._robot.random)
+            camera = self._aimed(seen_pose, aim, close)
             if not close:  # a thing fills a picture from near by
                 self._seen.keep_top(picture, camera, piece)
             front = self._seen.front_of(piece)
