@@ -137,6 +137,10 @@ class Front:
         from above."""
         return 0.0 if self.slides else max(0.0, self.size[0] / 2 - float(self.local(at[None])[0, 0]))
 
+    def before(self, base: np.ndarray) -> bool:
+        """Whether a base pose (3,) of the map is on the side that the front is on."""
+        return bool(self.local(np.array([[*base[:2], 0.0]]))[0, 0] > self.size[0] / 2)
+
     def opening(self) -> Position:
         """Return a place of the map in the middle of a shelf."""
         x, y, z = apply(self.map_from_front, np.array([(0.0, 0.0, LOOK_AT * self.size[2])]))[0]

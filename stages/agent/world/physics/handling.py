@@ -40,13 +40,14 @@ class Handling:
         """Whether a free arm pose over a position exists in the robot's own map, from a base pose; to `take` what was
         seen there a grasp of it."""
         self._robot.beliefs.hold(None)
-        target = self._target(at, 0, base) if take else None
-        if target is not None:
-            pose = np.array([base.x, base.y, base.yaw])
-            return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
-        self._robot.beliefs.show(self._seen.boxes(at, base))
         pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
         forward = front is not None and not front.slides
+        if front is not None and forward and not front.before(pose):
+            return False
+        target = self._target(at, 0, base) if take else None
+        if target is not None:
+            return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
+        self._robot.beliefs.show(self._seen.boxes(at, base))
         return reachable(self._robot.beliefs, pose, at, np.random.default_rng(5), forward=forward)
 
     def grasp(self, at: Position, label: str, candidate: int) -> Felt:
@@ -91,12 +92,17 @@ class Handling:
         self._close_hand()
         self._seen.surfaces = [s for s in self._seen.surfaces if s is not target.surface]
         self._robot.hold = motion.hold
+        lift, home = motion.away
         try:
-            self._robot.carry_out(motion.away)
+            self._robot.carry_out((lift,))
         except MotionFailed:
             self._robot.driver.release()  # lifting is blocked: let go
             self._robot.hold = None
             raise
+        try:
+            self._robot.carry_out((home,))
+        except MotionFailed:
+            self._robot.draw_in()  # it holds it all the same
         if self._robot.driver.robot.configuration().opening < CLOSED_ON_NOTHING:
             self._robot.hold = None
             self._robot.driver.held = None

@@ -132,8 +132,8 @@ class Looking:
     def _arms_into(self, shelf: Front, at: Position, *, close: bool) -> list[np.ndarray]:
         """Return arms that hold the wrist camera before an open shelf; none where the robot does not stand there."""
         asides = INTO_ASIDE[:1] if close else INTO_ASIDE
-        before = shelf.local(np.array([[*self._robot.believed[:2], 0.0]]))[0, 0] > shelf.size[0] / 2
-        return [] if self._robot.hold is not None or not before else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
+        can = self._robot.hold is None and shelf.before(self._robot.believed)
+        return [] if not can else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
 
     def _arms_at(
         self, at: Position, pitches: tuple[float, ...], aways: tuple[float, ...], asides: tuple[float, ...]

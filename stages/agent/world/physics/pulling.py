@@ -53,7 +53,7 @@ PRESS, OVERSHOOT = 0.006, 0.02
 """The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
 NOTICED = 0.1
 """Of an angle by which it pays to push a leaf on [rad]."""
-SHARES = (1.0, 0.75)
+SHARES = (1.0, 0.75, 0.5)
 """Of what a door opens to, tried one after the other."""
 SAMPLES = 500
 HERE = 0.12
@@ -295,7 +295,7 @@ class Pulling:
         if front is None:
             raise MotionFailed("no_grasp", "the robot knows of no open door there", (name,))
         tally = Tally()
-        for end in (-OVERSHOOT, 0.4 * front.value):
+        for end in (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value):
             for base in self._bases(front):
                 if self._push(front, base, end, tally) is None or not self._go(base, front.label):
                     continue
