@@ -46,7 +46,7 @@ FLOOR_VIEWS, FLOOR_AT = 4, 1.2
 LITTLE = 0.1
 """No look is taken that shows less of where it may lie."""
 DEEPER = (0.0, 0.07, 0.14)
-"""Before what is open a base stands so much farther away [m], too, and at more places: the way in is narrow."""
+"""Before what is open a base with a short arm stands so much farther away [m], too, and at more places."""
 ON_FLOOR = 0.2
 """Lower things lie on the floor [m]."""
 
@@ -254,7 +254,7 @@ class OwnSkills(CommonSkills):
     def _before(self, place: str) -> list[tuple[float, Base]]:
         """Return the base poses along all sides of furniture that the robot can get to, the nearest first."""
         piece = self.scene.furniture[place]
-        offs = DEEPER if piece.opened else (0.0,)
+        offs = DEEPER if piece.opened and self._body.short_armed else (0.0,)
         poses = [p for off in offs for p in around(piece, self._body.stand_off + off, APART / len(offs))]
         return self._open(drivable(self.scene, self._body.base, poses))
 

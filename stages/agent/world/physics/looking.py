@@ -114,15 +114,16 @@ class Looking:
                 self._robot.log.mistaken("missed", f"look {name}")
         self._segmenter.missed.clear()
 
-    def look_at_front(self, at: Position) -> list[Surface]:
-        """Look at a front from before it, to both sides of a position: handles, and what they are on, as surfaces."""
+    def look_at_front(self, at: Position, *, close: bool = False) -> list[Surface]:
+        """Look at a front from before it, to both sides of a position, or there at twice the resolution: handles, and
+        what they are on, as surfaces."""
         sector, found, renderer = quarter(self._robot.base, at), list[Surface](), None
         for arm in self._arms_at(at, FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE):
             self._robot.arm_to(arm)
             pose, camera = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
-            picture = take(renderer, WRIST, pose, self._robot.random)
-            masks = [m for m in self._segmenter.masks(picture, camera, (sector, False)) if m.label in PARTS]
+            picture = take(renderer, NEAR_BY if close else WRIST, pose, self._robot.random)
+            masks = [m for m in self._segmenter.masks(picture, camera, (sector, close)) if m.label in PARTS]
             found += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"front {arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
