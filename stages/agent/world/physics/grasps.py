@@ -32,6 +32,8 @@ FORWARD_PITCHES = (0.15, 0.0, 0.35)
 """The same of the hand that goes into a shelf."""
 LEVEL = 0.5
 """Below this a hand sees nothing of a thing's top [rad]: its middle lies half its width behind its front."""
+BEFORE_PALM = 0.004
+"""Room that such a hand leaves between its palm and the thing [m]."""
 STEEP = 1.5
 """From here on it comes from above [rad]."""
 HEIGHTS = (0.5, 0.65, 0.8, 0.35)
@@ -100,7 +102,8 @@ def _grasp_at(
     first, last = np.percentile(along[between], [3, 97])
     deeper = 0.0
     if pitch < LEVEL:
-        deeper = max(0.0, float(np.percentile(depth[between], 3)) + min((last - first) / 2, FINGER_DEPTH))
+        front = float(np.percentile(depth[way_in], 3))
+        deeper = max(0.0, front + min((last - first) / 2, FINGER_DEPTH - BEFORE_PALM))
         depth = depth - deeper
     under_palm = (np.abs(along) < PALM[0]) & (np.abs(aside) < PALM[1])
     room = (opening - MARGIN) / 2

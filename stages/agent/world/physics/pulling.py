@@ -12,7 +12,6 @@ import numpy as np
 
 from stages.agent.body import Base, Felt, Position
 from stages.agent.world.physics.driving import Driving
-from stages.agent.world.physics.eyes import Surface
 from stages.agent.world.physics.fronts import PARTS, Front, away_from, bases_before, before, front_seen, sides_of
 from stages.agent.world.physics.looking import Looking
 from stages.agent.world.physics.robot_in_room import RobotInRoom, felt
@@ -136,14 +135,14 @@ class Pulling:
         else:
             assert middle is not None
             at = np.array([*middle, HEIGHT_OF_LOOK * high[2]])
-        name, surfaces = f"furniture_{number}", list[Surface]()
-        for close in (False, True):
-            surfaces += self._looking.look_at_front(_position(at), close=close)
-            front = front_seen(name, piece.label, (low, high), surfaces, base)
-            if front is not None:
-                self._seen.fronts[name] = front
-                return front
-        return None
+        name, surfaces = f"furniture_{number}", self._looking.look_at_front(_position(at))
+        if not any(s.label == PARTS[0] for s in surfaces):  # a near look shows no whole panel
+            near = self._looking.look_at_front(_position(at), close=True)
+            surfaces += [s for s in near if s.label == PARTS[0]]
+        front = front_seen(name, piece.label, (low, high), surfaces, base)
+        if front is not None:
+            self._seen.fronts[name] = front
+        return front
 
     def _go(self, pose: np.ndarray, label: str) -> bool:
         """Drive to a base pose (3,) before furniture of a class, if the robot does not stand there."""
