@@ -26,8 +26,6 @@ TWICE = 0.5
 """Within this share of the distance of one thing a second detection of one look is of it as well."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
-WIDEST = 0.25
-"""Radius from which on it is no such thing but some part of furniture [m]."""
 FLOOR, PATCH = "floor", 0.1
 """What the floor under a thing is called, and its edge [m]."""
 Region = tuple[int | str, bool]
@@ -239,8 +237,6 @@ class SceneMap:
 
 def classes_not_of(radius: float) -> tuple[str, ...]:
     """Return the classes that a thing of a radius [m] is too narrow or too wide for."""
-    if radius > WIDEST:
-        return (*CARRIERS, *SMALL)
     return CARRIERS if radius < CARRIES else SMALL
 
 

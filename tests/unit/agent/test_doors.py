@@ -15,6 +15,7 @@ from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.doors import doored
 from stages.agent.world.physics.eyes import HEAD, Mask, Surface
 from stages.agent.world.physics.fronts import Front, edges, front_seen
+from stages.agent.world.physics.looking import is_thing
 from stages.agent.world.physics.room import Room
 from stages.kit.geometry.transforms import apply, look_at
 from stages.kit.motion.doors import body_from_moved
@@ -104,6 +105,11 @@ def test_how_far_it_is_open_is_felt_and_seen() -> None:
             (front.size[0] / 2, -0.32, 0.1), (front.size[0] / 2, 0.32, 0.8), (900, 3)
         )
         assert front.value_seen(apply(moved, leaf)) == pytest.approx(value, abs=0.06)
+
+
+def test_a_drawer_that_is_taken_for_a_plate_is_no_thing() -> None:
+    assert not is_thing(surface("plate", (1.5, 4.0, 0.4), (2.5, 4.4, 0.6)))
+    assert is_thing(surface("plate", (1.9, 4.0, 0.6), (2.12, 4.22, 0.62)))
 
 
 def test_edges_leave_strays_out() -> None:

@@ -29,6 +29,8 @@ FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), 
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
 INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
 """The same of looks into a shelf."""
+WIDEST = 0.5
+"""Of what lies about on furniture or in it [m]."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
 
@@ -103,7 +105,7 @@ class Looking:
         self._count_missed()
         self.looked_near = (self._robot.base, at) if close else None
         found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
-        near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
+        near = [s for s in fuse(found) if is_thing(s) and self._seen.belongs(s, at, piece, close)]
         self._seen.keep(near, at, piece, close)
         return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
 
@@ -215,6 +217,11 @@ class Looking:
             label = self._sought[0] if self._sought else "thing"
             return Detection(label, position, "", None, 0.04) if held is None else None
         return None if held is None else Detection(held.label, position, held.color, None, 0.04)
+
+
+def is_thing(surface: Surface) -> bool:
+    """Whether a surface is small enough for a thing: what is wider is of furniture, whatever its mask says."""
+    return float((surface.high - surface.low)[:2].max()) < WIDEST
 
 
 def _things(masks: list[Mask]) -> list[Mask]:
