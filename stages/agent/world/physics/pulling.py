@@ -11,8 +11,9 @@ from math import atan2, pi
 import numpy as np
 
 from stages.agent.body import Base, Felt, Position
+from stages.agent.world.physics.before_fronts import away_from, bases_before, before, sides_of
 from stages.agent.world.physics.driving import Driving
-from stages.agent.world.physics.fronts import PARTS, Front, away_from, bases_before, before, front_seen, sides_of
+from stages.agent.world.physics.fronts import PARTS, Front, front_seen
 from stages.agent.world.physics.looking import Looking
 from stages.agent.world.physics.robot_in_room import RobotInRoom, felt
 from stages.agent.world.physics.seen import Seen
