@@ -24,7 +24,7 @@ from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
 from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.records import run_of
-from stages.suture.trials.sight import LookingEyes
+from stages.suture.trials.sight import Looked, LookingEyes
 
 TRIALS = {"geometry": 20, "pictures": 20, "error_model": 20, "network_model": 20}
 """Case -> trials."""
@@ -36,10 +36,11 @@ FATES = ("right", "swapped", "abstained", "wrong")
 
 
 class Look(SutureRun):
-    """A trial with what became of the looks (place -> fate -> count)."""
+    """A trial with what became of the looks (place -> fate -> count), and each look where views were looked at."""
 
     cpu_seconds: float
     places: dict[str, dict[str, int]] = {}
+    looked: tuple[Looked, ...] = ()
 
 
 def model_of(arm: str, case: str) -> PerceptionModel:
@@ -58,7 +59,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Look
         run = run_of(trial.arm, seed, run_trial(POLICIES[trial.arm], seed, model=model, eyes=eyes))
         spent = time.process_time() - started
         places = {place: dict(counts) for place, counts in eyes.places.items()} if eyes else {}
-        yield trial, Look(**run.model_dump(), cpu_seconds=spent, places=places)
+        looked = tuple(eyes.looked) if eyes else ()
+        yield trial, Look(**run.model_dump(), cpu_seconds=spent, places=places, looked=looked)
 
 
 def looks(results: Results) -> str:

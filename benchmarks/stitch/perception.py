@@ -1,20 +1,24 @@
 """An error model of perception for the simulator of trials, fitted to what the needle benchmark measured of ours.
 
     python -m benchmarks.stitch.perception --needle FOLDER --commit HASH
-    python -m benchmarks.stitch.perception --segmentation FOLDER --commit HASH --out FILE
+    python -m benchmarks.stitch.perception --looks FOLDER --seconds 0.82 --commit HASH --out FILE
 
-The second is of the network's masks: there all views in air stand for the corner too, and a look takes what the network
-takes for both pictures and the estimate.
+The second is of the network's masks, from what trials by pictures saw (stitch_sight): the first look at each needle
+that has moved gives the shares, the looks after it how often its fate comes again. Of views of the needle world the
+tissue hides half of a needle, of trials a quarter, and the corner is of the right driver's needles alone, which stand
+for the left one's.
 
-Right: answered, centre within 1 mm, plane within 10 degrees, and the tip not taken for the swage. Corner shares are of
-the corner's views in which the needle is more than 15 degrees from edge-on, as pose correction turns it to face the
-cameras; the others are of all views. What the benchmark does not measure (how often the same mistake is made again, how
-much of an error stays) is kept as the thesis's model has it.
+Right: answered, centre within 1 mm, plane within 10 degrees, and the tip not taken for the swage. Corner shares of
+views are of those in which the needle is more than 15 degrees from edge-on, as pose correction turns it to face the
+cameras; the others are of all views. What is not measured (of views how often the same mistake is made again, of all
+how much of an error stays) is kept as the thesis's model has it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -27,10 +31,13 @@ from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.stage import Parameters
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.trials.perception import FOLDER, Errors, PerceptionModel, perception_model
+from stages.suture.trials.sight import Looked
 
 STRAY = 5.0
 """An end farther off than this [mm] strays: thread, a jaw or the other end was taken for it."""
 FEWEST, FEWEST_FAILURES = 10, 5
+SPREADS = ("normal_degrees", "end_millimetres")
+"""What right estimates have of Errors."""
 
 
 def right(record: Estimate) -> bool:
@@ -38,12 +45,26 @@ def right(record: Estimate) -> bool:
     return record.within and not record.swapped
 
 
-def by_place_learned(records: list[Estimate]) -> dict[str, list[Estimate]]:
-    """Return the simulator's places with the views that stand for them, by the network's masks."""
-    air = [r for r in records if r.holder != "tissue"]
-    seen = [r for r in air if r.visible]
-    tissue = [r for r in records if r.holder == "tissue"]
-    return {"corner_left": seen, "corner_right": seen, "elsewhere": air, "tissue": tissue}
+def by_place_looked(looked: Sequence[Looked]) -> dict[str, list[Estimate]]:
+    """Return the simulator's places with the first look at each needle there."""
+    places = {"corner_left": "corner_right", "corner_right": "corner_right"}
+    return {
+        place: [look.estimate for look in looked if look.place == places.get(place, place) and not look.again]
+        for place in ("corner_left", "corner_right", "elsewhere", "tissue")
+    }
+
+
+def persistence(looked: Sequence[Looked]) -> float:
+    """Return how often a look at a needle that stays has the fate of the look before, beyond what chance gives (0 to
+    1). `looked` are the looks of trials, one trial after the other. Raises ValueError where nothing was looked at
+    again."""
+    pairs = [(before.fate, look.fate) for before, look in pairwise(looked) if look.again]
+    if not pairs:
+        raise ValueError("no needle was looked at again")
+    alike = float(np.mean([before == after for before, after in pairs]))
+    seen = Counter(after for _, after in pairs)
+    chance = sum((count / len(pairs)) ** 2 for count in seen.values())
+    return round(max(0.0, (alike - chance) / (1.0 - chance)), 3) if chance < 1.0 else 0.0
 
 
 def by_place(records: list[Estimate]) -> dict[str, list[Estimate]]:
@@ -65,20 +86,25 @@ def fitted(
     for place, found in places.items():
         if len(found) < FEWEST:
             raise ValueError(f"{place}: {len(found)} views, {FEWEST} are needed")
-    seen = [record for found in places.values() for record in found]
+    # A record that stands for several places counts once.
+    seen = list({id(record): record for found in places.values() for record in found}.values())
     good = [record for record in seen if right(record)]
-    bad = [record for record in seen if record.answered and not right(record)]
+    bad = [record for record in seen if record.answered and not record.within]
+    swapped = [record for record in seen if record.within and record.swapped]
     return other.model_copy(
         update={
             "name": "ours",
             "measured": True,
-            "provenance": told + _counts(places) + f" Wrong answers behind their size of errors: {len(bad)}.",
+            "provenance": told + _counts(places) + f" Wrong answers behind their size of errors: {len(bad)}; "
+            f"right but for the names of the ends: {len(swapped)}.",
             "seconds_an_estimate": seconds,
             "thread_length_error": thread,
             "right_share": type(other.right_share)(**{p: _share(f, right) for p, f in places.items()}),
             "abstained_share": type(other.abstained_share)(**{p: _abstained(f, seen) for p, f in places.items()}),
             "right": _errors(good, other, False),
-            "wrong": _errors(bad, other, True),
+            "wrong": _errors(bad, other, True, swapped).model_copy(
+                update={"swapped_share": round(len(swapped) / max(1, len(bad) + len(swapped)), 3)}
+            ),
         }
     )
 
@@ -95,14 +121,17 @@ def _abstained(records: list[Estimate], every: list[Estimate]) -> float:
     return round(float(np.mean([not record.answered for record in failed])), 3) if failed else 0.0
 
 
-def _errors(records: list[Estimate], other: PerceptionModel, strays: bool) -> Errors:
-    """Return the spreads: per axis of the normal (two), of the ends (three); strays apart."""
+def _errors(records: list[Estimate], other: PerceptionModel, strays: bool, swapped: Sequence[Estimate] = ()) -> Errors:
+    """Return the spreads: per axis of the normal (two), of the ends (three; of a swapped needle both are as far off as
+    the worse one); strays apart."""
     errors = other.wrong if strays else other.right
-    if not records:
+    if not records and not swapped:
         return errors
-    ends = np.array([max(r.tip_error_mm, r.swage_error_mm) for r in records])
+    ends = np.array([max(r.tip_error_mm, r.swage_error_mm) for r in records] or [0.0])
     near = [e for r in records for e in (r.tip_error_mm, r.swage_error_mm) if not strays or e < STRAY]
-    normal = np.array([r.normal_error_deg for r in records if not strays or r.normal_error_deg < 45.0] or [10.0])
+    near += [r.end_error_mm for r in swapped for _ in range(2)]
+    turned = [r.normal_error_deg for r in (*records, *swapped)]
+    normal = np.array([angle for angle in turned if not strays or angle < 45.0] or [10.0])
     update = {
         "normal_degrees": round(float(np.sqrt((normal**2).mean() / 2.0)), 3),
         "end_millimetres": round(float(np.sqrt((np.array(near or [1.0]) ** 2).mean() / 3.0)), 3),
@@ -142,7 +171,7 @@ def as_toml(model: PerceptionModel) -> str:
     for table in ("right_share", "abstained_share", "right", "wrong"):
         lines += ["", f"[{table}]"]
         values = getattr(model, table).model_dump()
-        lines += [f"{name} = {value}" for name, value in values.items() if table != "right" or "stray" not in name]
+        lines += [f"{name} = {value}" for name, value in values.items() if table != "right" or name in SPREADS]
     return "\n".join(lines) + "\n"
 
 
@@ -150,7 +179,7 @@ class Options(Parameters):
     """Options of the fit."""
 
     needle: Path | None = Field(None, description="Output folder of stitch_needle")
-    segmentation: Path | None = Field(None, description="Output folder of stitch_segmentation, instead")
+    looks: Path | None = Field(None, description="Output folder of stitch_sight, case pictures, instead")
     commit: str = Field(description="Of the estimator that was measured")
     out: Path = Field(FOLDER / "perception_ours.toml", description="File")
     seconds: float = Field(0.2, description="An estimate with its network")
@@ -171,34 +200,33 @@ def of_needle(folder: Path, commit: str) -> tuple[dict[str, list[Estimate]], str
     return by_place(records), told
 
 
-def of_segmentation(folder: Path, commit: str) -> tuple[dict[str, list[Estimate]], str, float]:
-    """Return the same of the network's masks, and what a look takes [s]."""
-    kept = kept_records("stitch_segmentation", folder)
-    records = [record for trial, record in kept.items() if trial.arm == "ours_learned"]
-    pictures = [eye.seconds for trial, record in kept.items() if trial.arm == "network" for eye in record]
-    seconds = 2.0 * float(np.median(pictures)) + float(np.median([record.seconds for record in records]))
-    seeds = sorted(record.seed for record in records)
+def of_looks(folder: Path, commit: str) -> tuple[list[Looked], str]:
+    """Return the looks of trials by pictures, one trial after the other, and where they come from."""
+    kept = kept_records("stitch_sight", folder)
+    runs = [run for trial, run in kept.items() if (trial.arm, trial.case) == ("ours", "pictures")]
+    seeds, looked = sorted(run.seed for run in runs), [look for run in runs for look in run.looked]
     told = (
-        f"Measured by python -m benchmarks stitch_segmentation at commit {commit}, {len(seeds)} views of seeds "
-        f"{seeds[0]} to {seeds[-1]}, fitted by python -m benchmarks.stitch.perception. Masks are the network's. The "
-        "corner's shares are those of all views in air that are not near edge-on; persistence, systematic share and "
-        "the error of the thread's length are assumed."
+        f"Measured by python -m benchmarks stitch_sight --cases pictures at commit {commit}, {len(looked)} looks of "
+        f"trials with tuning seeds {seeds[0]} to {seeds[-1]}, fitted by python -m benchmarks.stitch.perception. Masks "
+        "are the network's. Shares are of the first look at each needle, persistence of those after it; the left "
+        "driver's corner is taken to be as the right one's, systematic share and the error of the thread's length are "
+        "assumed."
     )
-    return by_place_learned(records), told, round(seconds, 2)
+    return looked, told
 
 
 def main() -> None:
     """Fit and write."""
     options = asked(Options)
-    seconds = options.seconds
-    if options.segmentation is not None:
-        places, told, seconds = of_segmentation(options.segmentation, options.commit)
+    other = perception_model(FOLDER / "perception_thesis.toml")
+    if options.looks is not None:
+        looked, told = of_looks(options.looks, options.commit)
+        places, other = by_place_looked(looked), other.model_copy(update={"persistence": persistence(looked)})
     elif options.needle is not None:
         places, told = of_needle(options.needle, options.commit)
     else:
-        raise UsageError("nothing was measured", hint="--needle FOLDER or --segmentation FOLDER")
-    other = perception_model(FOLDER / "perception_thesis.toml")
-    model = fitted(places, other, seconds, options.thread_length_error, told)
+        raise UsageError("nothing was measured", hint="--needle FOLDER or --looks FOLDER")
+    model = fitted(places, other, options.seconds, options.thread_length_error, told)
     options.out.write_text(as_toml(model), encoding="utf-8")
     perception_model(options.out)
     print(options.out)

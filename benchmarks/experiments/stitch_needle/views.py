@@ -69,13 +69,13 @@ CASES = {
         *(Case(f"geometry_noise_{noise:g}", 100, TWO_CAMERAS, noise) for noise in (0.0, 0.25, 0.5, 1.5, 2.0, 3.0)),
         *(Case(f"geometry_ground_{g}", 100, TWO_CAMERAS, TWO_CAMERAS_NOISE, ground=g) for g in (1, 2, 3)),
         *(
-            Case(f"geometry_ground_2_{part}", 50, TWO_CAMERAS, TWO_CAMERAS_NOISE, ground=2, alone=part)
+            Case(f"geometry_ground_2_{part}", 100, TWO_CAMERAS, TWO_CAMERAS_NOISE, ground=2, alone=part)
             for part in PARTS
         ),
         Case("geometry_miscalibrated", 100, TWO_CAMERAS, TWO_CAMERAS_NOISE, calibration_error=0.3),
         Case("geometry_filtered", 20, TWO_CAMERAS, TWO_CAMERAS_NOISE, frames=FRAMES),
-        Case("geometry_corner_left", 50, TWO_CAMERAS, TWO_CAMERAS_NOISE, holder="left", place="corner"),
-        Case("geometry_corner_right", 50, TWO_CAMERAS, TWO_CAMERAS_NOISE, holder="right", place="corner"),
+        Case("geometry_corner_left", 100, TWO_CAMERAS, TWO_CAMERAS_NOISE, holder="left", place="corner"),
+        Case("geometry_corner_right", 100, TWO_CAMERAS, TWO_CAMERAS_NOISE, holder="right", place="corner"),
         Case("geometry_endoscope", 100, ENDOSCOPE, ENDOSCOPE_NOISE),
     )
 }

@@ -16,7 +16,7 @@ import numpy as np
 from schemas.plan import Failure
 from stages.agent.arms.next_view import ahead_of, best_floor_view, fallen_where, floor_seen, worth
 from stages.agent.arms.skills import CommonSkills
-from stages.agent.arms.stations import around, corners, drivable, other_sides
+from stages.agent.arms.stations import APART, around, corners, drivable, other_sides
 from stages.agent.body import Base, Body, Detection, Position
 from stages.agent.exploration import explore
 from stages.agent.goals import CARRIERS
@@ -45,6 +45,8 @@ FLOOR_VIEWS, FLOOR_AT = 4, 1.2
 """Looks at the floor for what fell, and how far before the base they are at [m]."""
 LITTLE = 0.1
 """No look is taken that shows less of where it may lie."""
+DEEPER = (0.0, 0.07, 0.14)
+"""Before what is open a base with a short arm stands so much farther away [m], too, and at more places."""
 ON_FLOOR = 0.2
 """Lower things lie on the floor [m]."""
 
@@ -251,7 +253,9 @@ class OwnSkills(CommonSkills):
 
     def _before(self, place: str) -> list[tuple[float, Base]]:
         """Return the base poses along all sides of furniture that the robot can get to, the nearest first."""
-        poses = around(self.scene.furniture[place], self._body.stand_off)
+        piece = self.scene.furniture[place]
+        offs = DEEPER if piece.opened and self._body.short_armed else (0.0,)
+        poses = [p for off in offs for p in around(piece, self._body.stand_off + off, APART / len(offs))]
         return self._open(drivable(self.scene, self._body.base, poses))
 
     def navigate(self, target: SceneObject) -> Outcome:

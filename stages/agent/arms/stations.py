@@ -35,15 +35,16 @@ def corners(piece: SeenFurniture) -> list[tuple[float, float]]:
     return [(x + i * w / 2, y + j * d / 2) for i in (-1, 1) for j in (-1, 1)]
 
 
-def around(piece: SeenFurniture, off: float) -> list[Base]:
-    """Return base poses along all four sides, `off` [m] from them; around what is small from eight sides."""
+def around(piece: SeenFurniture, off: float, apart: float = APART) -> list[Base]:
+    """Return base poses along all four sides, `off` [m] from them and `apart` [m]; around what is small from eight
+    sides."""
     (x, y), (w, d) = piece.centre, piece.size
     if max(w, d) < APART:
         far = max(w, d) / 2 + off
         return [facing(x + far * cos(k * pi / 4), y + far * sin(k * pi / 4), (x, y)) for k in range(8)]
     poses = []
     for length, across, turned in ((w, d, False), (d, w, True)):
-        count = max(1, ceil(length / APART))
+        count = max(1, ceil(length / apart))
         for k in range(count):
             along = (k + 0.5) / count * length - length / 2
             for side in (-1, 1):

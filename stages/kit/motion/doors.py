@@ -17,7 +17,7 @@ class ContactPoint:
 
     point: np.ndarray
     inward: np.ndarray
-    """Unit direction in which the part is pushed shut at this point."""
+    """Unit direction in which the part is pushed at this point: shut, or from inside further open."""
 
 
 def body_from_moved(joint: Joint, value: float) -> np.ndarray:
@@ -49,18 +49,27 @@ def closing_direction(joint: Joint, point: np.ndarray) -> np.ndarray:
 
 
 def push_points(
-    joint: Joint, part: trimesh.Trimesh, random: np.random.Generator, count: int, height: tuple[float, float]
+    joint: Joint,
+    part: trimesh.Trimesh,
+    random: np.random.Generator,
+    count: int,
+    height: tuple[float, float],
+    *,
+    opening: bool = False,
 ) -> list[ContactPoint]:
-    """Return points on the outside of a moving part where it can be pushed shut, far from the hinge first.
+    """Return points on the outside of a moving part where it can be pushed shut, or on its inside where it can be
+    pushed further open, far from the hinge first.
 
     `part` is the part's mesh in the body frame at value 0, `height` the range of z [m] in the body frame that the arm
-    reaches. A ray against the closing direction finds the surface; hits whose normal is slanted are left out.
+    reaches. A ray along the push finds the surface; hits whose normal is slanted are left out.
     """
+    sense = -1.0 if opening else 1.0
     vertices = np.asarray(part.vertices)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     middle = (low + high) / 2
-    direction = closing_direction(joint, middle if joint.type == "prismatic" else _widest(joint, vertices, axis))
+    farthest = middle if joint.type == "prismatic" else _widest(joint, vertices, axis)
+    direction = sense * closing_direction(joint, farthest)
     starts, sides = [], []
     for _ in range(count * 4):
         start = random.uniform(low, high)
@@ -72,7 +81,7 @@ def push_points(
     points = []
     for hit, triangle in zip(hits, triangles, strict=True):
         if float(part.face_normals[triangle] @ direction) < -0.9:
-            points.append(ContactPoint(hit, closing_direction(joint, hit)))
+            points.append(ContactPoint(hit, sense * closing_direction(joint, hit)))
     del rays
     if joint.type == "revolute":
         reach = max((_radius(joint, entry.point, axis) for entry in points), default=0.0)

@@ -37,12 +37,14 @@ class Shares(Model):
 
 
 class Errors(Model):
-    """Standard deviations per axis; `stray_end_share` of the estimates have one end farther off along a direction."""
+    """Standard deviations per axis; `stray_end_share` of the estimates have one end farther off along a direction.
+    In `swapped_share` of them tip and swage are taken for each other, and no end strays."""
 
     normal_degrees: float = Field(ge=0)
     end_millimetres: float = Field(ge=0)
     stray_end_share: float = Field(0.0, ge=0, le=1)
     stray_end_millimetres: float = Field(0.0, ge=0)
+    swapped_share: float = Field(0.0, ge=0, le=1)
 
 
 class PerceptionModel(Model):
@@ -111,6 +113,16 @@ class Looking(Protocol):
         ...
 
 
+def ends_of(needle: np.ndarray) -> np.ndarray:
+    """Return tip and swage, the columns of (3, 2) [m], of a needle at a pose (4, 4)."""
+    return np.asarray(needle[:3, :3] @ np.column_stack([TIP, SWAGE]) + needle[:3, 3:4])
+
+
+def has_moved(before: np.ndarray | None, ends: np.ndarray) -> bool:
+    """Whether ends (3, 2) [m] are farther than STILL from where they were (None: nowhere) at the look before."""
+    return before is None or float(np.abs(ends - before).max()) > STILL
+
+
 class Eyes:
     """Sees needles with the errors of a model; `looks` and `right` count estimates."""
 
@@ -125,9 +137,8 @@ class Eyes:
 
     def look(self, needle: np.ndarray, place: str) -> Seen | None:
         """Return one estimate of a needle at its true pose (4, 4); None when it is abstained from."""
-        ends = needle[:3, :3] @ np.column_stack([TIP, SWAGE]) + needle[:3, 3:4]
-        moved = self._ends is None or float(np.abs(ends - self._ends).max()) > STILL
-        if moved or self.random.random() > self.model.persistence:
+        ends = ends_of(needle)
+        if has_moved(self._ends, ends) or self.random.random() > self.model.persistence:
             self._draw(place)
         self._ends = ends
         self.looks += 1
@@ -141,7 +152,10 @@ class Eyes:
         normal = needle[:3, 2] + np.tan(np.radians(errors.normal_degrees)) * draw[0]
         offsets = draw[1:] * errors.end_millimetres / 1000.0 + self._stray[1:]
         tip, swage = ends[:, 0] + offsets[0], ends[:, 1] + offsets[1]
-        return Seen(normal / np.linalg.norm(normal), tip, swage, self._fate == "right")
+        normal /= np.linalg.norm(normal)
+        if self._fate == "swapped":
+            return Seen(-normal, swage, tip, False)
+        return Seen(normal, tip, swage, self._fate == "right")
 
     def _draw(self, place: str) -> None:
         random, model = self.random, self.model
@@ -151,7 +165,10 @@ class Eyes:
             self._fate = "right"
             return
         self._fate = "abstained" if random.random() < model.abstained_share.at(place) else "wrong"
-        if random.random() < model.wrong.stray_end_share:
+        swaps = model.wrong.swapped_share if self._fate == "wrong" else 0.0
+        if swaps and random.random() < swaps:
+            self._fate = "swapped"
+        elif random.random() < model.wrong.stray_end_share:
             direction = random.standard_normal(3)
             row = int(random.integers(1, 3))
             self._stray[row] = direction / np.linalg.norm(direction) * model.wrong.stray_end_millimetres / 1000.0

@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 
 from stages.kit.geometry.transforms import apply, inverse, transform_from
-from stages.suture.evaluation.judgement import judged
+from stages.suture.evaluation.judgement import Estimate, judged
 from stages.suture.masks import EyeMasks, learned_masks, open_segmenter, spoiled_masks
 from stages.suture.needle.estimators import ESTIMATORS
 from stages.suture.rig import TWO_CAMERAS, NeedlePose
 from stages.suture.robot.arms import REMOTE_CENTRES
 from stages.suture.robot.psm import YAW_TO_TIP
 from stages.suture.trials.bench import Bench
-from stages.suture.trials.perception import PerceptionModel, Seen
+from stages.suture.trials.perception import PerceptionModel, Seen, ends_of, has_moved
 from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
 from stages.suture.world.corruption import noisy_disparity
 from stages.suture.world.pad import Ridge
@@ -60,6 +60,17 @@ class TrialScene(NeedleScene):
         return joined([needle_tube(self.pose), joined(parts).moved(self.camera_from_world)])
 
 
+@dataclass(frozen=True)
+class Looked:
+    """A look: the place, what became of it (`right`, `swapped`: right but for the names of the ends, `abstained`,
+    `wrong`), whether the needle is where it was at the look before, and how far off it was."""
+
+    place: str
+    fate: str
+    again: bool
+    estimate: Estimate
+
+
 class LookingEyes:
     """Sees what is rendered of the trial that it watches; counts as `Eyes` does."""
 
@@ -68,9 +79,7 @@ class LookingEyes:
         self.model = model
         self.seed, self.pictures = seed, pictures
         self.looks = self.right = self.abstained = 0
-        self.places: dict[str, Counter[str]] = {}
-        """Of each place, how many looks were `right`, `swapped` (right but for the names of the ends), `abstained`,
-        `wrong`."""
+        self.looked: list[Looked] = []
         self._estimate = ESTIMATORS[model.name].of_view
         self._world = make_scene(seed, TWO_CAMERAS, calibration_error=CALIBRATION_ERROR)
         self._segmenter: Any = open_segmenter(None) if pictures else None
@@ -78,6 +87,15 @@ class LookingEyes:
         self._state = b""
         self._view: StereoView | None = None
         self._masks: EyeMasks | None = None
+        self._ends: np.ndarray | None = None
+
+    @property
+    def places(self) -> dict[str, Counter[str]]:
+        """Of each place, how many looks came to which fate."""
+        counted: dict[str, Counter[str]] = {}
+        for look in self.looked:
+            counted.setdefault(look.place, Counter())[look.fate] += 1
+        return counted
 
     def watch(self, bench: Bench) -> None:
         """Look at this trial from now on."""
@@ -95,7 +113,9 @@ class LookingEyes:
         fate = "abstained" if not record.answered else "wrong"
         if record.within:
             fate = "swapped" if record.swapped else "right"
-        self.places.setdefault(place, Counter())[fate] += 1
+        ends = ends_of(needle)
+        self.looked.append(Looked(place, fate, not has_moved(self._ends, ends), record))
+        self._ends = ends
         self.abstained += fate == "abstained"
         self.right += fate == "right"
         if answer.pose is None or answer.abstained:

@@ -9,14 +9,17 @@ from schemas.apartment import Apartment, Furniture, Thing
 from schemas.apartment import Room as Walls
 from stages.agent.body import Base, Position, Sweep
 from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.scene_map import Region
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.doors import doored
-from stages.agent.world.physics.eyes import HEAD, Surface
+from stages.agent.world.physics.eyes import HEAD, Mask, Surface
 from stages.agent.world.physics.fronts import Front, edges, front_seen
+from stages.agent.world.physics.looking import is_thing
 from stages.agent.world.physics.room import Room
 from stages.kit.geometry.transforms import apply, look_at
 from stages.kit.motion.doors import body_from_moved
+from stages.kit.rendering.object_views import Picture
 
 NO_ERRORS = Rates().with_true_eyes()
 FRIDGE = Furniture(name="fridge_0", label="fridge", centre=(2.0, 4.575), size=(0.65, 0.65), height=0.9, door=True)
@@ -104,6 +107,11 @@ def test_how_far_it_is_open_is_felt_and_seen() -> None:
         assert front.value_seen(apply(moved, leaf)) == pytest.approx(value, abs=0.06)
 
 
+def test_a_drawer_that_is_taken_for_a_plate_is_no_thing() -> None:
+    assert not is_thing(surface("plate", (1.5, 4.0, 0.4), (2.5, 4.4, 0.6)))
+    assert is_thing(surface("plate", (1.9, 4.0, 0.6), (2.12, 4.22, 0.62)))
+
+
 def test_edges_leave_strays_out() -> None:
     random = np.random.default_rng(2)
     points = np.concatenate(
@@ -150,10 +158,35 @@ def test_a_fridge_is_opened_looked_into_and_shut() -> None:
     body.close()
 
 
+def test_a_leaf_that_came_half_way_is_pushed_on_and_can_be_shut() -> None:
+    body = PhysicsBody(apartment(FRIDGE, "bottle", (1.95, 4.5)), ("bottle",), NO_ERRORS, 2)
+    body.sweep()
+    assert body.pull(at_front(FRIDGE), opening=True).ok
+    room = body._room
+    room.world.set_joint("fridge_0", room.doored["fridge_0"].joint.name, 0.9)
+    assert body._pulling._push_on("furniture_0", 0.9) > 1.2 and room.joint_value("fridge_0") > 1.2
+    body._pulling._seen.moved("furniture_0", room.joint_value("fridge_0"))
+    assert body.pull(at_front(FRIDGE), opening=False).ok and body.opened == set()
+    body.close()
+
+
+def test_a_handle_that_a_far_look_misses_is_found_from_near_by(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = PhysicsBody(apartment(FRIDGE, "bottle", (1.95, 4.5)), ("bottle",), NO_ERRORS, 2)
+    body.sweep()
+    masks = body._looking._segmenter.masks
+
+    def without_far_handles(picture: Picture, camera: np.ndarray, region: Region) -> list[Mask]:
+        return [m for m in masks(picture, camera, region) if m.label != "handle" or region[1]]
+
+    monkeypatch.setattr(body._looking._segmenter, "masks", without_far_handles)
+    assert body.pull(at_front(FRIDGE), opening=True).ok
+    body.close()
+
+
 def test_without_a_handle_nothing_is_pulled(monkeypatch: pytest.MonkeyPatch) -> None:
     body = PhysicsBody(apartment(FRIDGE, "bottle", (1.95, 4.5)), ("bottle",), NO_ERRORS, 2)
     body.sweep()
-    monkeypatch.setattr(body._looking, "look_at_front", lambda at: [])
+    monkeypatch.setattr(body._looking, "look_at_front", lambda at, *, close=False: [])
     felt = body.pull(at_front(FRIDGE), opening=True)
     assert not felt.ok and felt.failure is not None and felt.failure.kind == "no_grasp"
     assert felt.failure.numbers["sides"] >= 1 and body.opened == set()

@@ -15,7 +15,7 @@ from stages.agent.scene_map import SceneMap, classes_not_of
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.eyes import Surface, fuse
-from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
+from stages.agent.world.physics.grasps import FORWARD_PITCHES, antipodal_grasps, within_reach
 from stages.agent.world.physics.hands import whole_box
 from stages.agent.world.physics.head import SeenPiece, enter, steady
 from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
@@ -101,6 +101,15 @@ def test_grasps_come_from_above_first_and_across_the_narrow_side() -> None:
     assert all(pose[2, 3] > 0.004 for pose in grasps)
     wide = random.uniform(-0.08, 0.08, (4000, 3))
     assert antipodal_grasps(wide, np.tile([0.0, 1.0, 0.0], (4000, 1)), opening=0.08, floor=-0.08) == []
+
+
+def test_a_level_hand_grips_what_it_saw_the_front_of_about_its_axis() -> None:
+    angles = np.linspace(np.pi / 2, 3 * np.pi / 2, 60)  # the half that faces a hand that comes along x
+    ring = 0.03 * np.column_stack([np.cos(angles), np.sin(angles)])
+    points = np.concatenate([np.column_stack([ring, np.full(60, z)]) for z in np.linspace(0.0, 0.2, 40)])
+    normals = np.column_stack([np.tile(ring / 0.03, (40, 1)), np.zeros(2400)])
+    grasps = within_reach(antipodal_grasps(points, normals, 0.08, -0.5, FORWARD_PITCHES), 0.0, 0.99)
+    assert len(grasps) > 3 and all(abs(g[0, 3]) < 0.006 and abs(g[1, 3]) < 0.003 for g in grasps)
 
 
 def test_furniture_is_as_large_as_it_is_and_its_top_as_high() -> None:

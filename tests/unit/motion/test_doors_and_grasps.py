@@ -51,6 +51,15 @@ def test_push_points_lie_on_the_outside_far_from_the_hinge() -> None:
         assert entry.inward[1] > 0.9
 
 
+def test_points_to_push_a_door_further_open_lie_on_its_inside() -> None:
+    door = trimesh.creation.box(extents=(0.6, 0.05, 1.4))
+    door.apply_translation([0.0, -0.325, 0.7])
+    points = push_points(HINGE, door, np.random.default_rng(0), 6, (0.4, 1.2), opening=True)
+    assert len(points) == 6
+    for entry in points:
+        assert entry.point[1] == pytest.approx(-0.3, abs=1e-6) and entry.point[0] > 0.0 and entry.inward[1] < -0.9
+
+
 def test_tool_poses_are_rigid_and_press_along_the_closing_direction() -> None:
     contact = ContactPoint(np.array([0.2, -0.35, 0.9]), np.array([0.0, 1.0, 0.0]))
     values = np.array([1.0, 0.5, 0.0])

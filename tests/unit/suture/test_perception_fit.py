@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.stitch.perception import as_toml, by_place, fitted
+from benchmarks.stitch.perception import as_toml, by_place, by_place_looked, fitted, persistence
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.trials.perception import FOLDER, perception_model
+from stages.suture.trials.sight import Looked
 
 
 def estimate(case: str, seed: int, holder: str = "air", answered: bool = True, wrong: str = "") -> Estimate:
@@ -53,10 +54,32 @@ def test_shares_and_spreads_are_those_of_the_estimates(tmp_path: Path) -> None:
     assert model.abstained_share.corner_right == 0.5  # four failures: those of all places count
     assert model.right.normal_degrees == pytest.approx(np.sqrt(2.0), abs=1e-3)
     assert model.right.end_millimetres == pytest.approx(np.sqrt(1.0 / 3.0), abs=1e-3)
-    assert model.wrong.stray_end_share == 1.0 and model.wrong.stray_end_millimetres == 18.0
+    assert model.wrong.stray_end_share == 1.0 and model.wrong.stray_end_millimetres == 12.0
+    assert model.wrong.swapped_share == 0.5
     assert model.persistence == thesis.persistence
     path = tmp_path / "model.toml"
     path.write_text(as_toml(model))
     assert perception_model(path).model_dump(exclude={"provenance"}) == model.model_dump(exclude={"provenance"})
     with pytest.raises(ValueError, match="tissue: 0 views"):
         fitted(by_place(records()[:-10]), thesis, 0.2, 0.05, "Measured here and now, for a test.")
+
+
+def look(place: str, fate: str = "right", again: bool = False) -> Looked:
+    return Looked(place, fate, again, estimate("trial", 0, answered=fate != "abstained", wrong=fate))
+
+
+def test_of_looks_the_first_at_each_needle_gives_the_shares() -> None:
+    seen = [look("corner_right"), look("corner_right", "swapped", again=True), look("tissue", "swapped")]
+    places = by_place_looked(seen)
+    assert [len(places[name]) for name in ("corner_left", "corner_right", "elsewhere", "tissue")] == [1, 1, 0, 1]
+    assert places["tissue"][0].swapped
+
+
+def test_persistence_is_what_chance_does_not_give() -> None:
+    apart = [look("tissue"), look("tissue", "swapped")]
+    same = [*apart[:1], look("tissue", again=True), *apart[1:], look("tissue", "swapped", again=True)]
+    assert persistence(same) == 1.0
+    other = [look("tissue"), look("tissue", "swapped", again=True), look("tissue", "right", again=True)]
+    assert persistence(other) == 0.0
+    with pytest.raises(ValueError, match="again"):
+        persistence(apart)

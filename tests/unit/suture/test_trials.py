@@ -250,6 +250,20 @@ def test_estimates_are_as_often_right_as_the_model_says() -> None:
     assert np.isclose(np.std(errors), model.right.end_millimetres / 1000, rtol=0.1)
 
 
+def test_ends_that_are_taken_for_each_other_do_not_stray() -> None:
+    model = perfect()
+    never = Shares(corner_left=0, corner_right=0, elsewhere=0, tissue=0)
+    swaps = model.right.model_copy(update={"swapped_share": 1.0})
+    eyes = Eyes(
+        model.model_copy(update={"right_share": never, "abstained_share": never, "wrong": swaps}),
+        np.random.default_rng(1),
+    )
+    needle = upright(np.zeros(3), 0.3)
+    seen = eyes.look(needle, "tissue")
+    assert seen is not None and not seen.right
+    assert np.allclose(seen.tip, point_at(needle, np.pi), atol=1e-4) and seen.normal @ needle[:3, 2] < -0.99
+
+
 def test_a_needle_that_stays_shares_its_error() -> None:
     model = perception_model(FOLDER / "perception_thesis.toml").model_copy(
         update={"persistence": 1.0, "systematic": 1.0}

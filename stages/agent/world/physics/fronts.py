@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, hypot
+from math import atan2
 
 import numpy as np
 
@@ -44,8 +44,6 @@ LOOK_AT = 0.6
 """Height at which it is looked into, as a share of its own."""
 NARROWEST = 0.25
 """Of a front that was looked at, and not its edge [m]."""
-AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
-"""From where a side is looked at: before it, and beside its middle [m]."""
 EDGE_CELL = 0.01
 TRAY = 0.5
 """Height of the sides of a drawer, as a share of its front's."""
@@ -136,6 +134,10 @@ class Front:
         """Return how far a point (3,) of the map is behind the open front of a shelf [m]; 0 in a drawer, which is open
         from above."""
         return 0.0 if self.slides else max(0.0, self.size[0] / 2 - float(self.local(at[None])[0, 0]))
+
+    def before(self, base: np.ndarray) -> bool:
+        """Whether a base pose (3,) of the map is on the side that the front is on."""
+        return bool(self.local(np.array([[*base[:2], 0.0]]))[0, 0] > self.size[0] / 2)
 
     def opening(self) -> Position:
         """Return a place of the map in the middle of a shelf."""
@@ -242,40 +244,3 @@ def footprint(front: Front, less: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     x, w, out = front.size[0] / 2, front.size[1] / 2, (front.value if front.slides else 0.0) - less
     corners = apply(front.map_from_front, np.array([(-x, -w, 0.0), (x + out, w, 0.0)]))[:, :2]
     return corners.min(axis=0), corners.max(axis=0)
-
-
-def bases_before(front: Front) -> list[np.ndarray]:
-    """Return base poses (3,) of the map from which the hand may get along with what moves, the likeliest first: before
-    a drawer, and beside the way of a leaf on the handle's side."""
-    at = np.array(front.joint.handle or (0.0, 0.0, 0.0))
-    x = front.size[0] / 2
-    if front.slides:
-        spots = [(away, at[1] + aside) for aside in (0.0, 0.35, -0.35, 0.5, -0.5) for away in AWAYS]
-    else:
-        side = -front.joint.axis[2]
-        offs = ((0.75, 0.15), (0.65, 0.25), (0.85, 0.1), (0.85, 0.3), (0.55, 0.35), (0.75, -0.05), (0.95, 0.15))
-        spots = [(away, at[1] + side * aside) for away, aside in offs]
-    made = []
-    for away, y in spots:
-        here, there = apply(front.map_from_front, np.array([(x + away, y, 0.0), (x, at[1], 0.0)]))
-        made.append(np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])]))
-    return made
-
-
-def sides_of(box: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the middles (2,) of the four sides of a box with their unit normals (2,)."""
-    centre, half = (box[0] + box[1])[:2] / 2, (box[1] - box[0])[:2] / 2
-    return [(centre + normal * half, normal) for normal in np.array([(1, 0), (-1, 0), (0, 1), (0, -1)], float)]
-
-
-def before(middle: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
-    """Return base poses (3,) from which a side (its middle and normal, (2,)) is looked at, the best first."""
-    left = np.array([-normal[1], normal[0]])
-    spots = (middle + away * normal + aside * left for aside in ASIDES for away in AWAYS)
-    return [np.array([*spot, atan2(*(middle - spot)[::-1])]) for spot in spots]
-
-
-def away_from(front: Front, base: np.ndarray) -> float:
-    """Return the distance [m] of a base (3,) from the middle of the front."""
-    own = front.local(np.array([[base[0], base[1], 0.0]]))[0]
-    return hypot(own[0] - front.size[0] / 2, own[1])

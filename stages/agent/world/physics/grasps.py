@@ -30,6 +30,10 @@ PITCHES = (np.pi / 2, 1.1, 0.7)
 """How steeply the hand comes, from above first [rad]."""
 FORWARD_PITCHES = (0.15, 0.0, 0.35)
 """The same of the hand that goes into a shelf."""
+LEVEL = 0.5
+"""Below this a hand sees nothing of a thing's top [rad]: its middle lies half its width behind its front."""
+BEFORE_PALM = 0.004
+"""Room that such a hand leaves between its palm and the thing [m]."""
 STEEP = 1.5
 """From here on it comes from above [rad]."""
 HEIGHTS = (0.5, 0.65, 0.8, 0.35)
@@ -96,6 +100,11 @@ def _grasp_at(
     shift = np.percentile(along[way_in], [3, 97]).mean()
     along = along - shift
     first, last = np.percentile(along[between], [3, 97])
+    deeper = 0.0
+    if pitch < LEVEL:
+        front = float(np.percentile(depth[way_in], 3))
+        deeper = max(0.0, front + min((last - first) / 2, FINGER_DEPTH - BEFORE_PALM))
+        depth = depth - deeper
     under_palm = (np.abs(along) < PALM[0]) & (np.abs(aside) < PALM[1])
     room = (opening - MARGIN) / 2
     if np.abs(along[way_in]).max() > room or (under_palm & (depth < -FINGER_DEPTH)).sum() > LEAST:
@@ -105,7 +114,7 @@ def _grasp_at(
     square = max((float(facing[end].mean()) for end in ends if end.any()), default=0.0)
     pose = np.eye(4)
     pose[:3, :3] = axes
-    pose[:3, 3] = at + shift * closing
+    pose[:3, 3] = at + shift * closing + deeper * approach
     return pose, square, float(last - first)
 
 

@@ -40,13 +40,14 @@ class Handling:
         """Whether a free arm pose over a position exists in the robot's own map, from a base pose; to `take` what was
         seen there a grasp of it."""
         self._robot.beliefs.hold(None)
-        target = self._target(at, 0, base) if take else None
-        if target is not None:
-            pose = np.array([base.x, base.y, base.yaw])
-            return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
-        self._robot.beliefs.show(self._seen.boxes(at, base))
         pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
         forward = front is not None and not front.slides
+        if front is not None and forward and not front.before(pose):
+            return False
+        target = self._target(at, 0, base) if take else None
+        if target is not None:
+            return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
+        self._robot.beliefs.show(self._seen.boxes(at, base))
         return reachable(self._robot.beliefs, pose, at, np.random.default_rng(5), forward=forward)
 
     def grasp(self, at: Position, label: str, candidate: int) -> Felt:
@@ -76,7 +77,7 @@ class Handling:
             return
         before = self._seen.surfaces
         self._looking.look(at, close=True)
-        if not any(hypot(s.middle[0] - at[0], s.middle[1] - at[1]) <= FOUND_WITHIN for s in self._seen.surfaces):
+        if self._seen.nearest(at) is None:
             self._seen.surfaces = before
 
     def _take(self, at: Position, candidate: int) -> None:
@@ -91,12 +92,17 @@ class Handling:
         self._close_hand()
         self._seen.surfaces = [s for s in self._seen.surfaces if s is not target.surface]
         self._robot.hold = motion.hold
+        lift, home = motion.away
         try:
-            self._robot.carry_out(motion.away)
+            self._robot.carry_out((lift,))
         except MotionFailed:
             self._robot.driver.release()  # lifting is blocked: let go
             self._robot.hold = None
             raise
+        try:
+            self._robot.carry_out((home,))
+        except MotionFailed:
+            self._robot.draw_in()  # it holds it all the same
         if self._robot.driver.robot.configuration().opening < CLOSED_ON_NOTHING:
             self._robot.hold = None
             self._robot.driver.held = None
@@ -104,10 +110,9 @@ class Handling:
     def _target(self, at: Position, rank: int, base: Base | None = None) -> Target | None:
         """Return what was seen nearest to a position, and show the arm what is around a base pose, the robot's own if
         none is given; None where nothing was seen."""
-        away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._seen.surfaces]
-        if not away or min(away) > FOUND_WITHIN:
+        surface = self._seen.nearest(at)
+        if surface is None:
             return None
-        surface = self._seen.surfaces[int(np.argmin(away))]
         self._seen.surfaces = [s for s in self._seen.surfaces if s is surface or not s.same_as(surface)]
         number = next(k for k, s in enumerate(self._seen.surfaces) if s is surface)
         self._robot.beliefs.show(self._seen.boxes(None, base))

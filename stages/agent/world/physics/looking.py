@@ -27,8 +27,10 @@ STEEP, OVER = (1.5, 1.3, 1.1), 0.45
 """How far down the wrist camera looks at a thing from above, the steepest first [rad], and from how far [m]."""
 FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
-INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8), (0.0, 0.12, -0.12)
+INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
 """The same of looks into a shelf."""
+WIDEST = 0.5
+"""Of what lies about on furniture or in it [m]."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
 
@@ -83,12 +85,14 @@ class Looking:
             arms += self._arms_over(at)
         if not arms:
             return Look((), sector, close, in_view=False)
+        known = self._seen.nearest(at) if close and shelf is not None else None
+        aim = at if known is None else (at[0], at[1], float(known.middle[2]))  # tall, it would be cut
         for arm in arms:
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
-            picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, at, close), self._robot.random)
-            camera = self._aimed(seen_pose, at, close)
+            picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, aim, close), self._robot.random)
+            camera = self._aimed(seen_pose, aim, close)
             if not close:  # a thing fills a picture from near by
                 self._seen.keep_top(picture, camera, piece)
             front = self._seen.front_of(piece)
@@ -101,7 +105,7 @@ class Looking:
         self._count_missed()
         self.looked_near = (self._robot.base, at) if close else None
         found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
-        near = [s for s in fuse(found) if self._seen.belongs(s, at, piece, close)]
+        near = [s for s in fuse(found) if is_thing(s) and self._seen.belongs(s, at, piece, close)]
         self._seen.keep(near, at, piece, close)
         return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
 
@@ -112,15 +116,16 @@ class Looking:
                 self._robot.log.mistaken("missed", f"look {name}")
         self._segmenter.missed.clear()
 
-    def look_at_front(self, at: Position) -> list[Surface]:
-        """Look at a front from before it, to both sides of a position: handles, and what they are on, as surfaces."""
+    def look_at_front(self, at: Position, *, close: bool = False) -> list[Surface]:
+        """Look at a front from before it, to both sides of a position, or there at twice the resolution: handles, and
+        what they are on, as surfaces."""
         sector, found, renderer = quarter(self._robot.base, at), list[Surface](), None
         for arm in self._arms_at(at, FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE):
             self._robot.arm_to(arm)
             pose, camera = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
-            picture = take(renderer, WRIST, pose, self._robot.random)
-            masks = [m for m in self._segmenter.masks(picture, camera, (sector, False)) if m.label in PARTS]
+            picture = take(renderer, NEAR_BY if close else WRIST, pose, self._robot.random)
+            masks = [m for m in self._segmenter.masks(picture, camera, (sector, close)) if m.label in PARTS]
             found += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"front {arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
@@ -130,8 +135,8 @@ class Looking:
     def _arms_into(self, shelf: Front, at: Position, *, close: bool) -> list[np.ndarray]:
         """Return arms that hold the wrist camera before an open shelf; none where the robot does not stand there."""
         asides = INTO_ASIDE[:1] if close else INTO_ASIDE
-        before = shelf.local(np.array([[*self._robot.believed[:2], 0.0]]))[0, 0] > shelf.size[0] / 2
-        return [] if self._robot.hold is not None or not before else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
+        can = self._robot.hold is None and shelf.before(self._robot.believed)
+        return [] if not can else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
 
     def _arms_at(
         self, at: Position, pitches: tuple[float, ...], aways: tuple[float, ...], asides: tuple[float, ...]
@@ -212,6 +217,11 @@ class Looking:
             label = self._sought[0] if self._sought else "thing"
             return Detection(label, position, "", None, 0.04) if held is None else None
         return None if held is None else Detection(held.label, position, held.color, None, 0.04)
+
+
+def is_thing(surface: Surface) -> bool:
+    """Whether a surface is small enough for a thing: what is wider is of furniture, whatever its mask says."""
+    return float((surface.high - surface.low)[:2].max()) < WIDEST
 
 
 def _things(masks: list[Mask]) -> list[Mask]:

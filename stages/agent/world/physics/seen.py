@@ -128,6 +128,12 @@ class Seen:
                 return number
         return None
 
+    def nearest(self, at: Position) -> Surface | None:
+        """Return what was seen nearest to a position, if it is meant by that."""
+        away = {k: hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for k, s in enumerate(self.surfaces)}
+        best = min(away, key=lambda k: away[k], default=None)
+        return None if best is None or away[best] > FOUND_WITHIN else self.surfaces[best]
+
     def belongs(self, surface: Surface, at: Position, piece: int | None, close: bool) -> bool:
         """Whether a surface is of a piece of furniture, or lies where a look from near by was at."""
         middle = surface.middle

@@ -1,0 +1,50 @@
+"""Base poses before a front that is known, and before the sides of furniture whose front is not."""
+
+from __future__ import annotations
+
+from math import atan2, hypot
+
+import numpy as np
+
+from stages.agent.world.physics.fronts import Front
+from stages.kit.geometry.transforms import apply
+
+AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
+"""From where a side is looked at: before it, and beside its middle [m]."""
+
+
+def bases_before(front: Front) -> list[np.ndarray]:
+    """Return base poses (3,) of the map from which the hand may get along with what moves, the likeliest first: before
+    a drawer, and beside the way of a leaf on the handle's side."""
+    at = np.array(front.joint.handle or (0.0, 0.0, 0.0))
+    x = front.size[0] / 2
+    if front.slides:
+        spots = [(away, at[1] + aside) for aside in (0.0, 0.35, -0.35, 0.5, -0.5) for away in AWAYS]
+    else:
+        side = -front.joint.axis[2]
+        offs = ((0.75, 0.15), (0.65, 0.25), (0.85, 0.1), (0.85, 0.3), (0.55, 0.35), (0.75, -0.05), (0.95, 0.15))
+        spots = [(away, at[1] + side * aside) for away, aside in offs]
+    made = []
+    for away, y in spots:
+        here, there = apply(front.map_from_front, np.array([(x + away, y, 0.0), (x, at[1], 0.0)]))
+        made.append(np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])]))
+    return made
+
+
+def sides_of(box: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the middles (2,) of the four sides of a box with their unit normals (2,)."""
+    centre, half = (box[0] + box[1])[:2] / 2, (box[1] - box[0])[:2] / 2
+    return [(centre + normal * half, normal) for normal in np.array([(1, 0), (-1, 0), (0, 1), (0, -1)], float)]
+
+
+def before(middle: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
+    """Return base poses (3,) from which a side (its middle and normal, (2,)) is looked at, the best first."""
+    left = np.array([-normal[1], normal[0]])
+    spots = (middle + away * normal + aside * left for aside in ASIDES for away in AWAYS)
+    return [np.array([*spot, atan2(*(middle - spot)[::-1])]) for spot in spots]
+
+
+def away_from(front: Front, base: np.ndarray) -> float:
+    """Return the distance [m] of a base (3,) from the middle of the front."""
+    own = front.local(np.array([[base[0], base[1], 0.0]]))[0]
+    return hypot(own[0] - front.size[0] / 2, own[1])
