@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from stages.agent.body import Base, Position, Sweep
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.scene_map import Region
 from stages.agent.world.failures import Rates
+from stages.agent.world.physics.before_fronts import bases_outside
 from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.doors import doored
 from stages.agent.world.physics.eyes import HEAD, Mask, Surface
@@ -110,6 +113,18 @@ def test_how_far_it_is_open_is_felt_and_seen() -> None:
 def test_a_drawer_that_is_taken_for_a_plate_is_no_thing() -> None:
     assert not is_thing(surface("plate", (1.5, 4.0, 0.4), (2.5, 4.4, 0.6)))
     assert is_thing(surface("plate", (1.9, 4.0, 0.6), (2.12, 4.22, 0.62)))
+
+
+def test_a_leaf_that_swung_wide_is_pushed_from_its_outer_side() -> None:
+    front = replace(fridge_front(), value=1.9)
+    hinge = apply(front.map_from_front, np.array([front.joint.origin]))[0]
+    moved = front.map_from_front @ body_from_moved(front.joint, front.value)
+    bases = bases_outside(front)
+    assert bases and all(base[0] > hinge[0] for base in bases), "the hinge is at large x, the leaf beyond a right angle"
+    for base in bases:
+        own = apply(np.linalg.inv(moved), np.array([[*base[:2], 0.0]]))[0]
+        assert own[0] > front.size[0] / 2, "before the leaf's outer face as it stands"
+    assert bases_outside(replace(front, value=0.0)) == []
 
 
 def test_edges_leave_strays_out() -> None:

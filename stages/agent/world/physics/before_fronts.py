@@ -8,9 +8,12 @@ import numpy as np
 
 from stages.agent.world.physics.fronts import Front
 from stages.kit.geometry.transforms import apply
+from stages.kit.motion.doors import body_from_moved, closing_direction
 
 AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
 """From where a side is looked at: before it, and beside its middle [m]."""
+OFFS = (0.0, 0.25, -0.25)
+"""Beside the middle of a leaf from where it is pushed [m]."""
 
 
 def bases_before(front: Front) -> list[np.ndarray]:
@@ -29,6 +32,21 @@ def bases_before(front: Front) -> list[np.ndarray]:
         here, there = apply(front.map_from_front, np.array([(x + away, y, 0.0), (x, at[1], 0.0)]))
         made.append(np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])]))
     return made
+
+
+def bases_outside(front: Front) -> list[np.ndarray]:
+    """Return base poses (3,) of the map on the outer side of an open leaf, as it stands now, from which it is pushed
+    shut: beyond a right angle it is out of reach from before its furniture. None for a drawer."""
+    joint = front.joint
+    if front.slides or front.value == 0:
+        return []
+    y0, y1 = front.panel[:2]
+    middle = np.array([front.size[0] / 2, (y0 + y1) / 2, 0.0])
+    moved = front.map_from_front @ body_from_moved(joint, front.value)
+    at, way = apply(moved, middle[None])[0], moved[:3, :3] @ closing_direction(joint, middle)
+    aside = np.array([-way[1], way[0]])
+    spots = (at[:2] - away * way[:2] + off * aside for off in OFFS for away in AWAYS)
+    return [np.array([*spot, atan2(*(at[:2] - spot)[::-1])]) for spot in spots]
 
 
 def sides_of(box: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:

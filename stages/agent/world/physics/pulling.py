@@ -11,7 +11,7 @@ from math import atan2, pi
 import numpy as np
 
 from stages.agent.body import Base, Felt, Position
-from stages.agent.world.physics.before_fronts import away_from, bases_before, before, sides_of
+from stages.agent.world.physics.before_fronts import away_from, bases_before, bases_outside, before, sides_of
 from stages.agent.world.physics.driving import Driving
 from stages.agent.world.physics.fronts import PARTS, Front, front_seen
 from stages.agent.world.physics.looking import Looking
@@ -194,11 +194,11 @@ class Pulling:
             self._robot.draw_in()
             return self._seen_open(front, front.value)
 
-    def _bases(self, front: Front) -> Iterator[np.ndarray]:
+    def _bases(self, front: Front, *, shutting: bool = False) -> Iterator[np.ndarray]:
         """Yield base poses (3,) for a front that the robot can get to: where it stands first, if that is before it."""
         if away_from(front, self._robot.believed) < 1.2:
             yield self._robot.believed.copy()
-        for pose in bases_before(front):
+        for pose in (*(bases_outside(front) if shutting else ()), *bases_before(front)):
             if self._seen.obstacles.fits(pose[0], pose[1]):
                 yield pose
 
@@ -299,7 +299,7 @@ class Pulling:
             raise MotionFailed("no_grasp", "the robot knows of no open door there", (name,))
         tally = Tally()
         for end in (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value):
-            for base in self._bases(front):
+            for base in self._bases(front, shutting=True):
                 if self._push(front, base, end, tally) is None or not self._go(base, front.label):
                     continue
                 motion = self._push(front, self._robot.believed, end, tally)
@@ -315,7 +315,7 @@ class Pulling:
 
     def _shut_rest(self, front: Front, value: float, tally: Tally) -> float:
         """Push what was pushed half shut the rest of the way."""
-        for base in self._bases(front):
+        for base in self._bases(front, shutting=True):
             if self._push(front, base, -OVERSHOOT, tally) is not None and self._go(base, front.label):
                 motion = self._push(front, self._robot.believed, -OVERSHOOT, tally)
                 if motion is not None:
