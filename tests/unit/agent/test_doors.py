@@ -96,6 +96,9 @@ def test_a_front_is_made_of_what_was_seen() -> None:
     edge = surface("door", (1.674, 4.25, 0.03), (1.676, 4.27, 0.9))
     box = (np.array([1.675, 4.3, 0.0]), np.array([2.325, 4.9, 0.9]))
     assert front_seen("furniture_0", "fridge", box, [edge, handle_seen()], np.array([0.9, 4.5, 0.0])) is None
+    beyond = surface("handle", (1.63, 4.19, 0.5), (1.65, 4.205, 0.7))
+    sides = (np.array([1.675, 4.25, 0.0]), np.array([2.325, 4.9, 0.9]))
+    assert front_seen("furniture_0", "fridge", sides, [beyond], np.array([0.9, 4.5, 0.0])) is None, "past the edge"
 
 
 def test_how_far_it_is_open_is_felt_and_seen() -> None:

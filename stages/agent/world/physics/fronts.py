@@ -185,7 +185,7 @@ def front_seen(
     name: str, label: str, box: tuple[np.ndarray, np.ndarray], surfaces: Sequence[Surface], base: np.ndarray
 ) -> Front | None:
     """Return the front of furniture in a box (3,), (3,) of the map by what a look at it from a base pose (3,) showed;
-    None without a handle, or where a side was looked at: of a door that shows an edge."""
+    None without a handle, or where a side was looked at: of a door that shows an edge, its handle sticks out beyond."""
     handles = [s.points for s in surfaces if s.label == "handle"]
     panels = [s.points for s in surfaces if s.label in PARTS[1:]]
     if not handles:
@@ -215,6 +215,8 @@ def front_seen(
     if len(bar) < 5:
         return None
     near, far = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)
+    if abs(near[1] + far[1]) / 2 > half_width:
+        return None  # seen past an edge: it is on another side
     near[0] = far[0] - 2 * HALF_BAR
     extent = (-half_width, half_width, z0 if slides else LEAF, min(z1, float(high[2])))
     size = (float(2 * half_depth), float(2 * half_width), float(high[2]))
