@@ -115,7 +115,7 @@ class CameraEyes:
         }
 
         def points_at(values: dict[str, float]) -> np.ndarray:
-            with model.joints_at(body, values):
+            with model.world.joints_at(body, values):
                 return np.concatenate([apply(model.world.link_pose(body, k), own) for k, own in shapes.items()])
 
         motion = np.eye(4)

@@ -49,7 +49,7 @@ def plan_close(
         if first is None:
             continue
         after = RobotState(first.base, first.segments[-1].path[-1, 3:])
-        with model.joints_at(body, {joint_name: middle}):
+        with model.world.joints_at(body, {joint_name: middle}):
             second = _push(replace(search, state=after, base=None), middle, -OVERSHOOT)
         if second is not None:
             return first, second

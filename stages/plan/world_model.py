@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -283,23 +281,11 @@ class WorldModel:
     def part_mesh(self, name: str, link: str) -> trimesh.Trimesh:
         """Return the collision mesh of a link in the body frame with all joints at 0. Raises KeyError."""
         meshes = link_shapes(self._texts[name])[link]
-        with self.joints_at(name, {joint: 0.0 for joint in self.world.bodies[name].joints}):
+        with self.world.joints_at(name, {joint: 0.0 for joint in self.world.bodies[name].joints}):
             body_from_link = inverse(self.pose(name)) @ self.world.link_pose(name, link)
         mesh = joined(meshes)
         mesh.apply_transform(body_from_link)
         return mesh
-
-    @contextmanager
-    def joints_at(self, name: str, values: dict[str, float]) -> Iterator[None]:
-        """Put joints of a body at values for a while."""
-        before = {joint: self.joint_value(name, joint) for joint in values}
-        try:
-            for joint, value in values.items():
-                self.world.set_joint(name, joint, value)
-            yield
-        finally:
-            for joint, value in before.items():
-                self.world.set_joint(name, joint, value)
 
 
 def body_planes(record: SceneBody, text: str) -> tuple[SurfacePlane, ...]:

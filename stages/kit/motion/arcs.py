@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -35,10 +34,6 @@ class JointedModel(ArmModel, Protocol):
 
     def pose(self, name: str) -> np.ndarray:
         """Return world_from_body (4, 4)."""
-        ...
-
-    def joints_at(self, name: str, values: dict[str, float]) -> AbstractContextManager[None]:
-        """Put joints of a body at values for a while."""
         ...
 
 
@@ -105,7 +100,7 @@ def along_arc(
     checker = model.checker
     pulling = opening > 0
     try:
-        with model.joints_at(body, {joint.name: float(values[0])}):
+        with model.world.joints_at(body, {joint.name: float(values[0])}):
             checker.allow(touch=(joint.part,))
             near = poses[0].copy()
             near[:3, 3] -= STANDOFF * near[:3, 2]
@@ -114,7 +109,7 @@ def along_arc(
                 return None
             checker.allow()
             reach = planner.path(base, arm, approach[-1])
-        with model.joints_at(body, {joint.name: max(0.0, float(values[-1]))}):
+        with model.world.joints_at(body, {joint.name: max(0.0, float(values[-1]))}):
             checker.allow(touch=(joint.part,))
             far = poses[-1].copy()
             far[:3, 3] -= STANDOFF * far[:3, 2]
@@ -165,7 +160,7 @@ def _arc(
     checker = model.checker
     checker.allow(touch=(joint.part,))
     collision: Collision | None = None
-    with model.joints_at(body, {joint.name: float(values[0])}):
+    with model.world.joints_at(body, {joint.name: float(values[0])}):
         for index, value in enumerate(values):
             model.world.set_joint(body, joint.name, max(0.0, float(value)))
             rows = densify(arms[max(0, index - 1) : index + 1], np.full(arms.shape[1], ARM_RESOLUTION))

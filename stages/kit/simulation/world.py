@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -221,6 +223,18 @@ class PhysicsWorld:
         """Return the value of a joint [rad] or [m]."""
         body = self.bodies[name]
         return float(engine.getJointState(body.body_id, body.joints[joint], physicsClientId=self.client)[0])
+
+    @contextmanager
+    def joints_at(self, name: str, values: dict[str, float]) -> Iterator[None]:
+        """Put joints of a body at values [rad] or [m] for a while. Raises KeyError for an unknown body or joint."""
+        before = {joint: self.joint_value(name, joint) for joint in values}
+        try:
+            for joint, value in values.items():
+                self.set_joint(name, joint, value)
+            yield
+        finally:
+            for joint, value in before.items():
+                self.set_joint(name, joint, value)
 
     def bounds(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the axis-aligned bounds (3,), (3,) of all links of a body, world frame."""

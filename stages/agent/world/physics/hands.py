@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,18 +142,6 @@ class Beliefs:
     def pose(self, name: str) -> np.ndarray:
         """Return map_from_body (4, 4) of what is believed in."""
         return self.world.pose(name)
-
-    @contextmanager
-    def joints_at(self, name: str, values: dict[str, float]) -> Iterator[None]:
-        """Put joints of what is believed in at values for a while."""
-        before = {joint: self.world.joint_value(name, joint) for joint in values}
-        try:
-            for joint, value in values.items():
-                self.world.set_joint(name, joint, value)
-            yield
-        finally:
-            for joint, value in before.items():
-                self.world.set_joint(name, joint, value)
 
     def hold(self, hold: Hold | None) -> None:
         """Let checks carry the box of what is held."""
