@@ -7,11 +7,14 @@ labels are what the eyes say. Positions are in the map frame [m], which the robo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
 from schemas.plan import Failure
+
+if TYPE_CHECKING:
+    from stages.agent.obstacle_map import ObstacleMap
 
 Position = tuple[float, float, float]
 
@@ -35,6 +38,8 @@ class SeenFurniture:
     height: float
     door: bool
     opened: bool
+    open_to: float | None = None
+    """Heading out of a shelf [rad] whose leaf is open: it is looked and got into from there alone."""
 
 
 @dataclass(frozen=True)
@@ -120,8 +125,8 @@ class Body(Protocol):
         ...
 
     @property
-    def clearance(self) -> float:
-        """Cells of the obstacle map that the base keeps from what is occupied."""
+    def obstacles(self) -> ObstacleMap:
+        """What it knows of the floor: what its sweeps saw, what it touched, doors that it opened."""
         ...
 
     @property
@@ -130,11 +135,11 @@ class Body(Protocol):
         ...
 
     def sweep(self) -> Sweep:
-        """Turn the head camera around once."""
+        """Turn the head camera around once, and enter what it sees into the obstacle map."""
         ...
 
-    def drive(self, base: Base, length: float, toward: str) -> Felt:
-        """Drive to a pose along a path of a length [m]. `toward`: what the arm calls its goal; empty: exploring."""
+    def drive(self, base: Base, toward: str) -> Felt:
+        """Drive to a pose along the obstacle map. `toward`: what the arm calls its goal; empty: exploring."""
         ...
 
     def look(self, at: Position, *, close: bool) -> Look:

@@ -28,7 +28,7 @@ def explore(body: Body, scene: SceneMap, until: Callable[[], object] = lambda: N
         left.append(goal)
         x, y = goal
         yaw = float(np.arctan2(y - body.base.y, x - body.base.x))
-        arrived = body.drive(Base(x, y, yaw), scene.obstacles.way(body.base, goal), "").ok
+        arrived = body.drive(Base(x, y, yaw), "").ok
         if arrived or np.hypot(body.base.x - x, body.base.y - y) < NEAR:  # there is no room to turn, but to look
             scene.sweep(body)
     return MOST_STOPS

@@ -20,12 +20,21 @@ DEARER = 4.0
 DEAREST = 20.0
 """What a cell costs that is nearer than the clearance: where the base stands too near to something it first goes away
 from it."""
+BESIDE_MOVABLE = 2.0
+"""Cells that the base keeps from the outline of something movable: that is known finely, and looked at with the arm's
+collision model before anything is done there."""
 HALF = int(LARGEST_SIDE / CELL) + 20
 
 
 def cell_of(x: float, y: float) -> tuple[int, int]:
     """Return the cell of a point [m]."""
     return round(x / CELL), round(y / CELL)
+
+
+def _around(mask: np.ndarray, cells: float) -> np.ndarray:
+    """Return (H, W) bool: cells at most so far from those of a mask (H, W)."""
+    k = ceil(cells)
+    return binary_dilation(mask, np.hypot(*np.mgrid[-k : k + 1, -k : k + 1]) <= cells)
 
 
 @dataclass
@@ -40,12 +49,15 @@ class ObstacleMap:
     state: np.ndarray = field(init=False)
     _aside: np.ndarray = field(init=False, default_factory=lambda: np.zeros((0, 2), int))
     """Cells (N, 2) that something movable stands over now."""
+    _driven: np.ndarray = field(init=False)
+    """Cells around where the base was."""
     _fields: dict[tuple[int, int], np.ndarray] = field(init=False, default_factory=dict)
     _drivable: np.ndarray | None = field(init=False, default=None)
     _dear: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.state = np.zeros((2 * HALF + 1, 2 * HALF + 1), np.int8)
+        self._driven = np.zeros(self.state.shape, bool)
         i, j = cell_of(self.start.x, self.start.y)
         self._zero = (i - HALF, j - HALF)
         self._low, self._high = np.array([HALF - 1, HALF - 1]), np.array([HALF + 2, HALF + 2])
@@ -84,24 +96,33 @@ class ObstacleMap:
     def drivable(self) -> np.ndarray:
         """(H, W) bool: cells of the window where the base fits."""
         if self._drivable is None:
-            self._drivable = (self.window == FREE) & ~self._near_obstacles(self.clearance)
+            near = _around(self.window == OCCUPIED, self.clearance) | _around(self._taken_now(), BESIDE_MOVABLE)
+            self._drivable = (self.window == FREE) & ~near
         return self._drivable
 
     def _near_obstacles(self, cells: float) -> np.ndarray:
-        """Return (H, W) bool: cells of the window at most so far from what is occupied."""
-        k = ceil(cells)
-        disk = np.hypot(*np.mgrid[-k : k + 1, -k : k + 1]) <= cells
-        occupied = self.window == OCCUPIED
+        """Return (H, W) bool: cells of the window at most so far from what is occupied, for good or now."""
+        return _around((self.window == OCCUPIED) | self._taken_now(), cells)
+
+    def _taken_now(self) -> np.ndarray:
+        """Return (H, W) bool: cells of the window that something movable stands over."""
+        taken = np.zeros(self.window.shape, bool)
         rows = self._aside - self._zero - self._low
-        rows = rows[np.all((rows >= 0) & (rows < occupied.shape), axis=1)]
-        occupied[rows[:, 0], rows[:, 1]] = True
-        return binary_dilation(occupied, disk)
+        rows = rows[np.all((rows >= 0) & (rows < taken.shape), axis=1)]
+        taken[rows[:, 0], rows[:, 1]] = True
+        return taken
 
     def put_aside(self, points: np.ndarray) -> None:
         """Say over which points (N, 2) [m] something movable stands now, in place of those said before."""
         self._aside = np.unique(np.rint(points / CELL).astype(int), axis=0).reshape(-1, 2)
         self._fields.clear()
         self._drivable = self._dear = None
+
+    def driven(self, x: float, y: float) -> None:
+        """Say that the base was at a point [m]: there it gets through, however near to something that it felt after."""
+        i, j = (np.floor(np.array([x, y]) / CELL)).astype(int) - self._zero
+        self._driven[i : i + 2, j : j + 2] = True
+        self._fields.clear()
 
     def fits(self, x: float, y: float) -> bool:
         """Whether the base fits at a point [m], as far as is known."""
@@ -123,10 +144,10 @@ class ObstacleMap:
             return np.full(self.window.shape, np.inf)
         if at not in self._fields:
             k = ceil(self.clearance)
-            free = self.drivable.copy()
-            free[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] |= (
-                self.window[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] == FREE
-            )  # it stands here already, however near to something
+            before = self._driven[self._low[0] : self._high[0], self._low[1] : self._high[1]].copy()
+            before[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] = True
+            # it stands here already, however near to something
+            free = self.drivable | (before & (self.window == FREE) & ~self._taken_now())
             cost = np.ones(self.window.shape)
             if self.comfort > 0:
                 self._dear = self._near_obstacles(self.comfort)

@@ -10,7 +10,6 @@ from math import atan2, hypot, pi
 from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sweep
 from stages.agent.goals import BOXES, CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
-from stages.agent.obstacle_map import ObstacleMap
 from stages.kit.rendering.segmenter_errors import quarter_turn
 
 SAME_FURNITURE = 0.3
@@ -109,7 +108,7 @@ class SceneMap:
         """Whether doubts are told, and classes that a thing is too wide or too narrow for do not count."""
         self.furniture: dict[str, SeenFurniture] = {}
         self.items: dict[str, Item] = {}
-        self.obstacles = ObstacleMap(body.base, body.clearance)
+        self.obstacles = body.obstacles
         self._named: Counter[str] = Counter()
         self._same_thing, self._enough = body.same_thing, body.enough
 
@@ -120,12 +119,10 @@ class SceneMap:
         for number, detection in before.things:
             self.add(detection, keys[number], MAPPED)
 
-    def sweep(self, body: Body) -> int:
-        """Turn the head camera around and enter what it saw; return how many cells are new."""
-        sweep = body.sweep()
-        for seen in sweep.furniture:
+    def sweep(self, body: Body) -> None:
+        """Turn the head camera around and enter the furniture that it saw."""
+        for seen in body.sweep().furniture:
             self._enter(seen)
-        return self.obstacles.add(sweep)
 
     def _enter(self, seen: SeenFurniture) -> str:
         known = [key for key, piece in self.furniture.items() if _same_piece(piece, seen)] or [self._name(seen.label)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from math import hypot
 
 import numpy as np
@@ -38,6 +39,8 @@ OFF_SPOT = 0.05
 """Spots this near to one that something rolled off are not tried again [m]."""
 SAME_POSE = 0.15
 """Base poses this near to one that could not be driven to are left alone [m]."""
+SAME_ON_SIDE, SAME_BEFORE_OPEN = 0.3, 0.1
+"""Base poses this near to one that was tried are as good as it [m]; into a shelf the arm gets from few."""
 SAME_TARGET = 0.1
 """A base pose that failed for one position fails for those this near [m]."""
 HAND_VIEWS = 3
@@ -45,6 +48,8 @@ FLOOR_VIEWS, FLOOR_AT = 4, 1.2
 """Looks at the floor for what fell, and how far before the base they are at [m]."""
 LITTLE = 0.1
 """No look is taken that shows less of where it may lie."""
+PULLS = 3
+"""At one door within one call: where it does not move from there, the rest is not the base pose."""
 DEEPER = (0.0, 0.07, 0.14)
 """Before what is open a base with a short arm stands so much farther away [m], too, and at more places."""
 ON_FLOOR = 0.2
@@ -240,7 +245,10 @@ class OwnSkills(CommonSkills):
     # ---- base and arm ----
 
     def drive(self, base: Base, toward: str) -> bool:
-        """Drive to a base pose; where that failed is remembered."""
+        """Drive to a base pose; where that failed is remembered. Where no way is known now it stays where it is: what
+        was touched on a drive may have closed that to poses chosen before."""
+        if not np.isfinite(self.scene.obstacles.way(self._body.base, (base.x, base.y))):
+            return False
         arrived = super().drive(base, toward)
         if not arrived and self._use.memory:
             self._blocked.append(base)
@@ -293,7 +301,8 @@ class OwnSkills(CommonSkills):
         poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
         poses += self._before(place)
         known = tried + self._remembered(place, at)
-        apart = (base for _, base in poses if not any(hypot(base.x - b.x, base.y - b.y) < 0.3 for b in known))
+        near = SAME_BEFORE_OPEN if self.scene.furniture[place].opened and self._body.short_armed else SAME_ON_SIDE
+        apart = (base for _, base in poses if not any(hypot(base.x - b.x, base.y - b.y) < near for b in known))
         return next((b for b in apart if not self._use.reachability or self._body.reaches(b, at, take=take)), None)
 
     def _there(self, base: Base, place: str) -> bool:
@@ -343,21 +352,27 @@ class OwnSkills(CommonSkills):
 
     def _take(self, item: Item) -> Outcome:
         """Take a thing, by other grasps and from other base poses where one does not do it, and make sure that it is
-        held."""
-        place, candidate, tries = item.place, 0, 0
+        held. Nothing is executed that is known to fail, but for one try where nothing else is left: it says why."""
+        place, candidate, tries, executed = item.place, 0, 0, 0
         last: Failure | None = None
-        for base in self._stations(place, item.position, take=True):
-            if tries and not self._use.repair:
+        stations = ((base, False) for base in self._stations(place, item.position, take=True))
+        last_resort = ((base, True) for _, base in self._before(place)[:1])
+        for base, desperate in chain(stations, last_resort):
+            if executed and (desperate or not self._use.repair):
                 break
+            tries += 1
             if not self._there(base, place):
-                tries += 1
                 continue
-            while tries < TRIES:
-                tries += 1
+            sure = desperate or not self._use.reachability
+            if not sure and not self._body.reaches(self._body.base, item.position, take=True):
+                self._failed_from(place, base, item.position)
+                continue
+            while executed < TRIES:
+                executed += 1
                 felt = self._body.grasp(item.position, item.label, candidate)
                 if not felt.ok:
                     last = felt.failure
-                    self._failed_from(place, base, item.position)
+                    self._failed_from(place, self._body.base, item.position)
                     break
                 held = self._in_hand() if self._use.recheck else item.label
                 if held:
@@ -489,14 +504,17 @@ class OwnSkills(CommonSkills):
         if not self._use.recheck:
             return Outcome(True)
         self.scene.items.pop(item.key)
-        over = self.scene.at_carrier(at, place)
+        over = self.scene.items.get(self.scene.at_carrier(at, place))
+        over_seen = over is None
         seen_from: set[Region] = set()  # what was seen of it before it was moved says nothing of where it is now
         for close in (True, False):
             look = self._body.look(at, close=close)
             known = self.scene.matched(look.detections, place)
             for d, other in zip(look.detections, known, strict=True):
-                if other is not None and other.label in CARRIERS and d.whole:
-                    other.position = d.position  # the hand may have pushed it
+                shoved = over if other is None and over is not None and d.label == over.label else other
+                if shoved is not None and shoved.label in CARRIERS and d.whole:
+                    shoved.position = d.position  # the hand may have pushed it
+                over_seen = over_seen or shoved is over
             new = [
                 d
                 for d, other in zip(look.detections, known, strict=True)
@@ -509,7 +527,8 @@ class OwnSkills(CommonSkills):
                 seen_from.add((quarter(self._body.base, seen.position), close))
                 item.votes[quarter(self._body.base, seen.position), close] = seen.label
                 self.scene.items[item.key] = item
-                if away <= AWAY and self.scene.carrier_of(item) == over:
+                carries = self.scene.carrier_of(item) == (over.key if over else "")
+                if away <= AWAY and carries and (over_seen or not close):
                     said = "" if item.label == believed else f"{item.key} looks like a {item.label} after all"
                     return Outcome(True, message=said, label=item.label)
         self._off.append(at)
@@ -527,7 +546,7 @@ class OwnSkills(CommonSkills):
         tries = 0
         last: Failure | None = None
         for base in self._stations(key, at):
-            if tries and not self._use.repair:
+            if tries == (PULLS if self._use.repair else 1):
                 break
             tries += 1
             if not self._there(base, key):

@@ -129,7 +129,7 @@ class CommonSkills(ABC):
 
     def drive(self, base: Base, toward: str) -> bool:
         """Drive to a base pose before something, along the shortest known way."""
-        return self._body.drive(base, self.scene.obstacles.way(self._body.base, (base.x, base.y)), toward).ok
+        return self._body.drive(base, toward).ok
 
     # What differs from arm to arm.
     @abstractmethod

@@ -37,7 +37,7 @@ def corners(piece: SeenFurniture) -> list[tuple[float, float]]:
 
 def around(piece: SeenFurniture, off: float, apart: float = APART) -> list[Base]:
     """Return base poses along all four sides, `off` [m] from them and `apart` [m]; around what is small from eight
-    sides."""
+    sides, and of an open shelf along its front alone."""
     (x, y), (w, d) = piece.centre, piece.size
     if max(w, d) < APART:
         far = max(w, d) / 2 + off
@@ -52,7 +52,15 @@ def around(piece: SeenFurniture, off: float, apart: float = APART) -> list[Base]
                 px, py = (x + out, y + along) if turned else (x + along, y + out)
                 look = (x, y + along) if turned else (x + along, y)
                 poses.append(facing(px, py, look))
-    return poses
+    return [pose for pose in poses if _before_opening(piece, pose)]
+
+
+def _before_opening(piece: SeenFurniture, pose: Base) -> bool:
+    if piece.open_to is None:
+        return True
+    out = cos(piece.open_to), sin(piece.open_to)
+    depth = (abs(out[0]) * piece.size[0] + abs(out[1]) * piece.size[1]) / 2
+    return (pose.x - piece.centre[0]) * out[0] + (pose.y - piece.centre[1]) * out[1] > depth
 
 
 def drivable(scene: SceneMap, base: Base, poses: list[Base]) -> list[tuple[float, Base]]:

@@ -199,6 +199,8 @@ class RulesBrain:
             self._rejected.add(thing.key)
             self._unmoved.add(thing.key)
         else:
+            if outcome.kind == "wrong_object":  # the views agree now
+                self._doubted.pop(thing.key, None)
             self._at = thing.place
             self._look_again = True
             self._step_back = tries == MOST_FAILURES - 1 and not self._style.skilled
@@ -480,6 +482,9 @@ class RulesBrain:
         for thing in self._fitting(what):
             if self._may_be_other(thing, what):
                 raise _Ask(f"is {thing.key} a {thing.label}, or a {self._disputed[thing.key]}?")
+        for thing in self._things.values():
+            if thing.key in self._unmoved and what.fits(thing.label, thing.color, thing.used):
+                raise _GiveUp(f"{thing.key} could not be moved, and no other {what.text} was found in {seen} places")
         raise _GiveUp(f"no {what.text} was found in {seen} places")
 
     def _no_way(self, onto: Description) -> Reply:

@@ -12,6 +12,7 @@ import numpy as np
 
 from schemas.apartment import Apartment, Furniture, Thing
 from stages.agent.body import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep
+from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.world.events import Event, EventLog
 from stages.agent.world.failures import Rates
 from stages.agent.world.floor import Floor
@@ -27,6 +28,8 @@ BASE_CELL = 0.35
 """Base poses within such a square around a piece of furniture are one and the same to the arm [m]."""
 ROLLS, BESIDE = 0.22, 0.1
 """How far something rolls on furniture, and how far beside a small carrier it comes to lie [m]."""
+CLEARANCE = 3.0
+"""Cells of the obstacle map that the base keeps from what is occupied."""
 SPEED = 0.4
 """Of the base [m/s]."""
 SECONDS = {
@@ -56,7 +59,7 @@ class Body:
 class FastWorld:
     """One episode's world. `sought`: classes that the eyes are prompted with; `floor`: if it is worked out already."""
 
-    same_thing, stand_off, clearance, short_armed = 0.04, 0.45, 3.0, False
+    same_thing, stand_off, short_armed = 0.04, 0.45, False
     enough = 3
     """By the kit's error model one of five other things is taken for what is sought from three regions in 1 % of cases,
     from two in 3 %; the hand's view comes on top."""
@@ -76,6 +79,7 @@ class FastWorld:
         self._base = Base(*apartment.start)
         self._seconds = self.metres = 0.0
         self._floor = floor or Floor(apartment)
+        self.obstacles = ObstacleMap(self._base, CLEARANCE)
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -96,9 +100,11 @@ class FastWorld:
         """Cast rays over the floor from the base, to the first occupied cell."""
         self._seconds += SECONDS["sweep"]
         free, struck, seen = self._floor.swept(self._base)
-        return Sweep(free, struck, tuple(self._seen(self.apartment.furniture[k]) for k in seen))
+        sweep = Sweep(free, struck, tuple(self._seen(self.apartment.furniture[k]) for k in seen))
+        self.obstacles.add(sweep)
+        return sweep
 
-    def drive(self, base: Base, length: float, toward: str) -> Felt:
+    def drive(self, base: Base, toward: str) -> Felt:
         """Drive. A pose may be unreachable for good; the robot then stays where it is."""
         self._seconds += SECONDS["drive"]
         piece = self._nearest(base.x, base.y)
@@ -110,6 +116,7 @@ class FastWorld:
             self._done("drive", f"drive to {piece.name if piece else toward}", ok, "navigation")
         if not ok:
             return Felt(False, "no_way")
+        length = self.obstacles.way(self._base, (base.x, base.y))
         self._base = base
         self.metres += length
         self._seconds += length / SPEED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -13,13 +14,15 @@ from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from stages.kit.motion.cartesian import follow, straight_poses
 from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import ArmChain, forward, inverse_kinematics, random_starts, reach
+from stages.kit.motion.kinematics import ArmChain, forward, inverse_kinematics, joint_frames, random_starts, reach
 from stages.kit.motion.path_query import Query
 from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
 from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.robot_description import RobotDescription
 
+FOLDED_OUT = 0.01
+"""The joints of a folded arm are so much farther from the axis of the pedestal than as it carries, at most [m]."""
 ARM_RESOLUTION = 0.05
 """Largest step of a joint between two checks [rad]."""
 
@@ -155,20 +158,40 @@ class ArmPlanner:
 
     def folded(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (J,) with the tool drawn in over the pedestal; what is held stays upright."""
+        for pose in self._drawn_in(base, arm):
+            solution = self.reachable(base, pose, tally)
+            if solution is not None and self.free(base, solution, tally):
+                return solution
+        return None
+
+    def folding(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
+        """Return arm values (K, J) from `arm` (J,) along a straight line of the tool to where it is `folded`: what is
+        held stays upright on the way, too. None where no such line is free, or leaves the elbow stuck out."""
+        limit = self._sticks_out(self.model.description.carry) + FOLDED_OUT
+        for pose in self._drawn_in(base, arm):
+            line = self.line(base, arm, pose, tally)
+            if line is not None and self._sticks_out(line[-1]) < limit:
+                return line
+        return None
+
+    def _sticks_out(self, arm: np.ndarray) -> float:
+        """Return how far from the pedestal's axis the outermost joint is [m], the tool aside."""
+        joints = base_pose(np.zeros(3), self.model.description) @ joint_frames(self.model.chain, arm)[:-1]
+        return float(np.hypot(joints[:, 0, 3], joints[:, 1, 3]).max())
+
+    def _drawn_in(self, base: np.ndarray, arm: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield poses (4, 4) of the tool over the pedestal, turned from where it is about the vertical alone."""
         world_from_tool = base_pose(base, self.model.description) @ forward(self.model.chain, arm)
         approach = world_from_tool[:3, 2]
         heading = np.arctan2(approach[1], approach[0])
         steep = float(np.linalg.norm(approach[:2])) < 0.2
         turns = np.linspace(-np.pi, np.pi, 8, endpoint=False) if steep else np.array([0.0, 0.5, -0.5, 1.0, -1.0])
+        direction = np.array([np.cos(base[2]), np.sin(base[2])])
         for turn in turns:
             for forward_distance, height in ((0.38, 0.5), (0.42, 0.35), (0.45, 0.6), (0.35, 0.7)):
                 pose = world_from_tool.copy()
                 change = turn if steep else float(base[2]) - heading + turn
                 pose[:3, :3] = transform_from_yaw(change, np.zeros(3))[:3, :3] @ world_from_tool[:3, :3]
-                direction = np.array([np.cos(base[2]), np.sin(base[2])])
                 pose[:2, 3] = base[:2] + forward_distance * direction
                 pose[2, 3] = self.model.description.pedestal_height + height
-                solution = self.reachable(base, pose, tally)
-                if solution is not None and self.free(base, solution, tally):
-                    return solution
-        return None
+                yield pose

@@ -9,7 +9,8 @@ import pytest
 
 from schemas.apartment import Apartment, Furniture, Thing
 from schemas.apartment import Room as Walls
-from stages.agent.body import Base, Position, Sweep
+from stages.agent.arms.stations import around
+from stages.agent.body import Base, Position, SeenFurniture, Sweep
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.scene_map import Region
 from stages.agent.world.failures import Rates
@@ -143,8 +144,28 @@ def test_a_base_goes_around_what_is_put_aside_and_back_over_it() -> None:
     room.add(Sweep(np.argwhere(np.ones((41, 41), bool)), np.zeros((0, 2), int), ()))
     room.put_aside(np.array([(2.0, 1.0), (2.0, 1.1)]))
     assert not room.fits(2.2, 1.0) and room.fits(2.5, 1.0)
+    way = room.path(Base(1.8, 1.0, 0.0), (2.5, 1.0))
+    assert way is not None and all(np.hypot(x - 2.0, y - 1.05) > 0.1 for x, y in way), "not through it from near by"
     room.put_aside(np.zeros((0, 2)))
     assert room.fits(2.2, 1.0)
+
+
+def test_a_base_gets_back_the_way_it_came() -> None:
+    room = ObstacleMap(Base(1.0, 1.0, 0.0), 2.7)
+    room.add(Sweep(np.argwhere(np.ones((31, 31), bool)), np.zeros((0, 2), int), ()))
+    for x in np.arange(1.0, 2.21, 0.05):
+        room.driven(x, 1.0 + 0.4 * (x - 1.0))
+    felt = np.array([(17, row) for row in range(31) if row not in (12, 13)])  # a gap narrower than the map takes it for
+    room.add(Sweep(np.zeros((0, 2), int), felt, ()))
+    way = room.path(Base(2.2, 1.48, 0.0), (1.0, 1.0))
+    assert way is not None and way[-1] == (1.0, 1.0)
+
+
+def test_an_open_shelf_is_stood_before_on_its_front_alone() -> None:
+    shelf = SeenFurniture("fridge", (2.0, 4.0), (0.6, 0.7), 0.9, True, True, open_to=-np.pi / 2)
+    poses = around(shelf, 0.38)
+    assert poses and all(pose.y < 3.65 for pose in poses)
+    assert len(around(replace(shelf, open_to=None), 0.38)) > len(poses)
 
 
 def test_a_drawer_is_opened_by_its_handle_and_shut() -> None:
@@ -183,7 +204,7 @@ def test_a_leaf_that_came_half_way_is_pushed_on_and_can_be_shut() -> None:
     room = body._room
     room.world.set_joint("fridge_0", room.doored["fridge_0"].joint.name, 0.9)
     assert body._pulling._push_on("furniture_0", 0.9) > 1.2 and room.joint_value("fridge_0") > 1.2
-    body._pulling._seen.moved("furniture_0", room.joint_value("fridge_0"))
+    room.world.set_joint("fridge_0", room.doored["fridge_0"].joint.name, 1.0)  # the elbow came against it, unfelt
     assert body.pull(at_front(FRIDGE), opening=False).ok and body.opened == set()
     body.close()
 

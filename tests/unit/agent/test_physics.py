@@ -16,7 +16,7 @@ from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.eyes import Surface, fuse
 from stages.agent.world.physics.grasps import FORWARD_PITCHES, antipodal_grasps, within_reach
-from stages.agent.world.physics.hands import whole_box
+from stages.agent.world.physics.hands import Target, whole_box
 from stages.agent.world.physics.head import SeenPiece, enter, steady
 from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 
@@ -39,7 +39,8 @@ ABOVE = (2.0, 2.4, 0.74)
 class PhysicsBodyStub:
     """As much of a body as a map asks for."""
 
-    base, clearance, same_thing, enough = Base(0.0, -1.0, 0.0), 2.9, 0.07, 2
+    base, same_thing, enough = Base(0.0, -1.0, 0.0), 0.07, 2
+    obstacles = ObstacleMap(base, 2.9)
 
 
 def table(x: float, width: float) -> SeenFurniture:
@@ -192,7 +193,7 @@ def test_what_the_hand_holds_is_carried_upright_and_is_no_obstacle(body: Physics
     body.sweep()
     cup = next(d for d in body.look(ABOVE, close=False).detections if d.label == "cup")
     assert body.grasp(cup.position, "cup", 0).ok
-    assert body.drive(Base(2.0, 0.8, -np.pi / 2), 1.0, "").ok
+    assert body.drive(Base(2.0, 0.8, -np.pi / 2), "").ok
     assert body._room.world.pose("cup_0")[2, 2] > 0.97
     cells = 0.1 * body.sweep().occupied
     assert len(cells) and np.hypot(*(cells - (2.0, 0.8)).T).min() > 0.6
@@ -210,8 +211,19 @@ def test_what_is_round_goes_down_to_its_foot() -> None:
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     seen = np.array([0.0, 0.0, 0.78]) + 0.035 * away[away[:, 2] > 0]
     apple = Surface("apple", seen, away[away[:, 2] > 0], "red", 0.0, 2)
-    assert apple.low[2] > 0.775 and abs(whole_box(apple, 0.74)[0][2] - 0.745) < 0.006
-    assert whole_box(apple, 0.77)[0][2] == 0.77, "it stands on something"
+    assert apple.low[2] > 0.775 and abs(whole_box(Target(apple, "", 0, 0.74))[0][2] - 0.745) < 0.006
+    assert whole_box(Target(apple, "", 0, 0.77))[0][2] == 0.77, "it stands on something"
+
+
+def test_what_stands_in_a_shelf_is_as_deep_as_it_is_wide() -> None:
+    y, z = (axis.ravel() for axis in np.meshgrid(np.linspace(-0.03, 0.03, 30), np.linspace(0.5, 0.68, 30)))
+    seen = np.column_stack([np.zeros(y.shape), y, z])  # the front of a bottle, looked at along x
+    bottle = Surface("bottle", seen, np.tile([-1.0, 0.0, 0.0], (len(y), 1)), "green", 0.0, 2)
+    for inward, ends in ((0.1, (0.0, 0.06)), (np.pi, (-0.06, 0.0))):
+        low, high = whole_box(Target(bottle, "", 0, 0.5, behind=0.2, inward=inward))
+        assert np.allclose((low[0], high[0]), ends, atol=0.004)
+    low, high = whole_box(Target(bottle, "", 0, 0.5))
+    assert high[0] - low[0] < 0.004, "on a table it is seen from above, too"
 
 
 def test_what_came_apart_is_one_piece_of_furniture() -> None:
@@ -270,7 +282,7 @@ def test_what_fell_is_seen_on_the_floor_and_taken_from_there(body: PhysicsBody) 
     assert cup.label == "cup" and np.allclose(cup.position, (2.0, 0.4, 0.02), atol=0.03)
     far, near = Base(2.0, 1.5, -np.pi / 2), Base(2.0, 0.85, -np.pi / 2)
     assert body.reaches(near, cup.position, take=True) and not body.reaches(far, cup.position, take=True)
-    assert body.drive(near, 0.7, "floor_0").ok
+    assert body.drive(near, "floor_0").ok
     assert body.grasp(cup.position, "cup", 7).ok, "where few grasps are possible the first have their turn again"
     assert body.bodies["cup_0"].on == ""
 

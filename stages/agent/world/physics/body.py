@@ -21,6 +21,9 @@ from stages.agent.world.physics.room import Body, Room
 from stages.agent.world.physics.seen import Seen
 from stages.kit.rendering.segmenter_errors import SegmenterErrors
 
+CLEARANCE = 2.9
+"""Cells of the obstacle map that the base keeps from what is occupied."""
+
 
 class PhysicsBody:
     """One episode's world in pybullet. `sought`: classes that the eyes are asked for. `close` it.
@@ -29,7 +32,7 @@ class PhysicsBody:
     no error of the eyes is: they are its own.
     """
 
-    same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.9, True
+    same_thing, stand_off, short_armed = 0.07, 0.38, True
     enough = 2
     """Two are had from one stop, a third is not: where it is driven to for one, all that was measured before is off by
     both stops' errors."""
@@ -47,7 +50,8 @@ class PhysicsBody:
         self._robot = RobotInRoom(self._room, rates, seed)
         self._asked = segmenter
         eyes = segmenter or NoisyOracle(self._room, SegmenterErrors(rates, self._robot.luck, sought))
-        seen = Seen(self._robot, self.clearance)
+        seen = Seen(self._robot, CLEARANCE)
+        self.obstacles = seen.obstacles
         self._driving = Driving(self._robot, seen)
         self._looking = Looking(self._robot, seen, eyes, sought)
         self._handling = Handling(self._robot, seen, self._looking)
@@ -76,9 +80,9 @@ class PhysicsBody:
         """Turn the head camera around."""
         return self._looking.sweep()
 
-    def drive(self, base: Base, length: float, toward: str) -> Felt:
+    def drive(self, base: Base, toward: str) -> Felt:
         """Drive along the robot's own map."""
-        return self._driving.drive(base, length, toward)
+        return self._driving.drive(base, toward)
 
     def look(self, at: Position, *, close: bool) -> Look:
         """Look at a surface, or at a thing from near by."""

@@ -20,8 +20,8 @@ TRIES = 6
 """Ways that are tried on one drive, each around what was touched on those before."""
 TOUCHES = 0.001
 """Contacts less deep do not count [m]."""
-STEP = 0.05
-"""Between poses of the base at which collisions are looked for [m]."""
+STEP, BACK_STEPS = 0.05, 2
+"""Between poses of the base at which collisions are looked for [m], and how many of them it backs off a touch."""
 
 
 class Driving:
@@ -30,7 +30,7 @@ class Driving:
     def __init__(self, robot: RobotInRoom, seen: Seen) -> None:
         self._robot, self._seen = robot, seen
 
-    def drive(self, base: Base, length: float, toward: str) -> Felt:
+    def drive(self, base: Base, toward: str) -> Felt:
         """Drive along the robot's own map; with empty hands it is moved and asked for contacts, not simulated."""
         goal = np.array([base.x, base.y, base.yaw])
         error = stop_error(self._robot.random)
@@ -58,7 +58,6 @@ class Driving:
         self._robot.error = error
         self._robot.believed = (rows[-1] if failed is None else self._robot.true_base()) + error
         self._robot.believed[2] = (self._robot.believed[2] + pi) % (2 * pi) - pi
-        self._robot.metres += length
         if toward:
             self._robot.log.done("drive", f"drive to {toward.rsplit('_', 1)[0]}", failed is None, "navigation", "")
         return Felt(True) if failed is None else Felt(False, "no_way", failed.failure)
@@ -66,8 +65,10 @@ class Driving:
     def _roll_along(self, start: np.ndarray, rows: list[np.ndarray]) -> MotionFailed | None:
         arm = self._robot.arm + self._robot.joint_error
         if self._robot.hold is not None:
+            way = np.array([start, *rows])
+            self._robot.metres += float(np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1).sum())
             try:
-                self._robot.driver.follow(Segment(_whole_body_rows(np.array([start, *rows]), arm), 0.0), None)
+                self._robot.driver.follow(Segment(_whole_body_rows(way, arm), 0.0), None)
             except MotionFailed as failed:
                 if failed.failure.kind == "path_blocked":
                     return failed
@@ -84,23 +85,43 @@ class Driving:
                 struck = next((name for name, depth in now.items() if depth > before.get(name, TOUCHES)), None)
                 before = now
                 if struck is not None:
-                    self._remember(struck)
+                    at_fault = self._remember(struck)
                     back = here + (row - here) * (k - 1) / count
-                    self._robot.driver.put(Configuration(back, arm, opening))
+                    self._robot.driver.put(Configuration(self._backed_off(back, arm, at_fault), arm, opening))
                     what = self._robot.room.world.bodies[struck].record.class_name
                     return MotionFailed("path_blocked", f"the base touched {what}", (what,))
-            self._robot.seconds_aside += float(np.linalg.norm((row - here)[:2])) / self._robot.description.base_speed
+                self._seen.obstacles.driven(*(at + self._robot.error)[:2])
+            rolled = float(np.linalg.norm((row - here)[:2]))
+            self._robot.metres += rolled
+            self._robot.seconds_aside += rolled / self._robot.description.base_speed
             here = row
         self._robot.driver.put(Configuration(here, arm, opening))
         self._robot.seconds_aside += 1.0
         return None
 
-    def _remember(self, struck: str) -> None:
-        """Enter into the map where the base was felt to touch something that the eyes took for free."""
+    def _remember(self, struck: str) -> np.ndarray:
+        """Enter into the map where the base was felt to touch something that the eyes took for free; return the middle
+        (2,) of that, of the true room."""
         contacts = self._robot.room.world.contacts(self._robot.driver.robot.body_id)
         of_it = [c for c in contacts if self._robot.room.world.name_of(c.other_body) == struck and c.depth > TOUCHES]
         cells = {cell_of(*(c.point[:2] + self._robot.error[:2])) for c in of_it}
         self._seen.obstacles.add(Sweep(np.zeros((0, 2), int), np.array(sorted(cells), int).reshape(-1, 2), ()))
+        return np.mean([c.point[:2] for c in of_it], axis=0)
+
+    def _backed_off(self, base: np.ndarray, arm: np.ndarray, touched: np.ndarray) -> np.ndarray:
+        """Return the base pose (3,) farther from where it touched something (2,), as far as nothing is touched more for
+        it: leaning on it, no way would lead on."""
+        away = base[:2] - touched
+        step = np.array([*(away / max(np.linalg.norm(away), 1e-6) * STEP), 0.0])
+        self._robot.driver.robot.set_body(np.concatenate([base, arm]))
+        before = self._touched()
+        for _ in range(BACK_STEPS):
+            self._robot.driver.robot.set_body(np.concatenate([base + step, arm]))
+            now = self._touched()
+            if any(depth > before.get(name, TOUCHES) for name, depth in now.items()):
+                break
+            base, before = base + step, now
+        return base
 
     def _touched(self) -> dict[str, float]:
         """Return what the robot stands in, the floor aside, and how deep [m]."""

@@ -38,15 +38,17 @@ class Handling:
 
     def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
         """Whether a free arm pose over a position exists in the robot's own map, from a base pose; to `take` what was
-        seen there a grasp of it."""
+        seen there a grasp of it, from where it stands as seen from there."""
         self._robot.beliefs.hold(None)
         pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
         forward = front is not None and not front.slides
         if front is not None and forward and not front.before(pose):
             return False
+        if take and base == self._robot.base:
+            self._see_from_here(at)
         target = self._target(at, 0, base) if take else None
         if target is not None:
-            return graspable(self._robot.beliefs, pose, target, np.random.default_rng(5))
+            return graspable(self._robot.beliefs, pose, target, _chance(0))
         self._robot.beliefs.show(self._seen.boxes(at, base))
         return reachable(self._robot.beliefs, pose, at, np.random.default_rng(5), forward=forward)
 
@@ -86,7 +88,7 @@ class Handling:
         target = self._target(at, candidate)
         if target is None:
             raise MotionFailed("no_grasp", "no surface was seen there")
-        motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, self._robot.random)
+        motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, _chance(candidate))
         self._robot.grasps += 1
         self._robot.carry_out(motion.there)
         self._close_hand()
@@ -226,3 +228,8 @@ class Handling:
             for x, y, _ in [self._robot.room.lies(name)]
         ]
         return min(near)[1] if near and min(near)[0] <= FOUND_WITHIN else ""
+
+
+def _chance(candidate: int) -> np.random.Generator:
+    """Return what a grasp is planned with: what was found to be possible is found again when it is done."""
+    return np.random.default_rng((5, candidate))

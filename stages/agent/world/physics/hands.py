@@ -30,6 +30,8 @@ NEXT = 3
 """Grasps that have their turn last after one slipped."""
 APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
 """Of the hand before and after it closes, and after it does behind a front [m]."""
+CLEAR = 0.04
+"""What comes out of a shelf is so far before its front before it goes anywhere else [m]."""
 DROP = 0.15
 """Height over its target at which the thesis lets go [m]."""
 JUST_OVER = 0.008
@@ -265,11 +267,16 @@ def _inside(surface: Surface) -> np.ndarray:
     return np.all((surface.points > surface.low - slack) & (surface.points < surface.high + slack), axis=1)
 
 
-def whole_box(surface: Surface, floor: float) -> Box:
+def whole_box(target: Target) -> Box:
     """Return the box of a thing, down to where it ends if it is as high as it is wide, or to what it stands on: the
-    lower half of what is round was not seen."""
-    low, high = surface.low.copy(), surface.high
-    low[2] = max(min(low[2], high[2] - (high - low)[:2].min()), min(low[2], floor))
+    lower half of what is round was not seen. Of what stands in a shelf the back was not: it is as deep as wide."""
+    low, high = target.surface.low.copy(), target.surface.high.copy()
+    low[2] = max(min(low[2], high[2] - (high - low)[:2].min()), min(low[2], target.floor))
+    if target.behind > 0:
+        inward = np.array([np.cos(target.inward), np.sin(target.inward)])
+        along = int(np.abs(inward).argmax())
+        back = high if inward[along] > 0 else low
+        back[along] += np.sign(inward[along]) * max(0.0, (high - low)[1 - along] - (high - low)[along])
     return low, high
 
 
@@ -285,7 +292,7 @@ def _one_grasp(
     approach, lift = way
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
-    low, high = whole_box(target.surface, target.floor)
+    low, high = whole_box(target)
     box = np.eye(4)
     box[:3, 3] = (low + high) / 2
     hold = Hold(
@@ -298,13 +305,14 @@ def _one_grasp(
     beliefs.world.set_pose(target.name, _far())
     beliefs.hold(hold)
     checker.allow(touch=(HELD,))
-    folded = planner.folded(base, lift[-1], tally)
-    if folded is not None:
-        hold = replace(hold, home=folded)
-    home = planner.path(base, lift[-1], hold.home)
+    home = planner.folding(base, lift[-1], Tally())
+    if home is None:
+        folded = planner.folded(base, lift[-1], tally)
+        home = planner.path(base, lift[-1], hold.home if folded is None else folded)
+    hold = replace(hold, home=home[-1])
     return Motion(
         (Segment(whole_body(base, reach), opening), Segment(whole_body(base, approach[::-1]), opening, SLOW)),
-        (Segment(whole_body(base, lift), 0.0, SLOW), Segment(whole_body(base, home), 0.0, 0.6)),
+        (Segment(whole_body(base, lift), 0.0, SLOW), Segment(whole_body(base, home), 0.0, SLOW)),
         hold,
     )
 
@@ -333,8 +341,8 @@ def _way_in(
     lift = planner.line(base, at, above, tally)
     if lift is None or target.behind == 0:
         return None if lift is None else (approach, lift)
-    out = above.copy()
-    out[:2, 3] -= (APPROACH + target.behind) * out[:2, 2] / np.linalg.norm(out[:2, 2])
+    out, (low, high) = above.copy(), whole_box(target)
+    out[:2, 3] -= (CLEAR + float((high - low)[:2].max()) + target.behind) * out[:2, 2] / np.linalg.norm(out[:2, 2])
     way_out = planner.line(base, lift[-1], out, tally)
     return None if way_out is None else (approach, np.concatenate([lift, way_out[1:]]))
 

@@ -52,11 +52,17 @@ NOTHING_GRIPPED = 0.01
 """Opening of the fingers below which they hold no bar [m]."""
 PRESS, OVERSHOOT = 0.006, 0.02
 """The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
+PUSHES = 4
+"""To shut a front, at most: something may be in the way of one."""
 NOTICED = 0.1
 """Of an angle by which it pays to push a leaf on [rad]."""
 SHARES = (1.0, 0.75, 0.5)
 """Of what a door opens to, tried one after the other."""
+FAR_OUT = 1.1
+"""The same of a drawer first: what lies at its back is under the furniture's edge otherwise, and the hand is wide."""
 SAMPLES = 500
+SEEN_TO = 0.15
+"""How well the eyes tell how far a front is open [rad] or [m]."""
 HERE = 0.12
 """A base this near to one that is asked for stands there [m]."""
 LOOKS_IN = ((0.6, 0.15), (0.6, 0.28), (0.6, 0.02))
@@ -152,8 +158,8 @@ class Pulling:
         if np.hypot(*(pose[:2] - here[:2])) < HERE and abs(turn) < 0.6:
             return True
         base = Base(float(pose[0]), float(pose[1]), float(pose[2]))
-        length = self._seen.obstacles.way(self._robot.base, (base.x, base.y))
-        return bool(np.isfinite(length)) and self._driving.drive(base, length, f"{label}_0").ok
+        known = np.isfinite(self._seen.obstacles.way(self._robot.base, (base.x, base.y)))
+        return bool(known) and self._driving.drive(base, f"{label}_0").ok
 
     # ---- open ----
 
@@ -176,15 +182,10 @@ class Pulling:
         """Push a leaf that came less far than it should on from inside: half open it is in the way of base and elbow.
         Return where it is seen then."""
         self._seen.moved(name, value)
-        front, tally = self._seen.fronts[name], Tally()
+        front = self._seen.fronts[name]
         end = open_value(front.joint)
-        for base in self._bases(front) if value < end - NOTICED else ():
-            if self._push(front, base, end, tally) is None or not self._go(base, front.label):
-                continue
-            motion = self._push(front, self._robot.believed, end, tally)
-            if motion is not None:
-                return self._pushed(front, motion)
-        return value
+        pushed = self._pushed_toward(front, (end,), Tally()) if value < end - NOTICED else None
+        return value if pushed is None else pushed
 
     def _pushed(self, front: Front, motion: Manipulation) -> float:
         """Carry out a push; something behind a leaf may stop it."""
@@ -209,7 +210,7 @@ class Pulling:
         handle = np.array(joint.handle)
         bar = np.array(joint.handle_axis)
         inward = closing_direction(joint, handle)
-        for share in SHARES:
+        for share in (FAR_OUT, *SHARES) if front.slides else SHARES:
             values = arc_values(front.value, share * open_value(joint))
             for pitch in PITCHES:
                 contact = ContactPoint(handle, np.array([*(np.cos(pitch) * inward[:2]), -np.sin(pitch)]))
@@ -267,10 +268,12 @@ class Pulling:
         return max(0.0, front.felt(self._tool(robot.measured_arm()), shut)), False
 
     def _seen_open(self, front: Front, value: float) -> float:
-        """Return how far a front is open as seen from here; where it is not seen, the `value` that was felt."""
+        """Return how far a front is open as seen from here; the `value` that was felt, which is finer, where it is not
+        seen or the eyes say about the same."""
         handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
         seen = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
-        return max(0.0, front.value_seen(max(seen, key=lambda s: len(s.points)).points)) if seen else value
+        found = max(0.0, front.value_seen(max(seen, key=lambda s: len(s.points)).points)) if seen else value
+        return value if abs(found - value) < SEEN_TO else found
 
     def _tool(self, arm: np.ndarray) -> np.ndarray:
         """Return the tool point (3,) of the map for joint values (7,)."""
@@ -293,34 +296,41 @@ class Pulling:
     # ---- shut ----
 
     def _shut(self, name: str) -> float:
-        """Push a front shut; return how far it is still open by the arm's joints. Raises MotionFailed."""
-        front = self._seen.fronts.get(name)
-        if front is None:
+        """Push a front shut, as often as it takes; return how far it is still open by the arm's joints, of a leaf by
+        the eyes. Raises MotionFailed."""
+        if name not in self._seen.fronts:
             raise MotionFailed("no_grasp", "the robot knows of no open door there", (name,))
         tally = Tally()
-        for end in (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value):
-            for base in self._bases(front, shutting=True):
-                if self._push(front, base, end, tally) is None or not self._go(base, front.label):
-                    continue
-                motion = self._push(front, self._robot.believed, end, tally)
-                if motion is None:
-                    continue
-                value = self._carry_out(front, motion)
-                if end < 0 or is_closed(front.joint, value):
-                    return value
-                self._seen.moved(name, value)
-                return self._shut_rest(self._seen.fronts[name], value, tally)
-        tally.raise_for(f"close({front.name})", (front.name,))
-        raise AssertionError("unreachable")
+        for number in range(PUSHES):
+            front = self._seen.fronts[name]
+            if not front.slides and not number:  # the arm may have come against it since
+                front = self._seen.moved(name, self._seen_open(front, front.value))
+            value = self._pushed_toward(front, (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value), tally)
+            if value is None and not self._look_from_elsewhere(name, number):
+                tally.raise_for(f"close({name})", (name,))
+            if value is not None and is_closed(front.joint, self._seen.moved(name, value).value):
+                break
+        return self._seen.fronts[name].value
 
-    def _shut_rest(self, front: Front, value: float, tally: Tally) -> float:
-        """Push what was pushed half shut the rest of the way."""
-        for base in self._bases(front, shutting=True):
-            if self._push(front, base, -OVERSHOOT, tally) is not None and self._go(base, front.label):
-                motion = self._push(front, self._robot.believed, -OVERSHOOT, tally)
-                if motion is not None:
-                    return self._carry_out(front, motion)
-        return value
+    def _look_from_elsewhere(self, name: str, number: int) -> bool:
+        """Look at a leaf that cannot be pushed as it was seen from another base pose; whether there is one."""
+        front = self._seen.fronts[name]
+        for base in [] if front.slides else list(self._bases(front, shutting=True))[number + 1 :]:
+            if self._go(base, front.label):
+                self._seen.moved(name, self._seen_open(front, front.value))
+                return True
+        return False
+
+    def _pushed_toward(self, front: Front, ends: tuple[float, ...], tally: Tally) -> float | None:
+        """Push a front to the first of some values that the arm can push it to; return where it is then, None where it
+        can to none of them."""
+        for end in ends:
+            for base in self._bases(front, shutting=end < front.value):
+                if self._push(front, base, end, tally) is not None and self._go(base, front.label):
+                    motion = self._push(front, self._robot.believed, end, tally)
+                    if motion is not None:
+                        return self._pushed(front, motion)
+        return None
 
     def _push(self, front: Front, base: np.ndarray, end: float, tally: Tally) -> Manipulation | None:
         """Return the motion that pushes a front from where it is to a value, from a base pose (3,), or None."""

@@ -58,7 +58,11 @@ class Seen:
         piece = self.pieces[number]
         low, high = piece.box
         front = self.fronts.get(f"furniture_{number}")
-        if front is not None and front.slides and front.value > 0:
+        opened = front is not None and front.value > 0
+        outward: float | None = None
+        if front is not None and opened and not front.slides:
+            outward = float(np.arctan2(*front.map_from_front[1::-1, 0]))
+        if front is not None and opened and front.slides:
             ends = zip(footprint(front, NEARER), (low[2], high[2]), strict=True)
             low, high = (np.array([*corner, z]) for corner, z in ends)
         centre, size = (low + high) / 2, np.maximum(high - low, 0.1)
@@ -68,7 +72,8 @@ class Seen:
             (float(size[0]), float(size[1])),
             float(high[2]),
             piece.label in (*WITH_DRAWERS, *WITH_LEAVES),
-            front is not None and front.value > 0,
+            opened,
+            outward,
         )
 
     def keep_floor(self, picture: Picture, map_from_camera: np.ndarray, front: Front) -> None:
@@ -81,11 +86,12 @@ class Seen:
             floor = float(np.median(heights[np.abs(heights - level) < 0.006]))
             self.fronts[front.name] = replace(self.fronts[front.name], floor=floor)
 
-    def moved(self, name: str, value: float) -> None:
-        """Believe that the door of furniture is open so far, 0: shut; the base goes around it."""
+    def moved(self, name: str, value: float) -> Front:
+        """Believe that the door of furniture is open so far, 0: shut; the base goes around it. Return its front."""
         self.fronts[name] = replace(self.fronts[name], value=value)
         outlines = [front.outline() for front in self.fronts.values() if front.value > 0]
         self.obstacles.put_aside(np.concatenate([*outlines, np.zeros((0, 2))]))
+        return self.fronts[name]
 
     def of_parts(self, points: np.ndarray) -> np.ndarray:
         """Return (N,) bool: points (N, 3) of leaves and drawers, which are no lasting obstacles."""
