@@ -14,9 +14,9 @@ from stages.agent.trials import Setting, run_trial
 from stages.agent.world.failures import Rates
 
 GROUP = "apartments"
-TUNING = (*range(60), *range(3000, 3100))
+TUNING = (*range(60), *range(3000, 3120))
 """Versions 2, 4 and 5 were reported on seeds 3000, 3001 and 3002, version 6 on some of those up to 3022, version 7 on
-3030 to 3049, version 8 on 3060 to 3079, version 9 on 3080 to 3099."""
+3030 to 3049, version 8 on 3060 to 3079, version 9 on 3080 to 3099, version 10 on 3100 to 3119."""
 ARMS = ("open_loop", "bool_feedback", "thesis", "ours", "oracle")
 WITH_DOORS = ("fridge_bottle", "drawer_spoon")
 IMPOSSIBLE = ("absent_teapot", "high_shelf")

@@ -95,7 +95,7 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
 
 RUN = Stage(
     name="agent run",
-    version=11,
+    version=12,
     summary="Tell a mobile robot in words what to do in an apartment that it has never seen (COME-robot)",
     parameters=RunParameters,
     reads={
@@ -114,7 +114,7 @@ RUN = Stage(
 )
 REPLAY = Stage(
     name="agent replay",
-    version=11,
+    version=12,
     summary="Do an episode again with the programs that its brain wrote: the same bytes, nobody is asked",
     parameters=ReplayParameters,
     reads={"episode": AgentEpisode},

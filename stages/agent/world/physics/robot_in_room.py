@@ -66,7 +66,9 @@ class RobotInRoom:
         self.believed = np.array([x, y, yaw])
         self.arm = self.description.carry
         start = Configuration(self.believed, self.arm + self.joint_error, self.description.opening)
-        self.driver = PhysicalRobot(room.world, self.description, start, record_rate=1.0)
+        # a hand's fingers go together: with a motor each, what they hold slides between them by centimetres
+        hand = replace(self.description, coupled_fingers=True)
+        self.driver = PhysicalRobot(room.world, hand, start, record_rate=1.0)
         self.driver.put(start)
         self.hold: Hold | None = None
         """What it believes to hold."""
