@@ -14,15 +14,16 @@ from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from stages.kit.motion.cartesian import follow, straight_poses
 from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import ArmChain, forward, inverse_kinematics, joint_frames, random_starts, reach
+from stages.kit.motion.kinematics import ArmChain, forward, inverse_kinematics, random_starts, reach
 from stages.kit.motion.path_query import Query
 from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
 from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.robot_description import RobotDescription
 
-FOLDED_OUT = 0.01
-"""The joints of a folded arm are so much farther from the axis of the pedestal than as it carries, at most [m]."""
+WRIST, AS_CARRIED = 3, 1.0
+"""Joints that turn the hand alone, and how far those before them are from where the arm carries, at most, in an arm
+that is folded [rad]: with its elbow held otherwise it would stand in furniture."""
 ARM_RESOLUTION = 0.05
 """Largest step of a joint between two checks [rad]."""
 
@@ -166,18 +167,13 @@ class ArmPlanner:
 
     def folding(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (K, J) from `arm` (J,) along a straight line of the tool to where it is `folded`: what is
-        held stays upright on the way, too. None where no such line is free, or leaves the elbow stuck out."""
-        limit = self._sticks_out(self.model.description.carry) + FOLDED_OUT
+        held stays upright on the way, too. None where no such line is free, or each leaves the elbow elsewhere."""
+        carry = self.model.description.carry
         for pose in self._drawn_in(base, arm):
             line = self.line(base, arm, pose, tally)
-            if line is not None and self._sticks_out(line[-1]) < limit:
+            if line is not None and np.abs(line[-1] - carry)[:-WRIST].max() < AS_CARRIED:
                 return line
         return None
-
-    def _sticks_out(self, arm: np.ndarray) -> float:
-        """Return how far from the pedestal's axis the outermost joint is [m], the tool aside."""
-        joints = base_pose(np.zeros(3), self.model.description) @ joint_frames(self.model.chain, arm)[:-1]
-        return float(np.hypot(joints[:, 0, 3], joints[:, 1, 3]).max())
 
     def _drawn_in(self, base: np.ndarray, arm: np.ndarray) -> Iterator[np.ndarray]:
         """Yield poses (4, 4) of the tool over the pedestal, turned from where it is about the vertical alone."""

@@ -236,17 +236,11 @@ def _search(
 
 def forward(chain: ArmChain, arm: np.ndarray) -> np.ndarray:
     """Return base_from_tool (4, 4) of joint values (J,)."""
-    frame: np.ndarray = joint_frames(chain, arm)[-1]
-    return frame
-
-
-def joint_frames(chain: ArmChain, arm: np.ndarray) -> np.ndarray:
-    """Return base_from_joint of every joint, and base_from_tool last, (J + 1, 4, 4) of joint values (J,)."""
     frames = np.zeros((len(chain.fixed) + 1, 4, 4))
     frames[:, 3, 3] = 1.0
     _frames(chain.fixed, chain.tool, np.ascontiguousarray(arm, dtype=float), frames)
     frames[-1, 3] = (0, 0, 0, 1)
-    return frames
+    return frames[-1]
 
 
 def shoulder_height(chain: ArmChain) -> float:
