@@ -17,7 +17,7 @@ from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
 from stages.kit.motion.segments import Manipulation, Segment, whole_body
 from stages.kit.simulation.robot import Configuration
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
-from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
+from stages.plan.placements import PLACES, Placement, place_regions, room_left, sample_placements
 from stages.plan.rim_grasps import rim_grasps
 from stages.plan.tray_loading import lifts_left, load_moments
 from stages.plan.world_model import RobotState, WorldModel
@@ -124,11 +124,13 @@ def plan_pick(
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
     style: GraspStyle = "any",
+    base: np.ndarray | None = None,
 ) -> Manipulation:
     """Return the motion that takes `item` off (or out of) `source`, base pose included.
 
     `preferred` (base (3,), body_from_tool (4, 4)) is tried first. `style` is what the place where it goes next asks
-    for. Raises MotionFailed: `no_grasp` when the item is too wide for the gripper, otherwise what ended most attempts.
+    for; `base` (3,): from there or not at all. Raises MotionFailed: `no_grasp` when the item is too wide for the
+    gripper, otherwise what ended most attempts.
     """
     world_from_item = model.pose(item)
     points, normals = model.surface(item)
@@ -156,7 +158,7 @@ def plan_pick(
     tally = Tally()
     checker = model.checker
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
-    bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, None)
+    bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, base)
     queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
     if model.laden(item):
         moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
@@ -173,7 +175,7 @@ def plan_pick(
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     checker.allow(touch=model.links(item))
     try:
-        attempts = (_try_pick(model, state, item, source, base, grasp, arm_planner, tally) for base, grasp in queue)
+        attempts = (_try_pick(model, state, item, source, at, grasp, arm_planner, tally) for at, grasp in queue)
         motion = _first_motion(attempts, budgets.paths)
         if motion is not None:
             return motion
@@ -306,11 +308,14 @@ def plan_place(
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
+    base: np.ndarray | None = None,
+    further: tuple[str, ...] = (),
 ) -> Manipulation:
     """Return the motion that puts the held `item` down on `target`, or in it behind `door`, base pose included.
 
-    `preferred` (base (3,), world_from_item (4, 4)) is tried first. Raises MotionFailed: `no_placement` when no
-    free place there carries the item's footprint, otherwise what ended most attempts.
+    `preferred` (base (3,), world_from_item (4, 4)) is tried first; `base` (3,): from there or not at all; `further`:
+    what is put there later. Raises MotionFailed: `no_placement` when no free place there carries the item's footprint,
+    otherwise what ended most attempts.
     """
     assert state.tool_from_item is not None
     on_tray = model.records[target].carriable
@@ -327,7 +332,11 @@ def plan_place(
         left = lifts_left(
             model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
         )
-        order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
+        room = room_left(model, target, item, places, further, random)
+        most = 0.5 * room.max()  # places that leave less than half as much room as others come last
+        order = sorted(
+            range(len(places)), key=lambda index: (room[index] < most, not places[index].roomy, -left[index])
+        )
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
@@ -340,13 +349,16 @@ def plan_place(
     checker.allow(touch=model.links(item))
     for place in places[: max(4, budgets.bases // 6)]:
         goal = place.world_from_item[:3, 3]
-        bases = possible_bases(model.description, state.base, goal, model.room, budgets.bases // 8, random)
-        bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
-        queue += [(base, place) for base in bases]
+        if base is None:
+            bases = possible_bases(model.description, state.base, goal, model.room, budgets.bases // 8, random)
+            bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
+        else:
+            bases = base[None]
+        queue += [(at, place) for at in bases]
     try:
         attempts = (
-            _try_place(model, state, item, target, base, place, arm_planner, tally)
-            for base, place in queue[: budgets.pairs]
+            _try_place(model, state, item, target, at, place, arm_planner, tally)
+            for at, place in queue[: budgets.pairs]
         )
         motion = _first_motion(attempts, budgets.paths)
         if motion is not None:

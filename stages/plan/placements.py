@@ -77,6 +77,35 @@ def sample_placements(
     return sorted(mixed, key=lambda place: not place.roomy)
 
 
+def room_left(
+    model: WorldModel,
+    target: str,
+    item: str,
+    places: list[Placement],
+    further: tuple[str, ...],
+    random: np.random.Generator,
+) -> np.ndarray:
+    """Return (P,) numbers of places on `target` that an item at each of P places leaves to the one of `further` that
+    then has fewest; zeros where nothing further comes.
+
+    Things are as wide as their feet, circles; what stands there already counts.
+    """
+    feet = np.array([place.world_from_item[:2, 3] for place in places]).reshape(-1, 2)
+    standing = [
+        (apply(model.pose(name), np.zeros((1, 3)))[0, :2], model.footprint(name)[0]) for name in model.load(target)
+    ]
+    left = []
+    for other in further:
+        radius = model.footprint(other)[0]
+        spots = np.array([p.world_from_item[:2, 3] for p in sample_placements(model, other, target, None, random)])
+        spots = spots.reshape(-1, 2)
+        for foot, own in standing:
+            spots = spots[np.linalg.norm(spots - foot, axis=1) > radius + own]
+        away = np.linalg.norm(feet[:, None] - spots[None], axis=2)
+        left.append((away > radius + model.footprint(item)[0]).sum(axis=1))
+    return np.min(left, axis=0) if left else np.zeros(len(places), dtype=int)
+
+
 def _height(model: WorldModel, region: Region) -> float:
     middle = np.array([*(region.low + region.high) / 2, region.level])
     return float(apply(model.world_from_region(region), middle)[2])

@@ -66,6 +66,17 @@ def grasp_style(model: WorldModel, item: str, following: list[tuple[str, tuple[s
     return "any"
 
 
+def put_there_later(
+    name: str, arguments: tuple[str, ...], following: list[tuple[str, tuple[str, ...]]]
+) -> tuple[str, ...]:
+    """Return what later actions, (name, arguments), put where an action puts something."""
+    if action_named(name).hand != "puts":
+        return ()
+    return tuple(
+        later[0] for other, later in following if action_named(other).hand == "puts" and later[1] == arguments[1]
+    )
+
+
 def refine_action(
     model: WorldModel, state: RobotState, name: str, request: MotionRequest, origin: str
 ) -> tuple[list[Step], RobotState]:
@@ -134,9 +145,9 @@ def refine_plan(
                 continue
             style = grasp_style(model, arguments[0], plain[place + 1 :]) if kind.hand == "takes" else "any"
             try:
-                own, state = refine_action(
-                    model, state, kind.name, MotionRequest(arguments, budgets, random, style=style), origin
-                )
+                further = put_there_later(kind.name, arguments, plain[place + 1 :])
+                request = MotionRequest(arguments, budgets, random, style=style, further=further)
+                own, state = refine_action(model, state, kind.name, request, origin)
             except MotionFailed as failed:
                 failure = failed.failure.model_copy(update={"action": action.text})
                 raise RefinementFailed(place, action, failure) from None
