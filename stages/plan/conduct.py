@@ -145,7 +145,7 @@ class Conduct:
                 further = put_there_later(name, arguments, following)
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style, further=further)
                 again = self.eyes is not None and self.eyes.again
-                before = self.model.snapshot() if again else None
+                before = self.model.snapshot()
                 steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
@@ -153,12 +153,14 @@ class Conduct:
                     break
                 continue
             try:
-                if before is not None and steps[0].name == DRIVE:
-                    steps, after = self._look_from_there(before, state, steps, request, origin)
+                if again and steps[0].name == DRIVE:
+                    steps, after, before = self._look_from_there(before, state, steps, request, origin)
                 for offset, step in enumerate(steps):
                     self.physical.action = number + min(offset, len(group) - 1)
+                    if action.hand == "puts" and step.manipulation is not None:
+                        step, after = self._held_still(before, step, after, request, origin)
                     self._execute(step)
-                    self._check_joints(step, ended=step is steps[-1])
+                    self._check_joints(step, ended=offset == len(steps) - 1)
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 lost = state.holding is not None and self.physical.held is None
@@ -182,8 +184,9 @@ class Conduct:
 
     def _look_from_there(
         self, before: Snapshot, state: RobotState, steps: list[Step], request: MotionRequest, origin: str
-    ) -> tuple[list[Step], RobotState]:
+    ) -> tuple[list[Step], RobotState, Snapshot]:
         """Carry out the drive that an action begins with, look once more from there and return the steps from there on,
+        the state after them and the model before them,
         with the grasp or place of the planned ones where it still serves. Where nothing serves from there it drives and
         looks again, so that nothing is taken by what was seen from elsewhere. `before`: the model before they were
         planned. Raises MotionFailed."""
@@ -192,6 +195,7 @@ class Conduct:
             self._execute(drive)
             there = replace(state, base=drive.segments[-1].path[-1, :3])
             self.model.restore(before)
+            there = self._perceived(there)
             hold_for_checks(self.model, there)
             preferred = self._looked(step, self._anchor(step))
             if preferred is not None:
@@ -199,13 +203,37 @@ class Conduct:
             before = self.model.snapshot()
             wish = replace(request, preferred=preferred)
             try:
-                return refine_action(self.model, there, step.name, self._measured(wish, there.base), origin)
+                measured = self._measured(wish, there.base)
+                return *refine_action(self.model, there, step.name, measured, origin), before
             except MotionFailed:
                 steps, after = refine_action(self.model, there, step.name, wish, origin)
             if steps[0].name != DRIVE or look == LOOKS - 1:
                 break
             state = there
-        return steps, after
+        return steps, after, before
+
+    def _held_still(
+        self, before: Snapshot, step: Step, after: RobotState, request: MotionRequest, origin: str
+    ) -> tuple[Step, RobotState]:
+        """Bring what is held over the place where it is put and return the step from there on, planned anew for how it
+        lies in the hand by then: fingers give way sideways on the way. `before`: the model before the step was planned.
+        Raises MotionFailed as `PhysicalRobot.follow` does."""
+        item, motion = step.arguments[0], step.manipulation
+        assert motion is not None
+        if self.model.laden(item) or motion.item_pose is None:
+            return step, after
+        self.physical.follow(step.segments[0], None)
+        rest = replace(step, segments=step.segments[1:])
+        self.model.restore(before)
+        over = RobotState(motion.base, step.segments[0].path[-1, 3:], item)
+        over = self._perceived(over)
+        wish = replace(request, base=motion.base, preferred=(motion.base, motion.item_pose))
+        try:
+            steps, anew = refine_action(self.model, over, step.name, wish, origin)
+        except MotionFailed:  # as it was meant to be, then
+            action_named(step.name).move_things(self.model, step.arguments, motion)
+            return rest, after
+        return steps[-1], anew
 
     @staticmethod
     def _measured(request: MotionRequest, base: np.ndarray) -> MotionRequest:

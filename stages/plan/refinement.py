@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from schemas.plan import Failure, TriedPlan
-from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.segments import Manipulation, Segment
 from stages.kit.tasks.fast_downward import plan_with_fast_downward
@@ -16,6 +15,7 @@ from stages.kit.tasks.strips import Atom, GroundAction, Problem, apply_action, a
 from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
 from stages.plan.action import MotionRequest, action_named
 from stages.plan.domain import DOMAIN, START
+from stages.plan.driving import drive_way
 from stages.plan.learning import Lessons
 from stages.plan.pick_place import Budgets, GraspStyle
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
@@ -92,15 +92,7 @@ def refine_action(
         action.begin(model, arguments)
         for manipulation in action.manipulate(model, state, request):
             hold_for_checks(model, state)
-            path = plan_drive(
-                state.base,
-                manipulation.base,
-                state.arm,
-                model.checker,
-                model.room,
-                request.random,
-                samples=request.budgets.path_samples,
-            )
+            path = drive_way(model, state, manipulation.base, request.random, request.budgets.path_samples)
             manipulation, path = _same_turns(model, manipulation, path)
             rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
             pace = LADEN_PACE if state.holding is not None and model.laden(state.holding) else 1.0
