@@ -19,7 +19,7 @@ from stages.plan.correspondence import alike
 from stages.plan.erring_robot import ErringRobot
 from stages.plan.eyes import CELL, NEAR_BY, Room, Seen
 from stages.plan.pictures import RoomPictures
-from stages.plan.pose_fit import fit_joint, fit_upright
+from stages.plan.pose_fit import fit_joint, fit_upright, misfit
 from stages.plan.scaled_body import scaled_text
 from stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
 from stages.plan.thing_fit import fit_thing
@@ -40,10 +40,10 @@ HIDDEN = 0.015
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
-POINTS, FURNITURE_POINTS = 1500, 3000
-"""Of a shape that is fitted; of each part of furniture."""
+POINTS, FURNITURE_POINTS, SEEN_POINTS = 1500, 3000, 2000
+"""Of a shape that is fitted; of each part of furniture, and of what is seen of it."""
 MOST_MOVED = 0.1
-"""Furniture stands no farther from where it is believed [m]."""
+"""Furniture stands no farther from where the map has it [m]."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,9 @@ class CameraEyes:
         self._errors, self._random, self._radius = errors, random, radius
         self._names = dict(enumerate(room.records, start=1))
         """Instance number of a picture -> body of the room."""
+        self._mapped = {name: model.pose(name) for name, record in model.records.items() if not record.carriable}
+        """Furniture -> where the map has it (4, 4)."""
+        self._parts: dict[str, dict[str, np.ndarray]] = {}
         self._carriers: dict[str, SeenCarrier] = {}
         """Planned body -> its shape, as the last look showed it that showed all of it."""
 
@@ -141,20 +144,30 @@ class CameraEyes:
         self, body: str, points: np.ndarray, joints: dict[str, float]
     ) -> tuple[np.ndarray, dict[str, float]]:
         """Return how furniture stands from where it is believed (4, 4), and the joint values at which it fits the
-        points (N, 3), joint by joint: joints, place, and joints again, as an open door tells nothing of where a shut
-        one stands."""
-        model, found = self._model, dict(joints)
-        shapes = {
-            link: surface_points(meshes, FURNITURE_POINTS, np.random.default_rng(0))[0]
-            for link, meshes in link_shapes(model.text(body)).items()
-        }
+        points (N, 3): by turns place and joints, begun with either, whichever fits better. An open door tells nothing
+        of where a shut one stands, furniture beside its place nothing of how far a door is open."""
+        points = points[:: max(1, len(points) // SEEN_POINTS)]
+        fits = [self._by_turns(body, points, joints, turns) for turns in (2, 3)]
+        return min(fits, key=lambda fit: fit[0])[1:]
+
+    def _by_turns(
+        self, body: str, points: np.ndarray, joints: dict[str, float], turns: int
+    ) -> tuple[float, np.ndarray, dict[str, float]]:
+        """Return the misfit [m], the motion (4, 4) and the joint values after so many fits of the joints, each but
+        the first of two after one of the place."""
+        model, found, motion = self._model, dict(joints), np.eye(4)
+        shapes = self._parts_of(body)
 
         def points_at(values: dict[str, float]) -> np.ndarray:
             with model.world.joints_at(body, values):
                 return np.concatenate([apply(model.world.link_pose(body, k), own) for k, own in shapes.items()])
 
-        motion = np.eye(4)
-        for turn in range(2):
+        for turn in range(turns):
+            if turn > 0 or turns > 2:
+                moved = fit_upright(points, points_at(found), as_believed=True)
+                if self._off_its_place(body, moved) > MOST_MOVED:
+                    break  # that is no error of a map: something else was fitted
+                motion = moved
             seen = apply(inverse(motion), points)
             for joint in model.records[body].joints:
 
@@ -162,11 +175,24 @@ class CameraEyes:
                     return points_at(found | {name: value})
 
                 found[joint.name] = fit_joint(seen, of_joint, joint.lower, joint.upper, joints[joint.name])
-            if turn == 0:
-                motion = fit_upright(points, points_at(found), as_believed=True)
-                if np.linalg.norm(motion[:3, 3] + (motion[:3, :3] - np.eye(3)) @ points.mean(axis=0)) > MOST_MOVED:
-                    return np.eye(4), found  # that is no error of a map: something else was fitted
-        return motion, found
+        return misfit(apply(inverse(motion), points), points_at(found)), motion, found
+
+    def _parts_of(self, body: str) -> dict[str, np.ndarray]:
+        """Return points (N, 3) on each part of furniture, its own frame."""
+        if body not in self._parts:
+            meshes = link_shapes(self._model.text(body))
+            random = np.random.default_rng(0)
+            self._parts[body] = {
+                k: surface_points(own, FURNITURE_POINTS, random)[0] for k, own in meshes.items() if own
+            }
+        return self._parts[body]
+
+    def _off_its_place(self, body: str, motion: np.ndarray) -> float:
+        """Return how far [m] from where the map has furniture its middle comes by a motion (4, 4) from where it is
+        believed."""
+        middle = np.mean(self._model.world.bounds(body), axis=0)
+        mapped = self._mapped[body] @ inverse(self._model.pose(body))
+        return float(np.linalg.norm(apply(motion, middle[None])[0] - apply(mapped, middle[None])[0]))
 
     def _look_for(self, body: str, class_name: str, *, closely: bool = False) -> Look:
         """Return what the cameras show of the thing of its class that is nearest to where a body is believed;

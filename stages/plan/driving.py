@@ -12,7 +12,7 @@ from stages.plan.world_model import RobotState, WorldModel
 ROOM = 2.5 * LOCALISATION
 """Kept to everything on the way, where that is possible [m]: so far beside its way may the base be."""
 ASIDE, DIRECTIONS = (0.02, 0.04, 0.07, 0.1), 16
-"""A base that is believed to stand in something, as a door was seen otherwise since, leaves it by so short a way [m]."""
+"""A base that is believed to stand in something, as a door was seen otherwise since, leaves it so far [m]."""
 
 
 def drive_way(

@@ -69,11 +69,16 @@ def fit_joint(
     to stand where that is no nearer by `SURE`: of a door that stands open little is seen, and points of what is behind
     it lie as near to the shut one."""
 
-    def misfit(value: float) -> float:
-        return float(np.minimum(cKDTree(points_at(value)).query(seen)[0], FAR).mean())
+    def misfit_at(value: float) -> float:
+        return misfit(seen, points_at(value))
 
     values = np.linspace(lower, upper, STEPS)
-    best = min(values.tolist(), key=misfit)
+    best = min(values.tolist(), key=misfit_at)
     step = (upper - lower) / (STEPS - 1)
-    best = min(np.clip(np.linspace(best - step, best + step, FINE), lower, upper).tolist(), key=misfit)
-    return best if believed is None or misfit(best) < misfit(believed) - SURE else believed
+    best = min(np.clip(np.linspace(best - step, best + step, FINE), lower, upper).tolist(), key=misfit_at)
+    return best if believed is None or misfit_at(best) < misfit_at(believed) - SURE else believed
+
+
+def misfit(seen: np.ndarray, shape: np.ndarray) -> float:
+    """Return the mean distance of seen points (N, 3) from points of a shape (M, 3), each `FAR` at most [m]."""
+    return float(np.minimum(cKDTree(shape).query(seen)[0], FAR).mean())

@@ -14,6 +14,7 @@ from schemas.contact_graph import ContactGraphFile
 from stages.kit.geometry.transforms import apply, transform_from_yaw
 from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.shapes import surface_points
+from stages.plan.placements import Placement, room_left
 from stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, has_rim, rim_grasps
 from stages.plan.tray_loading import GRAVITY, PALM_ROOM, free_lanes, holding_moments, lifts_left, load_moments
 from stages.plan.world_model import WorldModel
@@ -261,3 +262,19 @@ def test_a_round_rim_is_square_everywhere() -> None:
     wall = np.column_stack([np.linspace(-0.1, 0.1, 400), np.full(400, 0.12)])
     turned = wall @ np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
     assert askew(turned[:, 0], turned[:, 1]) == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_place_in_the_middle_of_a_tray_leaves_no_room_for_what_comes_next(tmp_path: Path) -> None:
+    cans = [can("can_7", 0.5, 0.3, "table_3"), can("can_8", -0.5, 0.3, "table_3")]
+    write_scene(tmp_path, [floor(), table(0.0, 0.0), tray(), *cans])
+    model = WorldModel(tmp_path, ContactGraphFile.read(tmp_path / "graph.json"), PANDA, 0.004)
+    places = [
+        Placement(transform_from_yaw(0.0, np.array([x, 0.0, 0.76])), covered=False, in_drawer=False)
+        for x in (0.0, -0.13)
+    ]
+    try:
+        left = room_left(model, "tray_6", "can_7", places, ("can_8",), np.random.default_rng(0))
+        assert room_left(model, "tray_6", "can_7", places, (), np.random.default_rng(0)).tolist() == [0, 0]
+    finally:
+        model.close()
+    assert left[1] > left[0]
