@@ -164,7 +164,7 @@ class CameraEyes:
 
         for turn in range(turns):
             if turn > 0 or turns > 2:
-                moved = fit_upright(points, points_at(found), as_believed=True)
+                moved = fit_upright(points, points_at(found), as_believed=True, as_high=True)
                 if self._off_its_place(body, moved) > MOST_MOVED:
                     break  # that is no error of a map: something else was fitted
                 motion = moved
@@ -240,7 +240,10 @@ class CameraEyes:
         """Return what cameras show of a thing of a class, at most `radius` [m] from where a body is believed (or the
         eyes' own); `views`: where each stands and what it looks at, both (3,), as they truly are."""
         map_from_true = self._robot.map_from_true()
-        believed = np.mean(self._model.world.bounds(body), axis=0)
+        low, high = self._model.world.bounds(body)
+        carriable = self._model.records[body].carriable
+        if carriable:
+            low = high = (low + high) / 2  # of furniture any side may be in sight
         renderer = self._pictures.sight(self._robot.world)
         found, eyes = np.zeros((0, 3)), []
         for eye, target in views:
@@ -250,12 +253,14 @@ class CameraEyes:
                 points
                 for number in np.unique(picture.instance)
                 if self._made_out(int(number), picture.instance == number, class_name)
-                and len(points := cloud(picture, picture.instance == number, map_from_true @ pose))
+                and len(points := cloud(picture, picture.instance == number, map_from_true @ pose, whole=not carriable))
                 and not self._of_another(body, class_name, points)
             ]
-            goal = np.median(found, axis=0) if len(found) else believed
-            away = [float(np.linalg.norm(np.median(points, axis=0) - goal)) for points in clouds]
-            if clouds and min(away) < (SAME if len(found) else radius or self._radius):
+            if carriable and len(found):
+                low = high = np.median(found, axis=0)
+            middles = [np.median(points, axis=0) for points in clouds]
+            away = [float(np.linalg.norm(middle - np.clip(middle, low, high))) for middle in middles]
+            if clouds and min(away) < (SAME if carriable and len(found) else radius or self._radius):
                 found = np.concatenate([found, clouds[int(np.argmin(away))]])
                 eyes.append(apply(map_from_true, eye[None])[0])
         return Look(found, tuple(eyes))

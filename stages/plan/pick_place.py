@@ -17,7 +17,7 @@ from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
 from stages.kit.motion.segments import Manipulation, Segment, whole_body
 from stages.kit.simulation.robot import Configuration
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
-from stages.plan.placements import PLACES, Placement, is_roomy, place_regions, room_left, sample_placements
+from stages.plan.placements import PLACES, Placement, place_regions, room_left, sample_placements
 from stages.plan.rim_grasps import rim_grasps
 from stages.plan.tray_loading import lifts_left, load_moments
 from stages.plan.world_model import RobotState, WorldModel
@@ -335,15 +335,14 @@ def plan_place(
         room = room_left(model, target, item, places, further, random)
         most = 0.5 * room.max()  # places that leave less than half as much room as others come last
         order = sorted(
-            range(len(places)), key=lambda index: (not places[index].roomy, room[index] < most, -left[index])
+            range(len(places)), key=lambda index: (room[index] < most, not places[index].roomy, -left[index])
         )
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     checker = model.checker
     queue: list[tuple[np.ndarray, Placement]] = []
-    beside_wall = on_tray and any(place.roomy for place in places)  # a foot on the rim tips over as it is let down
-    if preferred is not None and not (beside_wall and not is_roomy(model, item, target, door, preferred[1])):
+    if preferred is not None:
         queue.append((preferred[0], Placement(preferred[1], *_cover(places, preferred[1]))))
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
@@ -398,7 +397,9 @@ def _try_place(
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     place = placement.world_from_item
-    touch, rest = model.links(item), {link: RESTING_DEPTH for link in model.links(target)}
+    # a foot that is let down on a tray's rim tips over
+    depth = 0.0 if model.records[target].carriable else RESTING_DEPTH
+    touch, rest = model.links(item), dict.fromkeys(model.links(target), depth)
     checker.allow(touch=touch, rest_on=rest)
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
     outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])

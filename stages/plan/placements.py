@@ -77,16 +77,6 @@ def sample_placements(
     return sorted(mixed, key=lambda place: not place.roomy)
 
 
-def is_roomy(model: WorldModel, item: str, target: str, door: str | None, world_from_item: np.ndarray) -> bool:
-    """Whether the whole foot of an item at a pose (4, 4) has surface of `target` under it, a cell to spare."""
-    radius, height = model.footprint(item)
-    for region in place_regions(model, item, target, door):
-        spot = apply(inverse(model.world_from_region(region)), world_from_item[:3, 3])[:2]
-        if np.all(spot > region.low) and np.all(spot < region.high):
-            return region.carries(spot, radius + CELL / 2, height)
-    return False
-
-
 def room_left(
     model: WorldModel,
     target: str,
