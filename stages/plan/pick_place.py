@@ -333,9 +333,8 @@ def plan_place(
             model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
         )
         room = room_left(model, target, item, places, further, random)
-        most = 0.5 * room.max()  # places that leave less than half as much room as others come last
         order = sorted(
-            range(len(places)), key=lambda index: (room[index] < most, not places[index].roomy, -left[index])
+            range(len(places)), key=lambda index: (-room[index].round(2), not places[index].roomy, -left[index])
         )
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()

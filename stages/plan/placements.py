@@ -85,25 +85,26 @@ def room_left(
     further: tuple[str, ...],
     random: np.random.Generator,
 ) -> np.ndarray:
-    """Return (P,) numbers of places on `target` that an item at each of P places leaves to the one of `further` that
-    then has fewest; zeros where nothing further comes.
+    """Return (P,) how well what is put on `target` later, `further`, still fits beside an item at each of P places: 0
+    where there is a place for each clear of all else, else by how much [m] the worst overlaps, negative.
 
-    Things are as wide as their feet, circles; what stands there already counts.
+    Things are as wide as their feet, circles, handles included: a little overlap may still be none.
     """
     feet = np.array([place.world_from_item[:2, 3] for place in places]).reshape(-1, 2)
-    standing = [
-        (apply(model.pose(name), np.zeros((1, 3)))[0, :2], model.footprint(name)[0]) for name in model.load(target)
-    ]
-    left = []
+    own = model.footprint(item)[0]
+    standing = [(model.pose(name)[:2, 3], model.footprint(name)[0]) for name in model.load(target)]
+    left = np.zeros(len(places))
     for other in further:
         radius = model.footprint(other)[0]
-        spots = np.array([p.world_from_item[:2, 3] for p in sample_placements(model, other, target, None, random)])
-        spots = spots.reshape(-1, 2)
-        for foot, own in standing:
-            spots = spots[np.linalg.norm(spots - foot, axis=1) > radius + own]
-        away = np.linalg.norm(feet[:, None] - spots[None], axis=2)
-        left.append((away > radius + model.footprint(item)[0]).sum(axis=1))
-    return np.min(left, axis=0) if left else np.zeros(len(places), dtype=int)
+        drawn = sample_placements(model, other, target, None, random, 2 * PLACES)
+        spots = np.array([place.world_from_item[:2, 3] for place in drawn]).reshape(-1, 2)
+        if not len(spots):
+            continue
+        gap = np.linalg.norm(feet[:, None] - spots[None], axis=2) - radius - own
+        for foot, beside in standing:
+            gap = np.minimum(gap, np.linalg.norm(spots - foot, axis=1) - radius - beside)
+        left = np.minimum(left, gap.max(axis=1))
+    return left
 
 
 def _height(model: WorldModel, region: Region) -> float:
