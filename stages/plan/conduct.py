@@ -154,13 +154,11 @@ class Conduct:
                 continue
             try:
                 if again and steps[0].name == DRIVE:
-                    steps, after, before = self._look_from_there(before, state, steps, request, origin)
+                    steps, after = self._look_from_there(before, state, steps, request, origin)
                 for offset, step in enumerate(steps):
                     self.physical.action = number + min(offset, len(group) - 1)
-                    if action.hand == "puts" and step.manipulation is not None:
-                        step, after = self._held_still(before, step, after, request, origin)
                     self._execute(step)
-                    self._check_joints(step, ended=offset == len(steps) - 1)
+                    self._check_joints(step, ended=step is steps[-1])
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 lost = state.holding is not None and self.physical.held is None
@@ -184,9 +182,8 @@ class Conduct:
 
     def _look_from_there(
         self, before: Snapshot, state: RobotState, steps: list[Step], request: MotionRequest, origin: str
-    ) -> tuple[list[Step], RobotState, Snapshot]:
+    ) -> tuple[list[Step], RobotState]:
         """Carry out the drive that an action begins with, look once more from there and return the steps from there on,
-        the state after them and the model before them,
         with the grasp or place of the planned ones where it still serves. Where nothing serves from there it drives and
         looks again, so that nothing is taken by what was seen from elsewhere. `before`: the model before they were
         planned. Raises MotionFailed."""
@@ -204,36 +201,13 @@ class Conduct:
             wish = replace(request, preferred=preferred)
             try:
                 measured = self._measured(wish, there.base)
-                return *refine_action(self.model, there, step.name, measured, origin), before
+                return refine_action(self.model, there, step.name, measured, origin)
             except MotionFailed:
                 steps, after = refine_action(self.model, there, step.name, wish, origin)
             if steps[0].name != DRIVE or look == LOOKS - 1:
                 break
             state = there
-        return steps, after, before
-
-    def _held_still(
-        self, before: Snapshot, step: Step, after: RobotState, request: MotionRequest, origin: str
-    ) -> tuple[Step, RobotState]:
-        """Bring what is held over the place where it is put and return the step from there on, planned anew for how it
-        lies in the hand by then: fingers give way sideways on the way. `before`: the model before the step was planned.
-        Raises MotionFailed as `PhysicalRobot.follow` does."""
-        item, motion = step.arguments[0], step.manipulation
-        assert motion is not None
-        if self.model.laden(item) or motion.item_pose is None:
-            return step, after
-        self.physical.follow(step.segments[0], None)
-        rest = replace(step, segments=step.segments[1:])
-        self.model.restore(before)
-        over = RobotState(motion.base, step.segments[0].path[-1, 3:], item)
-        over = self._perceived(over)
-        wish = replace(request, base=motion.base, preferred=(motion.base, motion.item_pose))
-        try:
-            steps, anew = refine_action(self.model, over, step.name, wish, origin)
-        except MotionFailed:  # as it was meant to be, then
-            action_named(step.name).move_things(self.model, step.arguments, motion)
-            return rest, after
-        return steps[-1], anew
+        return steps, after
 
     @staticmethod
     def _measured(request: MotionRequest, base: np.ndarray) -> MotionRequest:
