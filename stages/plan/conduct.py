@@ -145,7 +145,7 @@ class Conduct:
                 further = put_there_later(name, arguments, following)
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style, further=further)
                 again = self.eyes is not None and self.eyes.again
-                before = self.model.snapshot()
+                before = self.model.snapshot() if again else None
                 steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
@@ -153,7 +153,7 @@ class Conduct:
                     break
                 continue
             try:
-                if again and steps[0].name == DRIVE:
+                if before is not None and steps[0].name == DRIVE:
                     steps, after = self._look_from_there(before, state, steps, request, origin)
                 for offset, step in enumerate(steps):
                     self.physical.action = number + min(offset, len(group) - 1)
