@@ -17,9 +17,9 @@ from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
 from stages.kit.motion.segments import Manipulation, Segment, whole_body
 from stages.kit.simulation.robot import Configuration
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
-from stages.plan.placements import PLACES, Placement, place_regions, room_left, sample_placements
+from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
-from stages.plan.tray_loading import lifts_left, load_moments
+from stages.plan.tray_loading import lifts_left, lifts_left_beside, load_moments
 from stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
@@ -329,13 +329,14 @@ def plan_place(
             {"places": len(regions)},
         )
     if on_tray and places:
-        left = lifts_left(
-            model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
-        )
-        room = room_left(model, target, item, places, further, random)
-        order = sorted(
-            range(len(places)), key=lambda index: (-room[index].round(2), not places[index].roomy, -left[index])
-        )
+        poses = np.array([place.world_from_item for place in places])
+        left = lifts_left(model, target, item, poses, budgets.size_uncertainty)
+        if further and left.any():
+            spots = sample_placements(model, further[0], target, door, random)
+            later = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
+            both = lifts_left_beside(model, target, item, poses, further[0], later, budgets.size_uncertainty)
+            left = both if both.any() else left
+        order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)

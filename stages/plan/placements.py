@@ -77,36 +77,6 @@ def sample_placements(
     return sorted(mixed, key=lambda place: not place.roomy)
 
 
-def room_left(
-    model: WorldModel,
-    target: str,
-    item: str,
-    places: list[Placement],
-    further: tuple[str, ...],
-    random: np.random.Generator,
-) -> np.ndarray:
-    """Return (P,) how well what is put on `target` later, `further`, still fits beside an item at each of P places: 0
-    where there is a place for each clear of all else, else by how much [m] the worst overlaps, negative.
-
-    Things are as wide as their feet, circles, handles included: a little overlap may still be none.
-    """
-    feet = np.array([place.world_from_item[:2, 3] for place in places]).reshape(-1, 2)
-    own = model.footprint(item)[0]
-    standing = [(model.pose(name)[:2, 3], model.footprint(name)[0]) for name in model.load(target)]
-    left = np.zeros(len(places))
-    for other in further:
-        radius = model.footprint(other)[0]
-        drawn = sample_placements(model, other, target, None, random, 2 * PLACES)
-        spots = np.array([place.world_from_item[:2, 3] for place in drawn]).reshape(-1, 2)
-        if not len(spots):
-            continue
-        gap = np.linalg.norm(feet[:, None] - spots[None], axis=2) - radius - own
-        for foot, beside in standing:
-            gap = np.minimum(gap, np.linalg.norm(spots - foot, axis=1) - radius - beside)
-        left = np.minimum(left, gap.max(axis=1))
-    return left
-
-
 def _height(model: WorldModel, region: Region) -> float:
     middle = np.array([*(region.low + region.high) / 2, region.level])
     return float(apply(model.world_from_region(region), middle)[2])

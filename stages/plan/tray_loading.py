@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stages.kit.motion.grasps import narrowest_width
 from stages.plan.rim_grasps import rim_grasps
 
 if TYPE_CHECKING:
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 PALM_ROOM = 0.008
 """Free room wanted beside the palm [m]."""
+BESIDE = 0.012
+"""Things stand at least this far apart [m]: a finger is between them as one is put down."""
 GRAVITY = 9.81
 
 
@@ -45,18 +48,40 @@ def load_moments(model: WorldModel, tray: str, tool_poses: np.ndarray) -> np.nda
 def lifts_left(model: WorldModel, tray: str, item: str, places: np.ndarray, uncertainty: float = 0.0) -> np.ndarray:
     """Return, per pose world_from_item (N, 4, 4), by how many rim grasps the tray can be lifted when the item stands
     there, the palm over nothing and the fingers bearing the moment: (N,) int. `uncertainty` as in `rim_grasps` [m]."""
+    poses = _lifts(model, tray, uncertainty)
+    return np.array([_lifts_with(model, tray, poses, {item: place[:2, 3]}) for place in places], dtype=int)
+
+
+def lifts_left_beside(
+    model: WorldModel, tray: str, item: str, places: np.ndarray, other: str, spots: np.ndarray, uncertainty: float = 0.0
+) -> np.ndarray:
+    """Return the same per pose (N, 4, 4) of an item that `other` is put beside later: with that at the best of the
+    poses `spots` (M, 4, 4) where it has room; what sticks out of things, as handles do, can be turned away."""
+    poses = _lifts(model, tray, uncertainty)
+    apart = BESIDE + sum(narrowest_width(model.points(name)) / 2 for name in (item, other))
+    left = np.zeros(len(places), dtype=int)
+    for number, place in enumerate(places):
+        for spot in spots:
+            if np.linalg.norm(place[:2, 3] - spot[:2, 3]) > apart:
+                both = {item: place[:2, 3], other: spot[:2, 3]}
+                left[number] = max(left[number], _lifts_with(model, tray, poses, both))
+    return left
+
+
+def _lifts(model: WorldModel, tray: str, uncertainty: float) -> np.ndarray:
+    """Return the tool poses (N, 4, 4), world, that take a tray's rim."""
     world_from_tray = model.pose(tray)
     grasps = rim_grasps(model.points(tray), world_from_tray, np.random.default_rng(0), uncertainty=uncertainty)
-    if not grasps:
-        return np.zeros(len(places), dtype=int)
-    poses = np.array([world_from_tray @ grasp.body_from_tool for grasp in grasps])
-    others = [name for name in model.load(tray) if name != item]
-    feet = [[*model.pose(name)[:2, 3], model.footprint(name)[0]] for name in others]
-    masses = np.array([model.records[name].mass for name in (tray, *others, item)])
-    lifts = []
-    for place in places:
-        standing = np.array([*feet, [*place[:2, 3], model.footprint(item)[0]]])
-        free = free_lanes(poses, standing, model.description.palm)
-        moments = holding_moments(poses, np.concatenate([world_from_tray[None, :2, 3], standing[:, :2]]), masses)
-        lifts.append(int((free & (moments < model.description.holding_moment)).sum()))
-    return np.array(lifts)
+    return np.array([world_from_tray @ grasp.body_from_tool for grasp in grasps]).reshape(-1, 4, 4)
+
+
+def _lifts_with(model: WorldModel, tray: str, poses: np.ndarray, put: dict[str, np.ndarray]) -> int:
+    """Return how many tool poses (N, 4, 4) lift a tray with its load and what is put on it at places (2,), world."""
+    if not len(poses):
+        return 0
+    at = {name: model.pose(name)[:2, 3] for name in model.load(tray)} | put
+    feet = np.array([[*place, model.footprint(name)[0]] for name, place in at.items()])
+    masses = np.array([model.records[name].mass for name in (tray, *at)])
+    middles = np.concatenate([model.pose(tray)[None, :2, 3], feet[:, :2]])
+    bearable = holding_moments(poses, middles, masses) < model.description.holding_moment
+    return int((free_lanes(poses, feet, model.description.palm) & bearable).sum())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,16 @@ from schemas.contact_graph import ContactGraphFile
 from stages.kit.geometry.transforms import apply, transform_from_yaw
 from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.shapes import surface_points
-from stages.plan.placements import Placement, room_left
 from stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, has_rim, rim_grasps
-from stages.plan.tray_loading import GRAVITY, PALM_ROOM, free_lanes, holding_moments, lifts_left, load_moments
+from stages.plan.tray_loading import (
+    GRAVITY,
+    PALM_ROOM,
+    free_lanes,
+    holding_moments,
+    lifts_left,
+    lifts_left_beside,
+    load_moments,
+)
 from stages.plan.world_model import WorldModel
 from tests.unit.simulation.handmade_scene import HandmadeBody, floor, table, write_scene
 
@@ -265,19 +271,13 @@ def test_a_round_rim_is_square_everywhere() -> None:
     assert askew(turned[:, 0], turned[:, 1]) == pytest.approx(0.3, abs=0.02)
 
 
-def test_a_place_in_the_middle_of_a_tray_leaves_no_room_for_what_comes_next(tmp_path: Path) -> None:
-    wide = replace(can("can_8", -0.5, 0.3, "table_3"), boxes=[((0, 0, 0.05), (0.16, 0.16, 0.1))])
-    cans = [can("can_7", 0.5, 0.3, "table_3"), wide]
-    write_scene(tmp_path, [floor(), table(0.0, 0.0), tray(), *cans])
-    model = WorldModel(tmp_path, ContactGraphFile.read(tmp_path / "graph.json"), PANDA, 0.004)
-    places = [
-        Placement(transform_from_yaw(0.0, np.array([x, 0.0, 0.76])), covered=False, in_drawer=False)
-        for x in (0.0, -0.13)
-    ]
-    try:
-        left = room_left(model, "tray_6", "can_7", places, ("can_8",), np.random.default_rng(0))
-        assert room_left(model, "tray_6", "can_7", places, (), np.random.default_rng(0)).tolist() == [0, 0]
-    finally:
-        model.close()
-    assert left[0] < -0.01
-    assert left[1] == 0.0
+def test_a_place_in_the_middle_of_a_tray_leaves_no_room_for_what_comes_next(model: WorldModel) -> None:
+    """The other can has one spot, 6 cm beside the middle: beside the item at one end it can stand there, not beside
+    one in the middle. And what both leave is what is counted with the other put there first."""
+    places = np.array([on_tray(model, x, 0.0) for x in (0.0, -0.14)])
+    spots = on_tray(model, 0.055, 0.0)[None]
+    left = lifts_left_beside(model, "tray_6", "can_7", places, "can_8", spots)
+    model.world.set_pose("can_8", spots[0])
+    model.put_on("can_8", "tray_6")
+    assert left[0] == 0
+    assert left[1] == lifts_left(model, "tray_6", "can_7", places)[1] > 0
