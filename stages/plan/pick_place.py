@@ -331,12 +331,12 @@ def plan_place(
     if on_tray and places:
         poses = np.array([place.world_from_item for place in places])
         left = lifts_left(model, target, item, poses, budgets.size_uncertainty)
+        later = left
         if further and left.any():
             spots = sample_placements(model, further[0], target, door, random)
-            later = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
-            both = lifts_left_beside(model, target, item, poses, further[0], later, budgets.size_uncertainty)
-            left = both if both.any() else left
-        order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
+            beside = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
+            later = lifts_left_beside(model, target, item, poses, further[0], beside, budgets.size_uncertainty)
+        order = sorted(range(len(places)), key=lambda index: (not later[index], not places[index].roomy, -later[index]))
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
