@@ -336,7 +336,10 @@ def plan_place(
             spots = sample_placements(model, further[0], target, door, random)
             beside = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
             later = lifts_left_beside(model, target, item, poses, further[0], beside, budgets.size_uncertainty)
-        order = sorted(range(len(places)), key=lambda index: (not later[index], not places[index].roomy, -later[index]))
+        order = sorted(
+            range(len(places)),
+            key=lambda index: (not later[index], not places[index].roomy, -later[index], -left[index]),
+        )
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
