@@ -319,7 +319,7 @@ def plan_place(
     """
     assert state.tool_from_item is not None
     on_tray = model.records[target].carriable
-    places = sample_placements(model, item, target, door, random, 2 * PLACES if on_tray else PLACES)
+    places = sample_placements(model, item, target, door, random, 4 * PLACES if on_tray else PLACES)
     if not places and preferred is None:
         regions = place_regions(model, item, target, door)
         raise MotionFailed(

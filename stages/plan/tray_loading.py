@@ -45,11 +45,37 @@ def load_moments(model: WorldModel, tray: str, tool_poses: np.ndarray) -> np.nda
     return holding_moments(tool_poses, np.array([model.pose(name)[:2, 3] for name in names]), masses)
 
 
+class Lifts:
+    """The rim grasps of a tray with its load, and how many of them are left when more is put on it."""
+
+    def __init__(self, model: WorldModel, tray: str, more: tuple[str, ...], uncertainty: float) -> None:
+        world_from_tray = model.pose(tray)
+        grasps = rim_grasps(model.points(tray), world_from_tray, np.random.default_rng(0), uncertainty=uncertainty)
+        self._poses = np.array([world_from_tray @ grasp.body_from_tool for grasp in grasps]).reshape(-1, 4, 4)
+        self._middle = world_from_tray[:2, 3]
+        self._standing = {name: model.pose(name)[:2, 3] for name in model.load(tray)}
+        names = {*self._standing, *more}
+        self._radius = {name: model.footprint(name)[0] for name in names}
+        self._mass = {name: model.records[name].mass for name in (tray, *names)}
+        self._tray, self._hand = tray, model.description
+
+    def left(self, put: dict[str, np.ndarray]) -> int:
+        """Return by how many the tray is lifted with things put at places (2,), world: the palm over nothing, the
+        fingers bearing the moment."""
+        if not len(self._poses):
+            return 0
+        at = self._standing | put
+        feet = np.array([[*place, self._radius[name]] for name, place in at.items()])
+        masses = np.array([self._mass[name] for name in (self._tray, *at)])
+        moments = holding_moments(self._poses, np.concatenate([self._middle[None], feet[:, :2]]), masses)
+        return int((free_lanes(self._poses, feet, self._hand.palm) & (moments < self._hand.holding_moment)).sum())
+
+
 def lifts_left(model: WorldModel, tray: str, item: str, places: np.ndarray, uncertainty: float = 0.0) -> np.ndarray:
     """Return, per pose world_from_item (N, 4, 4), by how many rim grasps the tray can be lifted when the item stands
     there, the palm over nothing and the fingers bearing the moment: (N,) int. `uncertainty` as in `rim_grasps` [m]."""
-    poses = _lifts(model, tray, uncertainty)
-    return np.array([_lifts_with(model, tray, poses, {item: place[:2, 3]}) for place in places], dtype=int)
+    lifts = Lifts(model, tray, (item,), uncertainty)
+    return np.array([lifts.left({item: place[:2, 3]}) for place in places], dtype=int)
 
 
 def lifts_left_beside(
@@ -57,31 +83,11 @@ def lifts_left_beside(
 ) -> np.ndarray:
     """Return the same per pose (N, 4, 4) of an item that `other` is put beside later: with that at the best of the
     poses `spots` (M, 4, 4) where it has room; what sticks out of things, as handles do, can be turned away."""
-    poses = _lifts(model, tray, uncertainty)
+    lifts = Lifts(model, tray, (item, other), uncertainty)
     apart = BESIDE + sum(narrowest_width(model.points(name)) / 2 for name in (item, other))
     left = np.zeros(len(places), dtype=int)
     for number, place in enumerate(places):
         for spot in spots:
             if np.linalg.norm(place[:2, 3] - spot[:2, 3]) > apart:
-                both = {item: place[:2, 3], other: spot[:2, 3]}
-                left[number] = max(left[number], _lifts_with(model, tray, poses, both))
+                left[number] = max(left[number], lifts.left({item: place[:2, 3], other: spot[:2, 3]}))
     return left
-
-
-def _lifts(model: WorldModel, tray: str, uncertainty: float) -> np.ndarray:
-    """Return the tool poses (N, 4, 4), world, that take a tray's rim."""
-    world_from_tray = model.pose(tray)
-    grasps = rim_grasps(model.points(tray), world_from_tray, np.random.default_rng(0), uncertainty=uncertainty)
-    return np.array([world_from_tray @ grasp.body_from_tool for grasp in grasps]).reshape(-1, 4, 4)
-
-
-def _lifts_with(model: WorldModel, tray: str, poses: np.ndarray, put: dict[str, np.ndarray]) -> int:
-    """Return how many tool poses (N, 4, 4) lift a tray with its load and what is put on it at places (2,), world."""
-    if not len(poses):
-        return 0
-    at = {name: model.pose(name)[:2, 3] for name in model.load(tray)} | put
-    feet = np.array([[*place, model.footprint(name)[0]] for name, place in at.items()])
-    masses = np.array([model.records[name].mass for name in (tray, *at)])
-    middles = np.concatenate([model.pose(tray)[None, :2, 3], feet[:, :2]])
-    bearable = holding_moments(poses, middles, masses) < model.description.holding_moment
-    return int((free_lanes(poses, feet, model.description.palm) & bearable).sum())
