@@ -35,6 +35,10 @@ class Execution(Protocol):
         """Return a joint of the plan as the room has it, and its value there [rad or m]."""
         ...
 
+    def pose_in_room(self, body: str) -> np.ndarray:
+        """Return the pose (4, 4) of a body of the plan in the room, by the frame of the shape that it is seen with."""
+        ...
+
     def level(self, state: RobotState) -> RobotState:
         """Bring what the hand holds level; return the robot's state. Raises MotionFailed."""
         ...
@@ -52,7 +56,9 @@ class MotionRequest:
     style: GraspStyle = "any"
     """What the place where a grasped item goes next asks for."""
     base: np.ndarray | None = None
-    """Base (3,) from which a joint is moved; None: wherever that can be done."""
+    """Base (3,) from which it is done; None: wherever that can be done."""
+    further: tuple[str, ...] = ()
+    """What is put where this is put, later: room is left for it."""
 
 
 class PlanAction:

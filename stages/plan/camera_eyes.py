@@ -1,8 +1,10 @@
 """A look through cameras: rendered depth pictures, masks that may be missed or wrong, and the planned shape fitted to
-the points of a mask. What is estimated is where a thing, or furniture with joints, stands and how far a joint is open;
-shapes stay as planned."""
+the points of a mask. What is estimated is how a thing lies and, from near by, how large it is, where furniture stands
+and how far its joints are open; shapes stay as planned, but for trays."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,8 +19,10 @@ from stages.plan.correspondence import alike
 from stages.plan.erring_robot import ErringRobot
 from stages.plan.eyes import CELL, NEAR_BY, Room, Seen
 from stages.plan.pictures import RoomPictures
-from stages.plan.pose_fit import fit_joint, fit_upright
+from stages.plan.pose_fit import fit_joint, fit_upright, misfit
+from stages.plan.scaled_body import scaled_text
 from stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
+from stages.plan.thing_fit import fit_thing
 from stages.plan.world_model import WorldModel, body_planes, moved_record
 
 CAMERA = Camera(width=240, height=180, fx=260.0, fy=260.0, cx=119.5, cy=89.5)
@@ -26,17 +30,40 @@ EYES = ((0.0, 1.35), (0.2, 0.85))
 """How far before the middle of the base and how high the cameras are [m]: the head's, and one that the hand holds up,
 which is not there while the hand holds something. **Assumed**: the arm gets there and back."""
 BEFORE_IT, OVER_IT = 1.2, (0.1, 0.45)
-"""A carrier nearer to the base than this is looked at closely [m], and by the free hand from over it: so far on the
-robot's side of it, so high [m]."""
+"""What can be carried is looked at closely where it is nearer to the base than this [m], and by the free hand from over
+it: so far on the robot's side of it, so high [m]."""
+HEADINGS, SWEPT, FALLEN = 8, (0.6, 1.4), 1.5
+"""What is not where it is believed is looked for in so many directions, on the floor so far from the base [m], up to so
+far from where it was [m]."""
 HIDDEN = 0.015
 """A carrier that looks smaller than it did by more is partly hidden [m]."""
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
-POINTS, FURNITURE_POINTS = 1500, 3000
-"""Of a shape that is fitted; of each part of furniture."""
+POINTS, FURNITURE_POINTS, SEEN_POINTS = 1500, 3000, 2000
+"""Of a shape that is fitted; of each part of furniture, and of what is seen of it."""
 MOST_MOVED = 0.1
-"""Furniture stands no farther from where it is believed [m]."""
+"""Furniture stands no farther from where the map has it [m]."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What cameras showed of one thing."""
+
+    points: np.ndarray
+    """(N, 3), map frame."""
+    eyes: tuple[np.ndarray, ...]
+    """Where the cameras stood that showed it (3,), map frame."""
+
+
+NOTHING = Look(np.zeros((0, 3)), ())
+
+
+def _over(base: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return where the hand's camera is (3,) that looks at a target (3,) from over it, on the robot's side of it."""
+    back = base[:2] - target[:2]
+    back *= OVER_IT[0] / max(float(np.linalg.norm(back)), 1e-9)
+    return target + np.array([*back, OVER_IT[1]])
 
 
 class CameraEyes:
@@ -58,17 +85,24 @@ class CameraEyes:
         self._errors, self._random, self._radius = errors, random, radius
         self._names = dict(enumerate(room.records, start=1))
         """Instance number of a picture -> body of the room."""
+        self._mapped = {name: model.pose(name) for name, record in model.records.items() if not record.carriable}
+        """Furniture -> where the map has it (4, 4)."""
+        self._parts: dict[str, dict[str, np.ndarray]] = {}
         self._carriers: dict[str, SeenCarrier] = {}
         """Planned body -> its shape, as the last look showed it that showed all of it."""
 
     def seen(self, body: str, here: str) -> Seen | None:
-        """Return the planned body where the pictures show it; None where they do not, and for what neither is carried
-        nor has joints. `here` is not used: which thing it is, its class and place say."""
+        """Return the planned body where the pictures show it; None where they do not, and for what is far away and
+        neither is carried nor has joints. `here` is not used: which thing it is, its class and place say."""
         record = self._model.records[body]
-        if not record.carriable and not record.joints:
+        near = self._distance(body) < BEFORE_IT
+        if not record.carriable and not record.joints and not near:
             return None
-        carrier = record.class_name in CARRIER_CLASSES and self._distance(body) < BEFORE_IT
-        points = self._look_for(body, record.class_name, closely=carrier)
+        carrier = near and record.class_name in CARRIER_CLASSES
+        look = self._look_for(body, record.class_name, closely=near and record.carriable)
+        if len(look.points) < LEAST_POINTS and near and record.carriable:
+            look = self._search(body, record.class_name)
+        points = look.points
         if len(points) < LEAST_POINTS:
             return None
         text, planes = self._model.text(body), self._model.planes[body]
@@ -77,6 +111,10 @@ class CameraEyes:
             record, text = moved_record(record, shape.pose, {}), carrier_text(body, shape, record.mass)
             return record, text, body_planes(record, text)
         pose, joints = self._model.pose(body), {j.name: self._model.joint_value(body, j.name) for j in record.joints}
+        if near and record.carriable and record.class_name not in CARRIER_CLASSES:
+            fit = fit_thing(points, np.array(look.eyes), self._model.surface(body), pose)
+            record, text = moved_record(record, fit.pose, {}), scaled_text(text, fit.scale)
+            return record, text, body_planes(record, text)
         if record.carriable:
             seen_before = body in self._carriers
             pose = fit_upright(points, apply(pose, self._model.points(body, POINTS)), as_believed=seen_before) @ pose
@@ -106,20 +144,30 @@ class CameraEyes:
         self, body: str, points: np.ndarray, joints: dict[str, float]
     ) -> tuple[np.ndarray, dict[str, float]]:
         """Return how furniture stands from where it is believed (4, 4), and the joint values at which it fits the
-        points (N, 3), joint by joint: joints, place, and joints again, as an open door tells nothing of where a shut
-        one stands."""
-        model, found = self._model, dict(joints)
-        shapes = {
-            link: surface_points(meshes, FURNITURE_POINTS, np.random.default_rng(0))[0]
-            for link, meshes in link_shapes(model.text(body)).items()
-        }
+        points (N, 3): by turns place and joints, begun with either, whichever fits better. An open door tells nothing
+        of where a shut one stands, furniture beside its place nothing of how far a door is open."""
+        points = points[:: max(1, len(points) // SEEN_POINTS)]
+        fits = [self._by_turns(body, points, joints, turns) for turns in (2, 3)]
+        return min(fits, key=lambda fit: fit[0])[1:]
+
+    def _by_turns(
+        self, body: str, points: np.ndarray, joints: dict[str, float], turns: int
+    ) -> tuple[float, np.ndarray, dict[str, float]]:
+        """Return the misfit [m], the motion (4, 4) and the joint values after so many fits of the joints, each but
+        the first of two after one of the place."""
+        model, found, motion = self._model, dict(joints), np.eye(4)
+        shapes = self._parts_of(body)
 
         def points_at(values: dict[str, float]) -> np.ndarray:
             with model.world.joints_at(body, values):
                 return np.concatenate([apply(model.world.link_pose(body, k), own) for k, own in shapes.items()])
 
-        motion = np.eye(4)
-        for turn in range(2):
+        for turn in range(turns):
+            if turn > 0 or turns > 2:
+                moved = fit_upright(points, points_at(found), as_believed=True, as_high=True)
+                if self._off_its_place(body, moved) > MOST_MOVED:
+                    break  # that is no error of a map: something else was fitted
+                motion = moved
             seen = apply(inverse(motion), points)
             for joint in model.records[body].joints:
 
@@ -127,43 +175,114 @@ class CameraEyes:
                     return points_at(found | {name: value})
 
                 found[joint.name] = fit_joint(seen, of_joint, joint.lower, joint.upper, joints[joint.name])
-            if turn == 0:
-                motion = fit_upright(points, points_at(found), as_believed=True)
-                if np.linalg.norm(motion[:3, 3] + (motion[:3, :3] - np.eye(3)) @ points.mean(axis=0)) > MOST_MOVED:
-                    return np.eye(4), found  # that is no error of a map: something else was fitted
-        return motion, found
+        return misfit(apply(inverse(motion), points), points_at(found)), motion, found
 
-    def _look_for(self, body: str, class_name: str, *, closely: bool = False) -> np.ndarray:
-        """Return the points (N, 3) of the mask of its class that is nearest to where a body is believed, map frame;
+    def _parts_of(self, body: str) -> dict[str, np.ndarray]:
+        """Return points (N, 3) on each part of furniture, its own frame."""
+        if body not in self._parts:
+            meshes = link_shapes(self._model.text(body))
+            random = np.random.default_rng(0)
+            self._parts[body] = {
+                k: surface_points(own, FURNITURE_POINTS, random)[0] for k, own in meshes.items() if own
+            }
+        return self._parts[body]
+
+    def _off_its_place(self, body: str, motion: np.ndarray) -> float:
+        """Return how far [m] from where the map has furniture its middle comes by a motion (4, 4) from where it is
+        believed."""
+        middle = np.mean(self._model.world.bounds(body), axis=0)
+        mapped = self._mapped[body] @ inverse(self._model.pose(body))
+        return float(np.linalg.norm(apply(motion, middle[None])[0] - apply(mapped, middle[None])[0]))
+
+    def _look_for(self, body: str, class_name: str, *, closely: bool = False) -> Look:
+        """Return what the cameras show of the thing of its class that is nearest to where a body is believed;
         `closely`: at twice the resolution, and from above as well where the hand is free."""
-        map_from_true = self._robot.map_from_true()
-        believed = np.mean(self._model.world.bounds(body), axis=0)
-        target = apply(inverse(map_from_true), believed[None])[0]
+        target = self._believed_middle(body)
         base = self._robot.robot.configuration().base
         ahead = np.array([np.cos(base[2]), np.sin(base[2])])
-        renderer = self._pictures.sight(self._robot.world)
-        found = np.zeros((0, 3))
-        camera = scaled(CAMERA, 2.0) if closely else CAMERA
         hand = self._robot.held is None
         eyes = [np.array([*(base[:2] + forward * ahead), height]) for forward, height in EYES[: None if hand else 1]]
         if closely and hand:
-            back = base[:2] - target[:2]
-            back *= OVER_IT[0] / max(float(np.linalg.norm(back)), 1e-9)
-            eyes.append(target + np.array([*back, OVER_IT[1]]))
-        for eye in eyes:
+            eyes.append(_over(base, target))
+        return self._looks(body, class_name, [(eye, target) for eye in eyes], scaled(CAMERA, 2.0 if closely else 1.0))
+
+    def _search(self, body: str, class_name: str) -> Look:
+        """Return what a look all around shows of a thing that is not where it is believed, and a closer one at what was
+        found: what fell lies somewhere near."""
+        base = self._robot.robot.configuration().base
+        head = np.array([*base[:2], EYES[0][1]])
+        found = NOTHING
+        for heading in base[2] + 2 * np.pi * np.arange(HEADINGS) / HEADINGS:
+            for away in SWEPT:
+                target = np.array([*(base[:2] + away * np.array([np.cos(heading), np.sin(heading)])), 0.0])
+                look = self._looks(body, class_name, [(head, target)], CAMERA, FALLEN)
+                if len(look.points) > len(found.points):
+                    found = look
+        if not len(found.points):
+            return found
+        target = apply(inverse(self._robot.map_from_true()), np.median(found.points, axis=0)[None])[0]
+        views = [(head, target), (_over(base, target), target)][: 2 if self._robot.held is None else 1]
+        return self._looks(body, class_name, views, scaled(CAMERA, 2.0), FALLEN)
+
+    def _believed_middle(self, body: str) -> np.ndarray:
+        """Return where the middle of a body (3,) would truly be if it is where it is believed."""
+        believed = np.mean(self._model.world.bounds(body), axis=0)
+        return apply(inverse(self._robot.map_from_true()), believed[None])[0]
+
+    def _looks(
+        self,
+        body: str,
+        class_name: str,
+        views: list[tuple[np.ndarray, np.ndarray]],
+        camera: Camera,
+        radius: float | None = None,
+    ) -> Look:
+        """Return what cameras show of a thing of a class, at most `radius` [m] from where a body is believed (or the
+        eyes' own); `views`: where each stands and what it looks at, both (3,), as they truly are."""
+        map_from_true = self._robot.map_from_true()
+        low, high = self._model.world.bounds(body)
+        carriable = self._model.records[body].carriable
+        if carriable:
+            low = high = (low + high) / 2  # of furniture any side may be in sight
+        renderer = self._pictures.sight(self._robot.world)
+        found, eyes = np.zeros((0, 3)), []
+        for eye, target in views:
             pose = look_at(eye, target)
             picture = take(renderer, camera, pose, self._random)
             clouds = [
                 points
                 for number in np.unique(picture.instance)
                 if self._made_out(int(number), picture.instance == number, class_name)
-                and len(points := cloud(picture, picture.instance == number, map_from_true @ pose))
+                and len(points := cloud(picture, picture.instance == number, map_from_true @ pose, whole=not carriable))
+                and not self._of_another(body, class_name, points)
             ]
-            goal = np.median(found, axis=0) if len(found) else believed
-            away = [float(np.linalg.norm(np.median(points, axis=0) - goal)) for points in clouds]
-            if clouds and min(away) < (SAME if len(found) else self._radius):
+            if carriable and len(found):
+                low = high = np.median(found, axis=0)
+            middles = [np.median(points, axis=0) for points in clouds]
+            away = [float(np.linalg.norm(middle - np.clip(middle, low, high))) for middle in middles]
+            if clouds and min(away) < (SAME if carriable and len(found) else radius or self._radius):
                 found = np.concatenate([found, clouds[int(np.argmin(away))]])
-        return found
+                eyes.append(apply(map_from_true, eye[None])[0])
+        return Look(found, tuple(eyes))
+
+    def _of_another(self, body: str, class_name: str, points: np.ndarray) -> bool:
+        """Whether points (N, 3) are rather of another thing of a class that is believed to be nearer to them, and as
+        near as one cloud is to another of the same thing."""
+        middle = np.median(points, axis=0)
+
+        def away(name: str) -> float:
+            return float(np.linalg.norm(np.mean(self._model.world.bounds(name), axis=0) - middle))
+
+        others = [
+            name
+            for name, record in self._model.records.items()
+            if name != body
+            and record.carriable
+            and alike(record.class_name, class_name)
+            and name in self._model.world.bodies
+        ]
+        nearest = min(map(away, others), default=np.inf)
+        return nearest < min(SAME, away(body))
 
     def _made_out(self, number: int, mask: np.ndarray, class_name: str) -> bool:
         """Whether the segmentation takes an instance of a picture for something of a class."""

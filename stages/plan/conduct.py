@@ -21,14 +21,17 @@ from stages.plan.action import MotionRequest, action_named
 from stages.plan.affordances import CARRIER_CLASSES
 from stages.plan.carriers import NOTHING, carrier
 from stages.plan.correspondence import match_joint
+from stages.plan.erring_robot import ErringRobot
 from stages.plan.eyes import Eyes, Room
 from stages.plan.level_carrying import LEVEL_PACE, levelled
 from stages.plan.pick_place import Budgets
-from stages.plan.refinement import DRIVE, Step, grasp_style, refine_action
+from stages.plan.refinement import DRIVE, Step, grasp_style, put_there_later, refine_action
 from stages.plan.world_model import RobotState, Snapshot, WorldModel, hold_for_checks
 
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
+LOOKS = 3
+"""From so many places at most an action is looked at before it is carried out."""
 JOINT_TOLERANCE = 0.05
 """A joint further than this from where a motion should have left it is taken to be where it is [rad or m]."""
 
@@ -63,6 +66,8 @@ class Conduct:
     """Called with the index of its last step when an action has been carried out."""
     eyes: Eyes | None = None
     """What looks tell; a plan that is replayed needs none."""
+    seen_frames: dict[str, np.ndarray] = field(default_factory=dict)
+    """Body -> how the frame of the shape that it was seen with lies in its frame in the room (4, 4)."""
     steps: list[Step] = field(default_factory=list)
     """The plan; what was planned anew stands in the place of what could not be carried out."""
 
@@ -137,7 +142,8 @@ class Conduct:
             try:
                 preferred = self._looked(group[-1], anchor)
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
-                request = MotionRequest(arguments, self.budgets, self.random, preferred, style)
+                further = put_there_later(name, arguments, following)
+                request = MotionRequest(arguments, self.budgets, self.random, preferred, style, further=further)
                 again = self.eyes is not None and self.eyes.again
                 before = self.model.snapshot() if again else None
                 steps, after = refine_action(self.model, state, name, request, origin)
@@ -178,18 +184,35 @@ class Conduct:
         self, before: Snapshot, state: RobotState, steps: list[Step], request: MotionRequest, origin: str
     ) -> tuple[list[Step], RobotState]:
         """Carry out the drive that an action begins with, look once more from there and return the steps from there on,
-        with the grasp or place of the planned ones where it still serves. `before`: the model before they were planned.
-        Raises MotionFailed."""
-        drive, step = steps[:2]
-        self._execute(drive)
-        there = replace(state, base=drive.segments[-1].path[-1, :3])
-        self.model.restore(before)
-        hold_for_checks(self.model, there)
-        preferred = self._looked(step, self._anchor(step))
-        if preferred is None:
-            return refine_action(self.model, there, step.name, replace(request, base=there.base), origin)
-        preferred = (there.base, preferred[1])
-        return refine_action(self.model, there, step.name, replace(request, preferred=preferred), origin)
+        with the grasp or place of the planned ones where it still serves. Where nothing serves from there it drives and
+        looks again, so that nothing is taken by what was seen from elsewhere. `before`: the model before they were
+        planned. Raises MotionFailed."""
+        for look in range(LOOKS):
+            drive, step = steps[:2]
+            self._execute(drive)
+            there = replace(state, base=drive.segments[-1].path[-1, :3])
+            self.model.restore(before)
+            there = self._perceived(there)
+            hold_for_checks(self.model, there)
+            preferred = self._looked(step, self._anchor(step))
+            if preferred is not None:
+                preferred = (there.base, preferred[1])
+            before = self.model.snapshot()
+            wish = replace(request, preferred=preferred)
+            try:
+                measured = self._measured(wish, there.base)
+                return refine_action(self.model, there, step.name, measured, origin)
+            except MotionFailed:
+                steps, after = refine_action(self.model, there, step.name, wish, origin)
+            if steps[0].name != DRIVE or look == LOOKS - 1:
+                break
+            state = there
+        return steps, after
+
+    @staticmethod
+    def _measured(request: MotionRequest, base: np.ndarray) -> MotionRequest:
+        """Return a request for a motion from where a look was taken, which has shown how wide things are."""
+        return replace(request, base=base, budgets=replace(request.budgets, size_uncertainty=0.0))
 
     def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
         """Return the state after the way back, None (and a note) when the arm does not get there either."""
@@ -225,6 +248,15 @@ class Conduct:
         believed = self.model.records[body]
         kept = {"parent": believed.parent, "movable": believed.movable, "furniture": believed.furniture}
         self.model.see(body, record.model_copy(update=kept), text, planes)
+        self.seen_frames[body] = inverse(self._map_from_true() @ self.physical.world.pose(here)) @ self.model.pose(body)
+
+    def _map_from_true(self) -> np.ndarray:
+        return self.physical.map_from_true() if isinstance(self.physical, ErringRobot) else np.eye(4)
+
+    def pose_in_room(self, body: str) -> np.ndarray:
+        """Return the pose (4, 4) of a body of the plan in the room, by the frame of the shape that it is seen with.
+        Raises MotionFailed `not_found`."""
+        return self.physical.world.pose(self.matched(body)) @ self.seen_frames.get(body, np.eye(4))
 
     def look_around(self) -> None:
         """Take over everything that moves or has joints and has a counterpart in the room; of what is held its pose.
@@ -236,7 +268,7 @@ class Conduct:
             if match.matched is None or record is None:
                 continue
             if match.matched == self.physical.held:
-                self.model.world.set_pose(body, self.physical.world.pose(match.matched))
+                self.model.world.set_pose(body, self.pose_in_room(body))
             elif record.carriable or record.joints:
                 self._see(body, match.matched)
 
@@ -309,6 +341,7 @@ class Conduct:
             return RobotState(base, arm)
         tool_from_item = self.physical.held_pose()
         if state.holding is not None:
+            tool_from_item = tool_from_item @ self.seen_frames.get(state.holding, np.eye(4))
             self._take_along(state.holding)
             self.model.checker.carry(state.holding, tool_from_item)
         return RobotState(base, arm, state.holding, tool_from_item, inverse(tool_from_item))
@@ -341,7 +374,7 @@ class Conduct:
             here = self.matches[body].matched
             if here is None:
                 continue
-            self.model.world.set_pose(body, self.physical.world.pose(here))
+            self.model.world.set_pose(body, self.pose_in_room(body))
             below = carrier(self.physical.world, here)
             if body != item and below is not None and planned.get(below) not in (item, *load):
                 self.model.put_on(body, planned.get(below, NOTHING))

@@ -19,7 +19,7 @@ from stages.kit.simulation.robot import Configuration
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
-from stages.plan.tray_loading import lifts_left, load_moments
+from stages.plan.tray_loading import lifts_left, lifts_left_beside, load_moments
 from stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
@@ -124,11 +124,13 @@ def plan_pick(
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
     style: GraspStyle = "any",
+    base: np.ndarray | None = None,
 ) -> Manipulation:
     """Return the motion that takes `item` off (or out of) `source`, base pose included.
 
     `preferred` (base (3,), body_from_tool (4, 4)) is tried first. `style` is what the place where it goes next asks
-    for. Raises MotionFailed: `no_grasp` when the item is too wide for the gripper, otherwise what ended most attempts.
+    for; `base` (3,): from there or not at all. Raises MotionFailed: `no_grasp` when the item is too wide for the
+    gripper, otherwise what ended most attempts.
     """
     world_from_item = model.pose(item)
     points, normals = model.surface(item)
@@ -156,7 +158,7 @@ def plan_pick(
     tally = Tally()
     checker = model.checker
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
-    bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, None)
+    bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, base)
     queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
     if model.laden(item):
         moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
@@ -173,7 +175,7 @@ def plan_pick(
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     checker.allow(touch=model.links(item))
     try:
-        attempts = (_try_pick(model, state, item, source, base, grasp, arm_planner, tally) for base, grasp in queue)
+        attempts = (_try_pick(model, state, item, source, at, grasp, arm_planner, tally) for at, grasp in queue)
         motion = _first_motion(attempts, budgets.paths)
         if motion is not None:
             return motion
@@ -306,15 +308,18 @@ def plan_place(
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
+    base: np.ndarray | None = None,
+    further: tuple[str, ...] = (),
 ) -> Manipulation:
     """Return the motion that puts the held `item` down on `target`, or in it behind `door`, base pose included.
 
-    `preferred` (base (3,), world_from_item (4, 4)) is tried first. Raises MotionFailed: `no_placement` when no
-    free place there carries the item's footprint, otherwise what ended most attempts.
+    `preferred` (base (3,), world_from_item (4, 4)) is tried first; `base` (3,): from there or not at all; `further`:
+    what is put there later. Raises MotionFailed: `no_placement` when no free place there carries the item's footprint,
+    otherwise what ended most attempts.
     """
     assert state.tool_from_item is not None
     on_tray = model.records[target].carriable
-    places = sample_placements(model, item, target, door, random, 2 * PLACES if on_tray else PLACES)
+    places = sample_placements(model, item, target, door, random, 4 * PLACES if on_tray else PLACES)
     if not places and preferred is None:
         regions = place_regions(model, item, target, door)
         raise MotionFailed(
@@ -324,10 +329,17 @@ def plan_place(
             {"places": len(regions)},
         )
     if on_tray and places:
-        left = lifts_left(
-            model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
+        poses = np.array([place.world_from_item for place in places])
+        left = lifts_left(model, target, item, poses, budgets.size_uncertainty)
+        later = left
+        if further and left.any():
+            spots = sample_placements(model, further[0], target, door, random)
+            beside = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
+            later = lifts_left_beside(model, target, item, poses, further[0], beside, budgets.size_uncertainty)
+        order = sorted(
+            range(len(places)),
+            key=lambda index: (not later[index], not places[index].roomy, -later[index], -left[index]),
         )
-        order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
@@ -340,13 +352,16 @@ def plan_place(
     checker.allow(touch=model.links(item))
     for place in places[: max(4, budgets.bases // 6)]:
         goal = place.world_from_item[:3, 3]
-        bases = possible_bases(model.description, state.base, goal, model.room, budgets.bases // 8, random)
-        bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
-        queue += [(base, place) for base in bases]
+        if base is None:
+            bases = possible_bases(model.description, state.base, goal, model.room, budgets.bases // 8, random)
+            bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
+        else:
+            bases = base[None]
+        queue += [(at, place) for at in bases]
     try:
         attempts = (
-            _try_place(model, state, item, target, base, place, arm_planner, tally)
-            for base, place in queue[: budgets.pairs]
+            _try_place(model, state, item, target, at, place, arm_planner, tally)
+            for at, place in queue[: budgets.pairs]
         )
         motion = _first_motion(attempts, budgets.paths)
         if motion is not None:
@@ -385,7 +400,9 @@ def _try_place(
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     place = placement.world_from_item
-    touch, rest = model.links(item), {link: RESTING_DEPTH for link in model.links(target)}
+    # a foot that is let down on a tray's rim tips over
+    depth = 0.0 if model.records[target].carriable else RESTING_DEPTH
+    touch, rest = model.links(item), dict.fromkeys(model.links(target), depth)
     checker.allow(touch=touch, rest_on=rest)
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
     outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])

@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from schemas.plan import Failure, TriedPlan
-from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.segments import Manipulation, Segment
 from stages.kit.tasks.fast_downward import plan_with_fast_downward
@@ -16,6 +15,7 @@ from stages.kit.tasks.strips import Atom, GroundAction, Problem, apply_action, a
 from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
 from stages.plan.action import MotionRequest, action_named
 from stages.plan.domain import DOMAIN, START
+from stages.plan.driving import drive_way
 from stages.plan.learning import Lessons
 from stages.plan.pick_place import Budgets, GraspStyle
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
@@ -25,6 +25,8 @@ TASK_STATES = (6000, 50_000)
 DRIVE = "drive"
 LADEN_PACE = 0.25
 """Share of the full speed at which the robot drives with a laden tray."""
+BASES = 3
+"""From so many bases is an action tried that the robot does not get to."""
 FINAL = ("no_grasp",)
 """Failures that no other draw of the random choices can avoid."""
 
@@ -66,42 +68,71 @@ def grasp_style(model: WorldModel, item: str, following: list[tuple[str, tuple[s
     return "any"
 
 
+def put_there_later(
+    name: str, arguments: tuple[str, ...], following: list[tuple[str, tuple[str, ...]]]
+) -> tuple[str, ...]:
+    """Return what later actions, (name, arguments), put where an action puts something."""
+    if action_named(name).hand != "puts":
+        return ()
+    return tuple(
+        later[0] for other, later in following if action_named(other).hand == "puts" and later[1] == arguments[1]
+    )
+
+
 def refine_action(
     model: WorldModel, state: RobotState, name: str, request: MotionRequest, origin: str
 ) -> tuple[list[Step], RobotState]:
     """Return the drives and manipulations of one action, and the robot's state after it; the model is changed too.
 
-    `origin` names where the drive begins. Raises MotionFailed; the model is then as before.
+    `origin` names where the drive begins. A base that the robot does not get to is left for another one, `BASES` times
+    at most. Raises MotionFailed; the model is then as before.
     """
+    snapshot = model.snapshot()
+    for left in reversed(range(BASES)):
+        try:
+            return _refined(model, state, name, request, origin)
+        except _NoWay as no_way:
+            model.restore(snapshot)
+            if not left:
+                raise no_way.failed from None
+            request = replace(request, preferred=None)
+        except MotionFailed:
+            model.restore(snapshot)
+            raise
+    raise AssertionError("unreachable")
+
+
+class _NoWay(Exception):
+    """The base does not get to where a manipulation begins."""
+
+    def __init__(self, failed: MotionFailed) -> None:
+        super().__init__(str(failed))
+        self.failed = failed
+
+
+def _refined(
+    model: WorldModel, state: RobotState, name: str, request: MotionRequest, origin: str
+) -> tuple[list[Step], RobotState]:
+    """As `refine_action`, by the first bases that manipulations are found from. Raises MotionFailed and _NoWay."""
     action, arguments = action_named(name), request.arguments
     target = action.target(arguments)
-    snapshot = model.snapshot()
     steps: list[Step] = []
-    try:
-        action.begin(model, arguments)
-        for manipulation in action.manipulate(model, state, request):
-            hold_for_checks(model, state)
-            path = plan_drive(
-                state.base,
-                manipulation.base,
-                state.arm,
-                model.checker,
-                model.room,
-                request.random,
-                samples=request.budgets.path_samples,
-            )
-            manipulation, path = _same_turns(model, manipulation, path)
-            rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
-            pace = LADEN_PACE if state.holding is not None and model.laden(state.holding) else 1.0
-            if len(path) > 1:
-                # with the fingers together, though the way was checked with open ones: that much more clearance
-                steps.append(Step(DRIVE, (origin, target), (Segment(rows, 0.0, pace, "", state.holding),), None))
-            steps.append(Step(name, arguments, manipulation.segments, manipulation))
-            state = action.effect(model, state, arguments, manipulation)
-            origin = target
-    except MotionFailed:
-        model.restore(snapshot)
-        raise
+    action.begin(model, arguments)
+    for manipulation in action.manipulate(model, state, request):
+        hold_for_checks(model, state)
+        try:
+            path = drive_way(model, state, manipulation.base, request.random, request.budgets.path_samples)
+        except MotionFailed as failed:
+            raise _NoWay(failed) from None
+        manipulation, path = _same_turns(model, manipulation, path)
+        rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
+        pace = LADEN_PACE if state.holding is not None and model.laden(state.holding) else 1.0
+        if len(path) > 1:
+            # with the fingers together, though the way was checked with open ones: that much more clearance
+            steps.append(Step(DRIVE, (origin, target), (Segment(rows, 0.0, pace, "", state.holding),), None))
+        steps.append(Step(name, arguments, manipulation.segments, manipulation))
+        state = action.effect(model, state, arguments, manipulation)
+        origin = target
     return steps, state
 
 
@@ -134,9 +165,9 @@ def refine_plan(
                 continue
             style = grasp_style(model, arguments[0], plain[place + 1 :]) if kind.hand == "takes" else "any"
             try:
-                own, state = refine_action(
-                    model, state, kind.name, MotionRequest(arguments, budgets, random, style=style), origin
-                )
+                further = put_there_later(kind.name, arguments, plain[place + 1 :])
+                request = MotionRequest(arguments, budgets, random, style=style, further=further)
+                own, state = refine_action(model, state, kind.name, request, origin)
             except MotionFailed as failed:
                 failure = failed.failure.model_copy(update={"action": action.text})
                 raise RefinementFailed(place, action, failure) from None

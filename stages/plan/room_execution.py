@@ -57,9 +57,10 @@ NOISY = (
     "placing are planned anew from where the robot stands then"
 )
 CAMERAS = (
-    "before each action the planned shapes of what it names were fitted to two rendered depth pictures, poses of what "
-    "can be carried and joint values of furniture; of a tray from near by the shape was seen too, from over it where "
-    "the hand was free; all else it knew from the planned scene. Whether an action had its effect is told by the room"
+    "before each action the planned shapes of what it names were fitted to rendered depth pictures: how what can be "
+    "carried lies and, from near by, how large it is, where furniture stands and how far it is open; of a tray from "
+    "near by the shape was seen; from over things where the hand was free; all else it knew from the planned scene. "
+    "Whether an action had its effect is told by the room"
 )
 PROPRIOCEPTION = "the pose of a held item in the hand was read from the simulation"
 GRIP = "items are held by friction of the two fingers alone; no constraint is added"
@@ -220,9 +221,11 @@ def execute(
 def _robot(
     world: PhysicsWorld, model: WorldModel, start: Configuration, parameters: PlanParameters, context: Context
 ) -> PhysicalRobot:
+    # A hand's fingers go together: with a motor each, what they hold is free to slide between them by centimetres.
+    description = replace(model.description, coupled_fingers=True)
     if parameters.eyes == "true":
-        return PhysicalRobot(world, model.description, start, RECORD_RATE)
-    return ErringRobot(world, model.description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
+        return PhysicalRobot(world, description, start, RECORD_RATE)
+    return ErringRobot(world, description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
 
 
 @dataclass(frozen=True)

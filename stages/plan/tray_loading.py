@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stages.kit.motion.grasps import narrowest_width
 from stages.plan.rim_grasps import rim_grasps
 
 if TYPE_CHECKING:
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 PALM_ROOM = 0.008
 """Free room wanted beside the palm [m]."""
+BESIDE = 0.012
+"""Things stand at least this far apart [m]: a finger is between them as one is put down."""
 GRAVITY = 9.81
 
 
@@ -42,21 +45,49 @@ def load_moments(model: WorldModel, tray: str, tool_poses: np.ndarray) -> np.nda
     return holding_moments(tool_poses, np.array([model.pose(name)[:2, 3] for name in names]), masses)
 
 
+class Lifts:
+    """The rim grasps of a tray with its load, and how many of them are left when more is put on it."""
+
+    def __init__(self, model: WorldModel, tray: str, more: tuple[str, ...], uncertainty: float) -> None:
+        world_from_tray = model.pose(tray)
+        grasps = rim_grasps(model.points(tray), world_from_tray, np.random.default_rng(0), uncertainty=uncertainty)
+        self._poses = np.array([world_from_tray @ grasp.body_from_tool for grasp in grasps]).reshape(-1, 4, 4)
+        self._middle = world_from_tray[:2, 3]
+        self._standing = {name: model.pose(name)[:2, 3] for name in model.load(tray)}
+        names = {*self._standing, *more}
+        self._radius = {name: model.footprint(name)[0] for name in names}
+        self._mass = {name: model.records[name].mass for name in (tray, *names)}
+        self._tray, self._hand = tray, model.description
+
+    def left(self, put: dict[str, np.ndarray]) -> int:
+        """Return by how many the tray is lifted with things put at places (2,), world: the palm over nothing, the
+        fingers bearing the moment."""
+        if not len(self._poses):
+            return 0
+        at = self._standing | put
+        feet = np.array([[*place, self._radius[name]] for name, place in at.items()])
+        masses = np.array([self._mass[name] for name in (self._tray, *at)])
+        moments = holding_moments(self._poses, np.concatenate([self._middle[None], feet[:, :2]]), masses)
+        return int((free_lanes(self._poses, feet, self._hand.palm) & (moments < self._hand.holding_moment)).sum())
+
+
 def lifts_left(model: WorldModel, tray: str, item: str, places: np.ndarray, uncertainty: float = 0.0) -> np.ndarray:
     """Return, per pose world_from_item (N, 4, 4), by how many rim grasps the tray can be lifted when the item stands
     there, the palm over nothing and the fingers bearing the moment: (N,) int. `uncertainty` as in `rim_grasps` [m]."""
-    world_from_tray = model.pose(tray)
-    grasps = rim_grasps(model.points(tray), world_from_tray, np.random.default_rng(0), uncertainty=uncertainty)
-    if not grasps:
-        return np.zeros(len(places), dtype=int)
-    poses = np.array([world_from_tray @ grasp.body_from_tool for grasp in grasps])
-    others = [name for name in model.load(tray) if name != item]
-    feet = [[*model.pose(name)[:2, 3], model.footprint(name)[0]] for name in others]
-    masses = np.array([model.records[name].mass for name in (tray, *others, item)])
-    lifts = []
-    for place in places:
-        standing = np.array([*feet, [*place[:2, 3], model.footprint(item)[0]]])
-        free = free_lanes(poses, standing, model.description.palm)
-        moments = holding_moments(poses, np.concatenate([world_from_tray[None, :2, 3], standing[:, :2]]), masses)
-        lifts.append(int((free & (moments < model.description.holding_moment)).sum()))
-    return np.array(lifts)
+    lifts = Lifts(model, tray, (item,), uncertainty)
+    return np.array([lifts.left({item: place[:2, 3]}) for place in places], dtype=int)
+
+
+def lifts_left_beside(
+    model: WorldModel, tray: str, item: str, places: np.ndarray, other: str, spots: np.ndarray, uncertainty: float = 0.0
+) -> np.ndarray:
+    """Return the same per pose (N, 4, 4) of an item that `other` is put beside later: with that at the best of the
+    poses `spots` (M, 4, 4) where it has room; what sticks out of things, as handles do, can be turned away."""
+    lifts = Lifts(model, tray, (item, other), uncertainty)
+    apart = BESIDE + sum(narrowest_width(model.points(name)) / 2 for name in (item, other))
+    left = np.zeros(len(places), dtype=int)
+    for number, place in enumerate(places):
+        for spot in spots:
+            if np.linalg.norm(place[:2, 3] - spot[:2, 3]) > apart:
+                left[number] = max(left[number], lifts.left({item: place[:2, 3], other: spot[:2, 3]}))
+    return left

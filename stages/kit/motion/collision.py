@@ -5,7 +5,8 @@ Two checkers of one meaning: pybullet's on the meshes, and a compiled one that s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,6 +120,17 @@ class CollisionChecker:
         for index in body.links.values():
             self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
         return depths
+
+    @contextmanager
+    def keeping(self, clearance: float) -> Iterator[None]:
+        """Keep another clearance [m] meanwhile."""
+        before, self.clearance = self.clearance, clearance
+        self.compiled.keep(clearance)
+        try:
+            yield
+        finally:
+            self.clearance = before
+            self.compiled.keep(before)
 
     # --- queries ----------------------------------------------------------------------------------------------
 

@@ -49,6 +49,13 @@ class CompiledModel:
         self.arm: RobotArrays
         self.scene: SceneArrays
 
+    def keep(self, clearance: float) -> None:
+        """Keep another clearance [m] from now on."""
+        self.clearance = clearance
+        self._robot_state = None
+        if self._bodies is not None:
+            self.scene = self.scene._replace(distance=clearance + APART)
+
     def update(
         self,
         carried: str | None,

@@ -41,10 +41,11 @@ def take(
     return Picture(seen.color, depth, seen.instance, camera)
 
 
-def cloud(picture: Picture, mask: np.ndarray, map_from_camera: np.ndarray) -> np.ndarray:
-    """Return the points (N, 3) of a mask (H, W) in the map frame: its largest cluster; none where too few are left."""
+def cloud(picture: Picture, mask: np.ndarray, map_from_camera: np.ndarray, *, whole: bool = False) -> np.ndarray:
+    """Return the points (N, 3) of a mask (H, W) in the map frame: its largest cluster, or the `whole` of what may be
+    seen in pieces; none where too few are left."""
     inner = binary_erosion(mask) & (picture.depth > 0)
     if inner.sum() < LEAST_PIXELS:
         return np.zeros((0, 3))
     points = apply(map_from_camera, back_project(picture.depth, picture.camera)[inner].astype(float))
-    return points[clusters(points, LINK) == 0]
+    return points if whole else points[clusters(points, LINK) == 0]

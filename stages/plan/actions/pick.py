@@ -78,7 +78,17 @@ class Pick(PlanAction):
         """Return the grasp and the lift. Raises MotionFailed as `plan_pick` does."""
         item, source = request.arguments[:2]
         return (
-            plan_pick(model, state, item, source, request.budgets, request.random, request.preferred, request.style),
+            plan_pick(
+                model,
+                state,
+                item,
+                source,
+                request.budgets,
+                request.random,
+                request.preferred,
+                request.style,
+                request.base,
+            ),
         )
 
     def effect(

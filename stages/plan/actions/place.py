@@ -79,7 +79,20 @@ class Place(PlanAction):
         """Return the motion that puts it down. Raises MotionFailed as `plan_place` does."""
         item, target = request.arguments[:2]
         door = _door(request.arguments)
-        return (plan_place(model, state, item, target, door, request.budgets, request.random, request.preferred),)
+        return (
+            plan_place(
+                model,
+                state,
+                item,
+                target,
+                door,
+                request.budgets,
+                request.random,
+                request.preferred,
+                request.base,
+                request.further,
+            ),
+        )
 
     def grasp_style(self, model: WorldModel, item: str, arguments: tuple[str, ...]) -> GraspStyle | None:
         """As the place where it goes asks for."""
@@ -120,10 +133,10 @@ class Place(PlanAction):
     def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
         """It stands on its target as it was to stand."""
         item, target = arguments[:2]
-        world, here, there = conduct.physical.world, conduct.matched(item), conduct.matched(target)
-        parent = carrier(world, here)
+        here, there = conduct.matched(item), conduct.matched(target)
+        parent = carrier(conduct.physical.world, here)
         standing = conduct.model.standing(item)
-        tilt = float(np.arccos(np.clip((world.pose(here) @ standing.T)[2, 2], -1.0, 1.0)))
+        tilt = float(np.arccos(np.clip((conduct.pose_in_room(item) @ standing.T)[2, 2], -1.0, 1.0)))
         fell = tilt > MOST_TILT and abs(standing[2, 2]) > 0.5
         if parent != there or fell:
             raise MotionFailed(

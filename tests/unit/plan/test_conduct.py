@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,9 +13,10 @@ import pytest
 from schemas.plan import BodyMatch
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.segments import Manipulation
+from stages.kit.motion.segments import Manipulation, Segment
 from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from stages.plan import conduct as conduct_module
+from stages.plan.action import MotionRequest
 from stages.plan.actions.place import MOST_TILT, Place
 from stages.plan.conduct import Conduct
 from stages.plan.eyes import Room, TrueEyes
@@ -480,3 +482,51 @@ def test_a_look_around_sees_what_stands_on_what_is_held(carrying: Conduct) -> No
         np.testing.assert_allclose(model.pose(name), world.pose(name), atol=1e-6)
     model.take_aboard("bottle_7")
     np.testing.assert_allclose(cup_over_bottle(model), [0.0, 0.02, 0.201], atol=1e-6)
+
+
+class Looking(Conduct):
+    """Drives take no time, looks show nothing new."""
+
+    driven: list[float]
+
+    def _execute(self, step: Step) -> None:
+        self.driven.append(float(step.segments[-1].path[-1, 0]))
+
+    def _perceived(self, state: RobotState) -> RobotState:
+        return state
+
+    def _looked(self, step, before):  # type: ignore[no-untyped-def]
+        return None
+
+
+def test_where_nothing_serves_from_there_it_drives_on_and_looks_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From 1 m along nothing can be grasped, from 2 m it can: by a look from there, with the size it then has."""
+    room = Room({}, {}, {})
+    model = SimpleNamespace(
+        restore=lambda before: None,
+        snapshot=lambda: None,
+        pose=lambda body: np.eye(4),
+        text=lambda body: "",
+        links=lambda body: (),
+        checker=SimpleNamespace(allow=lambda touch: None, put_down=lambda: None),
+    )
+    physical = SimpleNamespace(action=-1, held=None)
+    conduct = Looking(model, room, physical, {}, {}, BUDGETS, np.random.default_rng(0), True, 2)  # type: ignore[arg-type]
+    conduct.driven = []
+    asked: list[tuple[float, bool]] = []
+
+    def drive_to(x: float) -> Step:
+        return Step("drive", ("start", "cup"), (Segment(np.array([[x, *np.zeros(9)]]), 0.0),), None)
+
+    def refined(model, state, name, request, origin):  # type: ignore[no-untyped-def]
+        asked.append((float(state.base[0]), request.base is not None))
+        if request.base is not None and state.base[0] < 2.0:
+            raise MotionFailed("no_path", "not from here", ("cup",))
+        return [act("pick", "cup", "table")] if request.base is not None else [drive_to(2.0), PLAN[1]], state
+
+    monkeypatch.setattr(conduct_module, "refine_action", refined)
+    request = MotionRequest(("cup", "table"), replace(BUDGETS, size_uncertainty=0.02), np.random.default_rng(0))
+    steps, _ = conduct._look_from_there(None, START, [drive_to(1.0), PLAN[1]], request, "start")  # type: ignore[arg-type]
+    assert [step.name for step in steps] == ["pick"]
+    assert conduct.driven == [1.0, 2.0]
+    assert asked == [(1.0, True), (1.0, False), (2.0, True)]

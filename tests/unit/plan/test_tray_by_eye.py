@@ -16,7 +16,7 @@ from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, Segment
 from stages.kit.simulation.robot import Configuration
 from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.world import load_scene, read_scene_bodies
-from stages.plan.camera_eyes import CameraEyes
+from stages.plan.camera_eyes import CameraEyes, Look
 from stages.plan.erring_robot import ErringRobot
 from stages.plan.eyes import Room
 from stages.plan.pictures import RoomPictures
@@ -82,9 +82,9 @@ def test_what_hides_a_part_of_it_does_not_make_it_smaller(
     whole, text = look(sight), sight.model.text("tray_6")
     points = CameraEyes._look_for
 
-    def hidden(self: CameraEyes, body: str, class_name: str, *, closely: bool = False) -> np.ndarray:
+    def hidden(self: CameraEyes, body: str, class_name: str, *, closely: bool = False) -> Look:
         found = points(self, body, class_name, closely=closely)
-        return found[apply(inverse(tray().world_from_body), found)[:, 0] < 0.08]
+        return replace(found, points=found.points[apply(inverse(tray().world_from_body), found.points)[:, 0] < 0.08])
 
     monkeypatch.setattr(CameraEyes, "_look_for", hidden)
     part = look(sight)

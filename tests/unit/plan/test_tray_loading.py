@@ -15,7 +15,15 @@ from stages.kit.geometry.transforms import apply, transform_from_yaw
 from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.shapes import surface_points
 from stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, has_rim, rim_grasps
-from stages.plan.tray_loading import GRAVITY, PALM_ROOM, free_lanes, holding_moments, lifts_left, load_moments
+from stages.plan.tray_loading import (
+    GRAVITY,
+    PALM_ROOM,
+    free_lanes,
+    holding_moments,
+    lifts_left,
+    lifts_left_beside,
+    load_moments,
+)
 from stages.plan.world_model import WorldModel
 from tests.unit.simulation.handmade_scene import HandmadeBody, floor, table, write_scene
 
@@ -261,3 +269,15 @@ def test_a_round_rim_is_square_everywhere() -> None:
     wall = np.column_stack([np.linspace(-0.1, 0.1, 400), np.full(400, 0.12)])
     turned = wall @ np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
     assert askew(turned[:, 0], turned[:, 1]) == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_place_in_the_middle_of_a_tray_leaves_no_room_for_what_comes_next(model: WorldModel) -> None:
+    """The other can has one spot, 6 cm beside the middle: beside the item at one end it can stand there, not beside
+    one in the middle. And what both leave is what is counted with the other put there first."""
+    places = np.array([on_tray(model, x, 0.0) for x in (0.0, -0.14)])
+    spots = on_tray(model, 0.055, 0.0)[None]
+    left = lifts_left_beside(model, "tray_6", "can_7", places, "can_8", spots)
+    model.world.set_pose("can_8", spots[0])
+    model.put_on("can_8", "tray_6")
+    assert left[0] == 0
+    assert left[1] == lifts_left(model, "tray_6", "can_7", places)[1] > 0
