@@ -358,13 +358,13 @@ class OwnSkills(CommonSkills):
         stations = ((base, False) for base in self._stations(place, item.position, take=True))
         last_resort = ((base, True) for _, base in self._before(place)[:1])
         for base, desperate in chain(stations, last_resort):
-            if executed and (desperate or not self._use.repair):
+            if (executed and desperate) or (tries and not self._use.repair):
                 break
             tries += 1
             if not self._there(base, place):
                 continue
-            sure = desperate or not self._use.reachability
-            if not sure and not self._body.reaches(self._body.base, item.position, take=True):
+            asks = self._use.reachability and self._use.repair and not desperate
+            if asks and not self._body.reaches(self._body.base, item.position, take=True):
                 self._failed_from(place, base, item.position)
                 continue
             while executed < TRIES:
