@@ -18,11 +18,12 @@ from schemas.plan import Failure
 from stages.agent.arms.next_view import ahead_of, best_floor_view, fallen_where, floor_seen, worth
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.arms.stations import APART, around, corners, drivable, other_sides
-from stages.agent.body import Base, Body, Detection, Position
+from stages.agent.body import Body
 from stages.agent.exploration import explore
 from stages.agent.goals import CARRIERS
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from stages.agent.scene_map import Item, Region, classes_not_of, quarter
+from stages.agent.senses import Base, Detection, Position
 
 SURE_OF_USE = 2
 """Regions of views by which a thing has to be ahead in being clean or used."""

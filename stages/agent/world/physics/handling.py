@@ -6,7 +6,7 @@ from math import hypot
 
 import numpy as np
 
-from stages.agent.body import Base, Felt, Position
+from stages.agent.senses import Base, Felt, Position
 from stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
 from stages.agent.world.physics.letting_go import DROP, JUST_OVER, SOME_WAY_OVER, Spot, plan_release
 from stages.agent.world.physics.looking import Looking

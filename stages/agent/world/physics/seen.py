@@ -8,8 +8,8 @@ from math import hypot
 
 import numpy as np
 
-from stages.agent.body import Base, Position, SeenFurniture
 from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.senses import Base, Position, SeenFurniture
 from stages.agent.world.physics import head
 from stages.agent.world.physics.beliefs import Believed
 from stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
