@@ -17,8 +17,8 @@ from foxglove_schemas_protobuf.SceneEntityDeletion_pb2 import SceneEntityDeletio
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from schemas.agent_episode import MapThing
-from stages.agent.body import Base
 from stages.agent.obstacle_map import CELL
+from stages.agent.senses import Base
 from stages.kit.formats import foxglove
 from stages.kit.formats.foxglove_log import foxglove_log
 

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stages.agent.body import Base, Body
+from stages.agent.body import Body
 from stages.agent.obstacle_map import CELL
 from stages.agent.scene_map import SceneMap
+from stages.agent.senses import Base
 
 MOST_STOPS = 60
 NEAR = 0.5

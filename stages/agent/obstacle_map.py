@@ -9,8 +9,8 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from schemas.apartment import LARGEST_SIDE
-from stages.agent.body import Base, Sweep
 from stages.agent.fast_marching import distances
+from stages.agent.senses import Base, Sweep
 
 CELL = 0.1
 """Edge of a cell [m]; cell (i, j) has its middle at (i, j) * CELL of the map frame."""

@@ -127,7 +127,7 @@ REPLAY = Stage(
 )
 EVALUATE = Stage(
     name="agent evaluate",
-    version=6,
+    version=7,
     summary="Compare arms of the agent over tasks and seeds in the fast world",
     parameters=EvaluateParameters,
     reads={},

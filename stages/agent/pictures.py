@@ -14,8 +14,8 @@ from matplotlib.patches import Circle, Rectangle
 from PIL import Image
 
 from schemas.agent_episode import MapThing
-from stages.agent.body import Base
 from stages.agent.obstacle_map import CELL
+from stages.agent.senses import Base
 
 MOST_PANELS = 6
 MOST_FRAMES, FRAME_MILLISECONDS = 24, 500

@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, pi
 
-from stages.agent.body import Base, Body, Detection, Position, SeenFurniture, Sweep
+from stages.agent.body import Body
 from stages.agent.goals import BOXES, CARRIERS, SMALL
 from stages.agent.language.values import ObjectMap, SceneObject
+from stages.agent.senses import Base, Detection, Position, SeenFurniture, Sweep
 from stages.kit.rendering.segmenter_errors import quarter_turn
 
 SAME_FURNITURE = 0.3

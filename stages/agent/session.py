@@ -9,11 +9,12 @@ from typing import Literal
 
 from schemas.plan import Failure
 from stages.agent.arms.skills import Skills
-from stages.agent.body import Base, Body
+from stages.agent.body import Body
 from stages.agent.brains.brain import Brain, Reply
 from stages.agent.language.interpreter import Called, Interpreter, Ran
 from stages.agent.language.program import PlanError, parse_program
 from stages.agent.language.values import Value
+from stages.agent.senses import Base
 from stages.kit.language.failures import LanguageFailed
 
 End = Literal["done", "give_up", "ask", "turns", "time", "repeats", "brain"]

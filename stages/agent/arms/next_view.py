@@ -13,9 +13,9 @@ from math import log2
 
 import numpy as np
 
-from stages.agent.body import Base
 from stages.agent.obstacle_map import CELL, OCCUPIED, ObstacleMap
 from stages.agent.scene_map import quarter
+from stages.agent.senses import Base
 
 WRONG = 0.1
 """**Assumed** rate of wrong votes of a region."""

@@ -18,11 +18,12 @@ from schemas.plan import Failure
 from stages.agent.arms.next_view import ahead_of, best_floor_view, fallen_where, floor_seen, worth
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.arms.stations import APART, around, corners, drivable, other_sides
-from stages.agent.body import Base, Body, Detection, Position
+from stages.agent.body import Body
 from stages.agent.exploration import explore
 from stages.agent.goals import CARRIERS
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from stages.agent.scene_map import Item, Region, classes_not_of, quarter
+from stages.agent.senses import Base, Detection, Position
 
 SURE_OF_USE = 2
 """Regions of views by which a thing has to be ahead in being clean or used."""
@@ -358,13 +359,13 @@ class OwnSkills(CommonSkills):
         stations = ((base, False) for base in self._stations(place, item.position, take=True))
         last_resort = ((base, True) for _, base in self._before(place)[:1])
         for base, desperate in chain(stations, last_resort):
-            if executed and (desperate or not self._use.repair):
+            if (executed and desperate) or (tries and not self._use.repair):
                 break
             tries += 1
             if not self._there(base, place):
                 continue
-            sure = desperate or not self._use.reachability
-            if not sure and not self._body.reaches(self._body.base, item.position, take=True):
+            asks = self._use.reachability and self._use.repair and not desperate
+            if asks and not self._body.reaches(self._body.base, item.position, take=True):
                 self._failed_from(place, base, item.position)
                 continue
             while executed < TRIES:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.arms.stations import around, drivable, middles
-from stages.agent.body import Position
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from stages.agent.scene_map import Item, quarter
+from stages.agent.senses import Position
 
 SHORT = 0.1
 """Sides whose middle is this much farther from the target than the nearest are no "short distance" [m]."""

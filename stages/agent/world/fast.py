@@ -11,8 +11,8 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 
 from schemas.apartment import Apartment, Furniture, Thing
-from stages.agent.body import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep
 from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.senses import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep
 from stages.agent.world.events import Event, EventLog
 from stages.agent.world.failures import Rates
 from stages.agent.world.floor import Floor

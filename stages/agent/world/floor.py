@@ -7,8 +7,8 @@ from math import pi
 import numpy as np
 
 from schemas.apartment import Apartment
-from stages.agent.body import Base
 from stages.agent.obstacle_map import CELL, cell_of
+from stages.agent.senses import Base
 
 RANGE, RAYS = 5.0, 360
 """Of the head camera [m], and rays of one turn."""

@@ -15,9 +15,9 @@ from scipy.ndimage import distance_transform_edt
 from schemas.apartment import LARGEST_SIDE, Apartment, Furniture, Room, Thing
 from schemas.errors import BadInput
 from schemas.interactive_scene import SceneBody
-from stages.agent.body import Detection, SeenFurniture, Sweep
 from stages.agent.obstacle_map import CELL
 from stages.agent.scene_map import Mapped
+from stages.agent.senses import Detection, SeenFurniture, Sweep
 from stages.agent.world.floor import Floor
 from stages.kit.geometry.transforms import transform_from_quaternion
 

@@ -10,9 +10,9 @@ import pytest
 from schemas.apartment import Apartment, Furniture, Thing
 from schemas.apartment import Room as Walls
 from stages.agent.arms.stations import around
-from stages.agent.body import Base, Position, SeenFurniture, Sweep
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.scene_map import Region
+from stages.agent.senses import Base, Position, SeenFurniture, Sweep
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.before_fronts import bases_outside
 from stages.agent.world.physics.body import PhysicsBody

@@ -15,8 +15,8 @@ from stages.agent.arms.next_view import (
     worth,
 )
 from stages.agent.arms.stations import around
-from stages.agent.body import Base, SeenFurniture, Sweep
 from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.senses import Base, SeenFurniture, Sweep
 
 CENTRE, SIZE = (3.0, 3.0), (1.4, 0.8)
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from schemas.apartment import Apartment, Furniture, Room, Thing
-from stages.agent.body import Base, Body, Detection, SeenFurniture, Sweep
+from stages.agent.body import Body
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.scene_map import SceneMap, classes_not_of
+from stages.agent.senses import Base, Detection, SeenFurniture, Sweep
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
 from stages.agent.world.physics.eyes import Surface, fuse

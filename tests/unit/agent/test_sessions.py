@@ -14,7 +14,6 @@ from schemas.apartment import Apartment, Furniture, Room, Thing
 from schemas.errors import UsageError
 from stages.agent import body
 from stages.agent.arms.registry import ARMS
-from stages.agent.body import Detection
 from stages.agent.brains.brain import Reply
 from stages.agent.brains.language import LanguageBrain
 from stages.agent.brains.prompt import feedback_text
@@ -28,6 +27,7 @@ from stages.agent.language.values import SceneObject
 from stages.agent.parameters import EvaluateParameters, ReplayParameters, RunParameters, check_run
 from stages.agent.replay_stage import run as replay
 from stages.agent.run_stage import run as run_step
+from stages.agent.senses import Detection
 from stages.agent.session import Limits, Session, run_session
 from stages.agent.tasks import TASKS, make_apartment
 from stages.agent.trials import Setting, goals_of, rules_brain, run_trial

@@ -7,13 +7,13 @@ import pytest
 from pydantic import ValidationError
 
 from schemas.apartment import Apartment, Furniture, Room, Thing
-from stages.agent.body import Base, Sweep
 from stages.agent.brains.words import NotUnderstood, understood
 from stages.agent.exploration import explore
 from stages.agent.fast_marching import distances
 from stages.agent.goals import Move, Shut, kind
 from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.scene_map import SceneMap
+from stages.agent.senses import Base, Sweep
 from stages.agent.tasks import TASKS, make_apartment
 from stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Rates
 from stages.agent.world.fast import FastWorld

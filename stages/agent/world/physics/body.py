@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from schemas.apartment import Apartment, Furniture
-from stages.agent.body import Base, Detection, Felt, Look, Position, Sweep
+from stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
 from stages.agent.world.events import Event
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.asked import AskedSegmenter

@@ -6,8 +6,8 @@ from math import atan2, pi
 
 import numpy as np
 
-from stages.agent.body import Base, Felt, Sweep
 from stages.agent.obstacle_map import cell_of
+from stages.agent.senses import Base, Felt, Sweep
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.agent.world.physics.seen import Seen
 from stages.kit.motion.failures import MotionFailed

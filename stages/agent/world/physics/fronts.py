@@ -15,7 +15,7 @@ import numpy as np
 
 from schemas.base import as_vector
 from schemas.scene_parts import Joint
-from stages.agent.body import Position
+from stages.agent.senses import Position
 from stages.agent.world.physics.eyes import Surface
 from stages.agent.world.physics.shapes import jointed_text, slab
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw

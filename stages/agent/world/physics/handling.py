@@ -6,19 +6,9 @@ from math import hypot
 
 import numpy as np
 
-from stages.agent.body import Base, Felt, Position
-from stages.agent.world.physics.hands import (
-    DROP,
-    JUST_OVER,
-    SOME_WAY_OVER,
-    Motion,
-    Spot,
-    Target,
-    graspable,
-    plan_grasp,
-    plan_release,
-    reachable,
-)
+from stages.agent.senses import Base, Felt, Position
+from stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
+from stages.agent.world.physics.letting_go import DROP, JUST_OVER, SOME_WAY_OVER, Spot, plan_release
 from stages.agent.world.physics.looking import Looking
 from stages.agent.world.physics.robot_in_room import RobotInRoom, felt
 from stages.agent.world.physics.seen import FLOOR, FOUND_WITHIN, Seen

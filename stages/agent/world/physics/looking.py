@@ -7,8 +7,8 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
-from stages.agent.body import Base, Detection, Look, Position, Sweep
 from stages.agent.scene_map import quarter
+from stages.agent.senses import Base, Detection, Look, Position, Sweep
 from stages.agent.world.physics import head
 from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Mask, Segmenter, Surface, fuse, seen_in
 from stages.agent.world.physics.fronts import PARTS, Front

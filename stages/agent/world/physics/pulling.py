@@ -10,7 +10,7 @@ from math import atan2, pi
 
 import numpy as np
 
-from stages.agent.body import Base, Felt, Position
+from stages.agent.senses import Base, Felt, Position
 from stages.agent.world.physics.before_fronts import away_from, bases_before, bases_outside, before, sides_of
 from stages.agent.world.physics.driving import Driving
 from stages.agent.world.physics.fronts import PARTS, Front, front_seen

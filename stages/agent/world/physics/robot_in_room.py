@@ -12,10 +12,10 @@ from math import cos, sin
 
 import numpy as np
 
-from stages.agent.body import Base, Felt, FeltKind
+from stages.agent.senses import Base, Felt, FeltKind
 from stages.agent.world.events import EventLog
 from stages.agent.world.failures import Rates
-from stages.agent.world.physics.hands import Beliefs, Hold
+from stages.agent.world.physics.beliefs import Beliefs, Hold
 from stages.agent.world.physics.room import Room
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.failures import MotionFailed

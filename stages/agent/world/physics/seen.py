@@ -8,12 +8,12 @@ from math import hypot
 
 import numpy as np
 
-from stages.agent.body import Base, Position, SeenFurniture
 from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.senses import Base, Position, SeenFurniture
 from stages.agent.world.physics import head
+from stages.agent.world.physics.beliefs import Believed
 from stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
 from stages.agent.world.physics.fronts import WITH_DRAWERS, WITH_LEAVES, Front, footprint
-from stages.agent.world.physics.hands import Believed
 from stages.agent.world.physics.robot_in_room import RobotInRoom
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply

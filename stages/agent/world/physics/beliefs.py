@@ -1,0 +1,110 @@
+"""What the arm believes around it: boxes of what was seen, fronts, what it holds; for collision checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.base import as_transform
+from stages.agent.world.physics.fronts import Front
+from stages.agent.world.physics.shapes import record_of, slab, urdf_of
+from stages.kit.motion.collision import CollisionChecker
+from stages.kit.motion.kinematics import arm_chain
+from stages.kit.simulation.robot import Configuration, Robot
+from stages.kit.simulation.robot_description import RobotDescription
+from stages.kit.simulation.world import PhysicsWorld
+
+HELD = "held"
+"""Name of the box of what is in the hand."""
+Box = tuple[np.ndarray, np.ndarray]
+Believed = Box | Front
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What the robot believes to have in its hand: the box of what it grasped, and where it is in the hand."""
+
+    size: np.ndarray
+    tool_from_box: np.ndarray
+    foot: float
+    """Height of the tool point over the foot of what is held [m], the hand as it grasped."""
+    rotation: np.ndarray
+    """Of the hand then, base frame."""
+    home: np.ndarray
+    """Arm (7,) with which it is carried about: folded, and the hand as upright as it grasped, since what is held above
+    its middle swings between the fingers when they turn."""
+
+
+class Beliefs:
+    """Boxes and doors around the robot, for collision checks. A `JointedModel` of the kit."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.description = description
+        self.chain = arm_chain(description)
+        self.world = PhysicsWorld()
+        self.robot = Robot(self.world, description)
+        self.checker = CollisionChecker(self.world, self.robot, 0.004)
+        self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
+        self._boxes: dict[str, object] = {}
+
+    def close(self) -> None:
+        """End the pybullet world."""
+        self.world.close()
+
+    def show(self, boxes: dict[str, Believed]) -> None:
+        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, in these fronts, and in
+        nothing else but what is held."""
+        wanted = {name: _told(entry) for name, entry in boxes.items()}
+        for name in [n for n, box in self._boxes.items() if n != HELD and wanted.get(n) != box]:
+            self.world.remove_body(name)
+            del self._boxes[name]
+        for name, box in wanted.items():
+            if name in self._boxes:
+                continue
+            entry = boxes[name]
+            if isinstance(entry, Front):
+                self._add_front(name, entry)
+            else:
+                assert isinstance(box, tuple)
+                part = slab(box[:3], tuple(max(h, low + 0.004) for low, h in zip(box[:3], box[3:], strict=True)))  # type: ignore[arg-type]
+                self.world.add_body(record_of(name, "box", (0, 0, 0), 0), urdf_of(name, (part,), 1.0))
+            self.checker.add_body(name)
+            self._boxes[name] = box
+
+    def _add_front(self, name: str, front: Front) -> None:
+        record = record_of(name, "front", (0, 0, 0), 0).model_copy(
+            update={
+                "world_from_body": as_transform(front.map_from_front),
+                "joints": (front.joint,),
+                "joint_values": {front.joint.name: front.value},
+            }
+        )
+        self.world.add_body(record, front.urdf())
+
+    def pose(self, name: str) -> np.ndarray:
+        """Return map_from_body (4, 4) of what is believed in."""
+        return self.world.pose(name)
+
+    def hold(self, hold: Hold | None) -> None:
+        """Let checks carry the box of what is held."""
+        self.checker.put_down()
+        if HELD in self._boxes:
+            self.world.remove_body(HELD)
+            del self._boxes[HELD]
+        if hold is None:
+            return
+        half = hold.size / 2
+        part = slab(tuple(-half), tuple(half))  # type: ignore[arg-type]
+        self.world.add_body(record_of(HELD, "box", (0, 0, 0), 0), urdf_of(HELD, (part,), 1.0))
+        self.checker.add_body(HELD)
+        self._boxes[HELD] = tuple(half)
+        self.checker.carry(HELD, hold.tool_from_box)
+
+
+def _told(entry: Believed) -> object:
+    """Return what tells a box or a front from another one: numbers to the millimetre."""
+    if not isinstance(entry, Front):
+        return (*np.round(entry[0], 3).tolist(), *np.round(entry[1], 3).tolist())
+    pose = tuple(np.round(entry.map_from_front, 3).ravel().tolist())
+    return (pose, entry.size, entry.panel, entry.bar, round(entry.value, 3), entry.floor)
