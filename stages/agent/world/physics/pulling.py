@@ -53,7 +53,7 @@ NOTHING_GRIPPED = 0.01
 PRESS, OVERSHOOT = 0.006, 0.02
 """The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
 PUSHES = 4
-"""To shut a front, at most: something may be in the way of one."""
+"""At one front, at most: something may be in the way of one."""
 NOTICED = 0.1
 """Of an angle by which it pays to push a leaf on [rad]."""
 SHARES = (1.0, 0.75, 0.5)
@@ -179,13 +179,16 @@ class Pulling:
         raise AssertionError("unreachable")
 
     def _push_on(self, name: str, value: float) -> float:
-        """Push a leaf that came less far than it should on from inside: half open it is in the way of base and elbow.
-        Return where it is seen then."""
-        self._seen.moved(name, value)
-        front = self._seen.fronts[name]
-        end = open_value(front.joint)
-        pushed = self._pushed_toward(front, (end,), Tally()) if value < end - NOTICED else None
-        return value if pushed is None else pushed
+        """Push a leaf that came less far than it should on from inside, as long as that gets it on: half open it is in
+        the way of base and elbow. Return where it is seen then."""
+        for _ in range(PUSHES):
+            front = self._seen.moved(name, value)
+            end = open_value(front.joint)
+            pushed = self._pushed_toward(front, (end,), Tally()) if value < end - NOTICED else None
+            if pushed is None or pushed < value + NOTICED:
+                return value if pushed is None else pushed
+            value = pushed
+        return value
 
     def _pushed(self, front: Front, motion: Manipulation) -> float:
         """Carry out a push; something behind a leaf may stop it."""
