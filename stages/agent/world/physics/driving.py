@@ -66,12 +66,13 @@ class Driving:
         arm = self._robot.arm + self._robot.joint_error
         if self._robot.hold is not None:
             way = np.array([start, *rows])
-            self._robot.metres += float(np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1).sum())
             try:
                 self._robot.driver.follow(Segment(_whole_body_rows(way, arm), 0.0), None)
             except MotionFailed as failed:
                 if failed.failure.kind == "path_blocked":
+                    self._robot.metres += float(np.linalg.norm((self._robot.true_base() - start)[:2]))
                     return failed
+            self._robot.metres += float(np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1).sum())
             return None
         here = start
         opening = self._robot.driver.robot.configuration().opening
@@ -85,9 +86,9 @@ class Driving:
                 struck = next((name for name, depth in now.items() if depth > before.get(name, TOUCHES)), None)
                 before = now
                 if struck is not None:
-                    at_fault = self._remember(struck)
+                    touched = self._remember(struck)
                     back = here + (row - here) * (k - 1) / count
-                    self._robot.driver.put(Configuration(self._backed_off(back, arm, at_fault), arm, opening))
+                    self._robot.driver.put(Configuration(self._backed_off(back, arm, touched), arm, opening))
                     what = self._robot.room.world.bodies[struck].record.class_name
                     return MotionFailed("path_blocked", f"the base touched {what}", (what,))
                 self._seen.obstacles.driven(*(at + self._robot.error)[:2])
