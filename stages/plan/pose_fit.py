@@ -39,7 +39,7 @@ def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = Fals
         back = (seen - motion[:3, 3]) @ motion[:3, :3]
         away, nearest = tree.query(back)
         near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
-        step = _planar(apply(motion, shape[nearest[near]]), seen[near])
+        step = align_upright(apply(motion, shape[nearest[near]]), seen[near])
         if as_high:
             step[2, 3] = 0.0
         motion = step @ motion
@@ -48,7 +48,7 @@ def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = Fals
     return motion
 
 
-def _planar(source: np.ndarray, target: np.ndarray) -> np.ndarray:
+def align_upright(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Return the turn about the vertical and shift (4, 4) that bring points (N, 3) closest to others (N, 3)."""
     middle, goal = source.mean(axis=0), target.mean(axis=0)
     a, b = (source - middle)[:, :2], (target - goal)[:, :2]

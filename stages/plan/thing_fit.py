@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from stages.kit.geometry.transforms import apply, inverse
-from stages.plan.pose_fit import SURE
+from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.kit.measurement.pose_error import align_rigidly
+from stages.plan.pose_fit import SURE, align_upright
 
 FEW, MANY = 300, 800
 """Points seen that a first and a last fit go by."""
@@ -92,7 +93,8 @@ def _thinned(points: np.ndarray, most: int) -> np.ndarray:
 
 def _yaw(angle: float) -> np.ndarray:
     """Return the turn (3, 3) about the vertical by an angle [rad]."""
-    return np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    turn: np.ndarray = transform_from_yaw(angle, np.zeros(3))[:3, :3]
+    return turn
 
 
 def _upright(pose: np.ndarray) -> np.ndarray:
@@ -136,23 +138,8 @@ def _fitted(seen: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: b
         away, nearest = tree.query(apply(inverse(pose), seen))
         near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
         source, target = apply(pose, shape[nearest[near]]), seen[near]
-        pose = _rigid(source, target, upright) @ pose
+        pose = (align_upright if upright else align_rigidly)(source, target) @ pose
     return pose
-
-
-def _rigid(source: np.ndarray, target: np.ndarray, upright: bool) -> np.ndarray:
-    """Return the motion (4, 4) that brings points (N, 3) closest to others (N, 3)."""
-    middle, goal = source.mean(axis=0), target.mean(axis=0)
-    covariance = (source - middle).T @ (target - goal)
-    if upright:
-        angle = np.arctan2(covariance[0, 1] - covariance[1, 0], covariance[0, 0] + covariance[1, 1])
-        turn = _yaw(float(angle))
-    else:
-        u, _, v = np.linalg.svd(covariance)
-        turn = v.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(v.T @ u.T))]) @ u.T
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = turn, goal - turn @ middle
-    return motion
 
 
 def _best_scale(
