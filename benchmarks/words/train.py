@@ -43,7 +43,7 @@ class Options(Recipe):
     """Options."""
 
     rooms: Path | None = Field(None, description="Where rooms and samples are kept; OUT/rooms if not given")
-    steps: int = Field(9628, description="Steps")
+    steps: int = Field(10_000, description="Steps")
     batch: int = Field(1024, description="Crops a step")
     seed: int = Field(0, description="Seed")
     device: Literal["cpu", "cuda"] = Field("cpu", description="Where it is trained")
