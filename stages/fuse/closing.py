@@ -9,6 +9,7 @@ import numpy as np
 from schemas.base import as_vector
 from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.vocabulary import UNNAMED, Vocabulary
+from stages.fuse.agreed_names import with_agreed_names
 from stages.fuse.counts import TripleCounts
 from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
 from stages.fuse.impossible_names import without_impossible_names
@@ -64,7 +65,7 @@ def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
 
 
 def is_strange(source: MaskSource, parameters: FuseParameters) -> bool:
-    """Whether the segmenter recognised so little of this place that its names are not to be believed."""
+    """Whether the segmenter recognised so little of this place that its masks are not to be believed."""
     return source.recognised is not None and source.recognised < parameters.least_recognised
 
 
@@ -118,6 +119,10 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
             size = {"voxel": parameters.voxel_size, "minimum_area": parameters.unnamed_area}
             if strange:
                 entities, labelled = by_geometry(surface, entities, labelled, classes, **size)
+                least = parameters.minimum_prediction_share
+                entities, labelled = with_agreed_names(
+                    entities, labelled, scores, mapper.sightings, vocabulary, unnamed, least
+                )
             else:
                 told = share_told(labelled, scores, mapper.sightings)
                 entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=told)

@@ -102,11 +102,12 @@ class FuseParameters(Parameters):
         0.2, ge=0, lt=1, description="Things under this share of one of their class that they touch are a part of it"
     )
     least_recognised: float = Field(
-        0.6,
+        0.84,
         ge=0,
         le=1,
-        description="`ours`: where our own network recognised less than this share of what it took for things, its "
-        "names are not believed, walls are what geometry says and its masks are proposals (0: always believed)",
+        description="`ours`: where our own network recognised less than this share of what it took for things, walls "
+        "are what geometry says, its masks are proposals, and what it calls a piece counts where most looks agree "
+        "(0: its masks are always believed)",
     )
     unnamed_area: float = Field(
         0.2,
@@ -147,7 +148,7 @@ def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="fuse",
-    version=9,
+    version=10,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={

@@ -98,7 +98,7 @@ def write_map(
     }
     if source.recognised is not None:
         summary["recognised_share"] = round(source.recognised, 3)
-        summary["names_believed"] = not is_strange(source, mapper.parameters)
+        summary["masks_believed"] = not is_strange(source, mapper.parameters)
     return PanopticMap(context.output, outcome="ok" if len(closed.surface.faces) else "empty", summary=summary)
 
 

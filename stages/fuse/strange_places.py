@@ -1,8 +1,8 @@
 """What is left of the masks of a segmenter in a place that is strange to it.
 
-Ours. A network that was taught in generated rooms recognises little of what it takes for things in a real one, and the
-names that it is sure of there are wrong as often as not. Where that is so it names nothing: a thing that most views of
-its surface had is proposed as one, and geometry says what becomes of it (`unnamed_pieces`).
+Ours. A network that was taught in generated rooms recognises less of what it takes for things in a real one, and cuts
+worse there than geometry does. Where that is so a thing that most views of its surface had is proposed as one, and
+geometry says what becomes of it (`unnamed_pieces`); what it is called is asked afterwards (`agreed_names`).
 """
 
 from __future__ import annotations
