@@ -4,7 +4,7 @@ and how far its joints are open; shapes stay as planned, but for trays."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,8 @@ HEADINGS, SWEPT, FALLEN = 8, (0.6, 1.4), 1.5
 far from where it was [m]."""
 HIDDEN = 0.015
 """A carrier that looks smaller than it did by more is partly hidden [m]."""
+RIM_KEPT = 0.8
+"""A carrier of whose rim less than this share is seen of what was seen before has the one of before."""
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
@@ -123,13 +125,15 @@ class CameraEyes:
 
     def _carrier(self, body: str, points: np.ndarray) -> SeenCarrier | None:
         """Return what points (N, 3) of a carrier show of its shape, None where that is less than was seen before: an
-        arm or what stands on it hides the rest."""
+        arm or what stands on it hides the rest. Where only less of its rim is seen, it has the one of before."""
         load = [[*self._model.pose(name)[:2, 3], self._model.footprint(name)[0]] for name in self._model.load(body)]
         pose = self._model.pose(body)
         shape = seen_carrier(points, np.array(load).reshape(-1, 3), float(np.arctan2(pose[1, 0], pose[0, 0])))
         before = self._carriers.get(body)
         if shape is None or (before is not None and np.any(shape.size < before.size - HIDDEN)):
             return None
+        if before is not None and shape.rim < RIM_KEPT * before.rim:
+            return replace(shape, boxes=before.boxes)
         self._carriers[body] = shape
         return shape
 
