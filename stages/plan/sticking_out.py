@@ -13,7 +13,7 @@ from stages.kit.geometry.point_clouds import clusters
 
 BEYOND = 0.01
 """Points seen farther than this from the surface are of nothing that is believed of the thing [m]."""
-CELL = 0.01
+CELL = 0.005
 """Edge of the cells that they fill [m]."""
 LEAST_POINTS = 3
 """Of a cell: beside an edge single pixels take a depth between near and far."""
