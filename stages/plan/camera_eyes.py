@@ -36,9 +36,7 @@ HEADINGS, SWEPT, FALLEN = 8, (0.6, 1.4), 1.5
 """What is not where it is believed is looked for in so many directions, on the floor so far from the base [m], up to so
 far from where it was [m]."""
 HIDDEN = 0.015
-"""A carrier that looks smaller than it did by more is partly hidden [m]."""
-RIM_KEPT = 0.8
-"""A carrier of whose rim less than this share is seen of what was seen before has the one of before."""
+"""A carrier that looks smaller or larger than it is by more is partly hidden, or taken with what is beside it [m]."""
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
@@ -87,8 +85,8 @@ class CameraEyes:
         """Instance number of a picture -> body of the room."""
         self._parts: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
         self._things = SeenThings()
-        self._carriers: dict[str, SeenCarrier] = {}
-        """Planned body -> its shape, as the last look showed it that showed all of it."""
+        self._carriers: dict[str, tuple[int, SeenCarrier]] = {}
+        """Planned body -> how many points showed most of it, and its shape then."""
 
     def seen(self, body: str, here: str) -> Seen | None:
         """Return the planned body where the pictures show it; None where they do not, and for what is far away and
@@ -124,18 +122,18 @@ class CameraEyes:
         return moved_record(record, pose, joints), text, planes
 
     def _carrier(self, body: str, points: np.ndarray) -> SeenCarrier | None:
-        """Return what points (N, 3) of a carrier show of its shape, None where that is less than was seen before: an
-        arm or what stands on it hides the rest. Where only less of its rim is seen, it has the one of before."""
+        """Return how points (N, 3) of a carrier show it, None where an arm or what stands on it hides too much. Its
+        shape is that of the look that showed most points of it."""
         load = [[*self._model.pose(name)[:2, 3], self._model.footprint(name)[0]] for name in self._model.load(body)]
         pose = self._model.pose(body)
         shape = seen_carrier(points, np.array(load).reshape(-1, 3), float(np.arctan2(pose[1, 0], pose[0, 0])))
-        before = self._carriers.get(body)
-        if shape is None or (before is not None and np.any(shape.size < before.size - HIDDEN)):
+        if shape is None:
             return None
-        if before is not None and shape.rim < RIM_KEPT * before.rim:
-            return replace(shape, boxes=before.boxes)
-        self._carriers[body] = shape
-        return shape
+        most, best = self._carriers.get(body, (0, shape))
+        if len(points) >= most:
+            self._carriers[body] = len(points), shape
+            return shape
+        return replace(shape, boxes=best.boxes) if np.all(np.abs(shape.size - best.size) < HIDDEN) else None
 
     def _distance(self, body: str) -> float:
         """Return how far from the base a body is believed [m]."""

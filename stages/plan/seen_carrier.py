@@ -50,11 +50,6 @@ class SeenCarrier:
         """Length and breadth (2,) [m]."""
         return self.boxes[0][1][:2]
 
-    @property
-    def rim(self) -> float:
-        """Volume of what stands up from its floor [m^3]."""
-        return float(sum(np.prod(size) for _, size in self.boxes[1:]))
-
 
 def seen_carrier(points: np.ndarray, load: np.ndarray, yaw: float) -> SeenCarrier | None:
     """Return the carrier that points (N, 3) of its upper side show, None where they are too few.
