@@ -19,7 +19,7 @@ from stages.kit.simulation.robot import Configuration
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
-from stages.plan.tray_loading import lifts_left, lifts_left_beside, load_moments
+from stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
 from stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
@@ -194,8 +194,8 @@ def plan_pick(
     bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, base)
     queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
     if model.laden(item):
-        moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
-        queue = [queue[index] for index in np.argsort(moments.round(1), kind="stable")]
+        poses = np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue])
+        queue = [queue[index] for index in easiest_first(model, item, poses)]
     lowest = float(apply(world_from_item, points)[:, 2].min())
     over = {
         id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
