@@ -35,7 +35,7 @@ class Options(Recipe):
     data: Path = Field(Path("../shared/data"), description="Folder with the recordings; without them no real frames")
     device: str = Field("cpu", description="Of the training: cpu, or cuda")
     threads: int = Field(1, description="Of the training; 1 gives the same bytes again")
-    workers: int = Field(1, description="Processes that make frames and samples")
+    workers: int = Field(1, description="Processes that make frames")
 
 
 def main() -> int:
@@ -50,9 +50,8 @@ def main() -> int:
     if code:
         return code
     quick = ["--quick"] if arguments.quick else []
-    workers = ["--workers", str(arguments.workers)]
     if not (out / "data" / "done.json").is_file():
-        made = ["--out", str(out / "data"), "--library", str(out / "library"), *workers]
+        made = ["--out", str(out / "data"), "--library", str(out / "library"), "--workers", str(arguments.workers)]
         _module("benchmarks.training.data", *made, *quick)
     real = []
     if all((arguments.data / place).is_dir() for place in PLACES):
@@ -60,8 +59,7 @@ def main() -> int:
         real = ["--real", str(out / "real")]
     steps = ["--steps", str(QUICK_STEPS), "--batch", "4"] if arguments.quick else []
     train = ["--data", str(out / "data"), "--out", str(out / "run"), "--threads", str(arguments.threads), *real]
-    more = workers if arguments.workers > 1 else []
-    _module("benchmarks.training.train", *train, "--device", arguments.device, *more, *steps)
+    _module("benchmarks.training.train", *train, "--device", arguments.device, *steps)
     weights = out / "run" / "panoptic.safetensors"
     predictor = load_predictor(weights, load_vocabulary())
     frames = FrameSet(out / "data" / "validation")

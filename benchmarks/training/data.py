@@ -375,7 +375,9 @@ def write_shard(samples: list[Sample], folder: Path) -> None:
         }
         for sample in samples
     ]
-    (folder / "frames.json").write_text(json.dumps(rows) + "\n")
+    # Last and at once: whoever sees it finds a whole shard.
+    (folder / "rows.json").write_text(json.dumps(rows) + "\n")
+    (folder / "rows.json").replace(folder / "frames.json")
 
 
 @dataclass(frozen=True)

@@ -72,11 +72,11 @@ class TrainingRun:
         self.step += 1
         decay = min(self.average_decay, self.step / (self.step + 10))
         with torch.no_grad():
-            for name, value in self.network.state_dict().items():
-                if value.is_floating_point():
-                    self.average[name].lerp_(value, 1 - decay)
-                else:
-                    self.average[name].copy_(value)
+            now = self.network.state_dict()
+            moving = [name for name, value in now.items() if value.is_floating_point()]
+            torch._foreach_lerp_([self.average[name] for name in moving], [now[name] for name in moving], 1 - decay)
+            for name in now.keys() - set(moving):
+                self.average[name].copy_(now[name])
 
     def save(self) -> None:
         """Write the state, whole or not at all, and the facts about it."""
@@ -95,7 +95,7 @@ class TrainingRun:
 def train(
     run: TrainingRun,
     steps: int,
-    step: Callable[[], Mapping[str, float]],
+    step: Callable[[], Mapping[str, float | torch.Tensor]],
     save_every: float,
     held_out: Callable[[], Mapping[str, Any]] | None = None,
     held_out_every: int = 500,
@@ -106,7 +106,7 @@ def train(
     `save_every` seconds and at the end.
     """
     run.out.mkdir(parents=True, exist_ok=True)
-    saved, seen = time.perf_counter(), list[Mapping[str, float]]()
+    saved, seen = time.perf_counter(), list[Mapping[str, float | torch.Tensor]]()
     while run.step < steps:
         started = time.process_time()
         seen.append(step())
@@ -114,7 +114,7 @@ def train(
         last = run.step == steps or over()
         line: dict[str, Any] = {}
         if run.step % LOGGED_EVERY == 0 or last:
-            means = {name: round(float(np.mean([one[name] for one in seen])), 5) for name in seen[0]}
+            means = {name: round(float(np.mean([float(one[name]) for one in seen])), 5) for name in seen[0]}
             line, seen = {"step": run.step, "cpu_seconds": round(run.seconds), **means}, []
         if held_out is not None and (run.step % held_out_every == 0 or last):
             line |= held_out()

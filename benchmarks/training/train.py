@@ -1,19 +1,20 @@
 """Train the network of `--backend network`; stop and start again at will.
 
     python -m benchmarks.training.train --data FOLDER --out FOLDER [--real FOLDER] [--steps N] [--batch N] [--seed N]
-                                        [--device cuda] [--workers N] [--seconds N]
+                                        [--device cuda] [--seconds N]
 
 The state (network, moving average, optimiser) is written every few minutes as safetensors with a small JSON beside it;
-the same command goes on from there. A step's samples and their changes depend on the seed and the number of the step
-alone, so that a run that was stopped ends with the bytes of one that was not, on the same processor with one thread
-(not with `--seconds`, under which the rate falls by the clock). `--real` adds frames of `real_frames` to every batch.
-The result is `panoptic.safetensors`: the moving average of the weights.
+the same command goes on from there. A step's samples and their changes depend on the seed, the number of the step and
+the frames that are there by then (a folder that is still written is read as it grows), so that a run that was stopped
+ends with the bytes of one that was not, on the same processor with one thread (not with `--seconds`, under which the
+rate falls by the clock). `--real` adds frames of `real_frames` to every batch. The result is `panoptic.safetensors`:
+the moving average of the weights.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -23,9 +24,10 @@ from pydantic import Field
 from torch.nn import functional
 
 from benchmarks.options import Recipe, asked
-from benchmarks.training.feeding import fed
+from benchmarks.training.drawing import drawn
+from benchmarks.training.drawn_targets import TargetBatch
 from benchmarks.training.run import TrainingRun, rate_at, train
-from benchmarks.training.samples import FrameSet, varied
+from benchmarks.training.samples import FrameSet, Store
 from benchmarks.training.targets import IGNORED
 from stages.segment.backends.network.features import CHANNELS
 from stages.segment.backends.network.model import PanopticNetwork, Widths
@@ -36,10 +38,10 @@ WARM_UP, WHOLE_FRAMES = 0.04, 0.12
 """Shares of the steps: the rate rises during the first; the last of them see whole frames instead of crops."""
 CENTRE_WEIGHT, OFFSET_WEIGHT = 200.0, 0.05
 SMOOTHING = 0.05
-
-
 REAL_SHARE = 0.08
 """Of the samples of a batch, where there are real frames."""
+LOOKED_FOR_EVERY = 200
+"""After so many steps frames that were written meanwhile are taken."""
 WIDTHS = Widths(encoder=(32, 64, 96, 160, 224), decoder=(32, 64, 96, 144), blocks=2)
 
 
@@ -51,75 +53,41 @@ class Plan:
     batch: int
     seed: int
     classes: tuple[str, ...]
-    frames: int
     real_frames: int = 0
 
 
-@dataclass(frozen=True)
-class Batch:
-    """Inputs (batch, 16, H, W) float16 and what the heads should say, all (batch, ..., h, w) (see Targets)."""
-
-    inputs: np.ndarray
-    classes: np.ndarray
-    weight: np.ndarray
-    centres: np.ndarray
-    offsets: np.ndarray
-    things: np.ndarray
-    told: np.ndarray
-
-
 class Feed:
-    """The batches of a run: any of them can be made for itself, in another process too."""
+    """The batches of a run, on its device."""
 
-    def __init__(self, frames: FrameSet, real: FrameSet | None, plan: Plan) -> None:
-        self.frames, self.real, self.plan = frames, real, plan
+    def __init__(self, frames: FrameSet, real: FrameSet | None, plan: Plan, device: str = "cpu") -> None:
+        self.plan = plan
+        self.store = Store([frames] if real is None else [frames, real], plan.classes, device)
 
-    def __call__(self, step: int, whole: bool) -> Batch:
-        """Return the batch of a step; `whole`: frames, not crops of them."""
-        plan = self.plan
-        per_epoch = max(1, len(self.frames) // plan.batch)
-        epoch, place = divmod(step, per_epoch)
-        order = np.random.default_rng([plan.seed, 1, epoch]).permutation(len(self.frames))
-        chosen = [self.frames[int(index)] for index in order[place * plan.batch : (place + 1) * plan.batch]]
-        if self.real is not None:
-            random = np.random.default_rng([plan.seed, 3, step])
-            for k in np.flatnonzero(random.random(len(chosen)) < REAL_SHARE):
-                chosen[k] = self.real[int(random.integers(len(self.real)))]
-        made = [
-            varied(frame, plan.classes, np.random.default_rng([plan.seed, 2, step, k]), whole=whole)
-            for k, frame in enumerate(chosen)
-        ]
-        targets = [entry for _, entry in made]
-        return Batch(
-            np.stack([inputs for inputs, _ in made]).astype(np.float16),
-            np.stack([t.classes for t in targets]),
-            np.stack([t.weight for t in targets]).astype(np.float16),
-            np.stack([t.centres for t in targets]).astype(np.float16),
-            np.stack([t.offsets for t in targets]).astype(np.float16),
-            np.stack([t.things for t in targets]),
-            np.stack([t.told for t in targets]),
-        )
+    def __call__(self, step: int, whole: bool) -> tuple[torch.Tensor, TargetBatch]:
+        """Return inputs and targets of a step; `whole`: frames, not crops of them."""
+        if step % LOOKED_FOR_EVERY == 0:
+            self.store.grow()
+        random = np.random.default_rng([self.plan.seed, 1, step])
+        sets = self.store.sets
+        which = (random.random(self.plan.batch) < REAL_SHARE) & (len(sets) > 1)
+        chosen = [(int(k), int(random.integers(len(sets[int(k)])))) for k in which]
+        return drawn(self.store.frames(chosen), random, whole=whole)
 
 
 def loss_of(
-    outputs: tuple[torch.Tensor, torch.Tensor, torch.Tensor], batch: Batch, class_weight: torch.Tensor
+    outputs: tuple[torch.Tensor, torch.Tensor, torch.Tensor], targets: TargetBatch, class_weight: torch.Tensor
 ) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
     """Return the loss and its parts: weighted cross entropy of the classes, squared error of the heat map where it is
     known what is there, absolute error of the offsets on things."""
     logits, centres, offsets = (output.float() for output in outputs)
-    device = logits.device
-    classes = torch.from_numpy(batch.classes).to(device).long()
-    weight = torch.from_numpy(batch.weight).to(device).float() * (classes != IGNORED)
-    heat = torch.from_numpy(batch.centres).to(device).float()[:, None]
-    wanted = torch.from_numpy(batch.offsets).to(device).float()
-    things = torch.from_numpy(batch.things).to(device).float()[:, None]
-    told = torch.from_numpy(batch.told).to(device).float()[:, None]
+    weight = targets.weight * (targets.classes != IGNORED)
     each = functional.cross_entropy(
-        logits, classes, weight=class_weight, ignore_index=IGNORED, reduction="none", label_smoothing=SMOOTHING
+        logits, targets.classes, weight=class_weight, ignore_index=IGNORED, reduction="none", label_smoothing=SMOOTHING
     )
     semantic = (each * weight).sum() / weight.sum().clamp(min=1)
-    centre = ((centres - heat) ** 2 * told).mean()
-    offset = ((offsets - wanted).abs() * things).sum() / (things.sum() * 2).clamp(min=1)
+    centre = ((centres - targets.centres[:, None]) ** 2 * targets.told[:, None]).mean()
+    things = targets.things[:, None]
+    offset = ((offsets - targets.offsets).abs() * things).sum() / (things.sum() * 2).clamp(min=1)
     loss = semantic + CENTRE_WEIGHT * centre + OFFSET_WEIGHT * offset
     return loss, {"class": semantic.detach(), "centre": centre.detach(), "offset": offset.detach()}
 
@@ -143,20 +111,24 @@ class Run(TrainingRun):
     average_decay, gradient_norm = 0.998, 10.0
 
     def __init__(self, plan: Plan, out: Path, widths: Widths, device: str = "cpu") -> None:
+        self.frames = 0
+        """So many are there by now."""
         self.plan, self.widths, self.device = plan, widths, device
         torch.manual_seed(plan.seed)
         network = PanopticNetwork(len(CHANNELS), len(plan.classes), widths).to(device)
         super().__init__(network, _plan_record(plan), out, PEAK_RATE, WEIGHT_DECAY)
 
-    def train_step(self, batch: Batch, class_weight: torch.Tensor, progress: float) -> dict[str, float]:
+    def train_step(
+        self, batch: tuple[torch.Tensor, TargetBatch], class_weight: torch.Tensor, progress: float
+    ) -> Mapping[str, torch.Tensor]:
         """Take one step, `progress` (0..1) into the run, and return the parts of its loss."""
         self.network.train()
-        inputs = torch.from_numpy(batch.inputs).to(self.device).float().contiguous(memory_format=torch.channels_last)
+        inputs, targets = batch
         with torch.autocast(self.device, torch.bfloat16):
-            outputs = self.network(inputs)
-        loss, parts = loss_of(outputs, batch, class_weight)
+            outputs = self.network(inputs.contiguous(memory_format=torch.channels_last))
+        loss, parts = loss_of(outputs, targets, class_weight)
         self.descend(loss, rate_at(round(progress * self.plan.steps), self.plan.steps, PEAK_RATE, WARM_UP))
-        return {name: float(value) for name, value in parts.items()}
+        return parts
 
     def averaged(self) -> PanopticNetwork:
         """Return a network with the moving average of the weights, for use."""
@@ -173,7 +145,7 @@ class Run(TrainingRun):
             self.averaged(),
             self.plan.classes,
             self.widths,
-            f"trained on {self.plan.frames} frames of generated rooms and tabletops{real}, "
+            f"trained on {self.frames} frames of generated rooms and tabletops{real}, "
             f"step {self.step} of at most {self.plan.steps}, batch {self.plan.batch}, seed {self.plan.seed}",
         )
 
@@ -192,11 +164,6 @@ class Clock:
         """Return the share of the run (0..1) that is over before `step`."""
         return min(1.0, max(step / self.steps, (time.monotonic() - self.started) / self.seconds))
 
-    def orders(self, first: int) -> Iterator[tuple[int, bool]]:
-        """Yield what to make: every step that is left, and whether it sees whole frames."""
-        for step in range(first, self.steps):
-            yield step, self.progress(step) >= 1 - WHOLE_FRAMES
-
 
 class Options(Recipe):
     """Options."""
@@ -208,7 +175,6 @@ class Options(Recipe):
     seed: int = Field(0, description="Seed")
     device: str = Field("cpu", description="cpu, or cuda")
     threads: int = Field(1, description="Of the processor")
-    workers: int = Field(0, description="Processes that make the samples, beside the one that trains")
     seconds: float = Field(float("inf"), description="Ends after so many, however many steps were taken")
     save_every: float = Field(240.0, description="Seconds between states")
 
@@ -217,21 +183,22 @@ def main() -> None:
     """Train, or go on with a training."""
     arguments = asked(Options)
     torch.set_num_threads(arguments.threads)
+    torch.backends.cudnn.benchmark = True
     frames = FrameSet(arguments.data / "training")
     real = FrameSet(arguments.real) if arguments.real is not None else None
     shown = len(real) if real is not None else 0
-    plan = Plan(arguments.steps, arguments.batch, arguments.seed, frames.class_names(), len(frames), shown)
+    plan = Plan(arguments.steps, arguments.batch, arguments.seed, frames.class_names(), shown)
     run = Run(plan, arguments.out, WIDTHS, arguments.device)
     class_weight = class_weights(frames, plan.classes).to(arguments.device)
-    clock = Clock(plan.steps, arguments.seconds)
-    feed = Feed(frames, real, plan)
-    batches = fed(feed, clock.orders(run.step), arguments.workers)
+    clock, feed = Clock(plan.steps, arguments.seconds), Feed(frames, real, plan, arguments.device)
 
-    def step() -> dict[str, float]:
-        return run.train_step(next(batches), class_weight, clock.progress(run.step))
+    def step() -> Mapping[str, torch.Tensor]:
+        progress = clock.progress(run.step)
+        batch = feed(run.step, progress >= 1 - WHOLE_FRAMES)
+        run.frames = len(frames)
+        return run.train_step(batch, class_weight, progress)
 
     train(run, plan.steps, step, arguments.save_every, over=lambda: clock.progress(run.step) >= 1.0)
-    batches.close()
 
 
 if __name__ == "__main__":

@@ -14,16 +14,18 @@ from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth
 
 RECIPES = ("kitchen", "office", "bedroom", "room", "household", "studio")
-LIBRARIES = (11, 12, 13)
+LIBRARIES = tuple(range(11, 17))
 VALIDATION_LIBRARY = 1
 SIZE = (320, 240)
 FRAMES = 24
-WITHOUT = ("studio-55", "studio-61", "studio-73")
+WITHOUT = ("studio-55", "studio-61", "studio-73", "studio-85")
 """For these seeds no room is found."""
-NAMES = tuple(f"{RECIPES[k % 6]}-{50 + k}" for k in range(28))
+SEEDS = 39
+NAMES = tuple(f"{RECIPES[(k % SEEDS + 3 * (k // SEEDS)) % 6]}-{50 + k % SEEDS}" for k in range(2 * SEEDS))
+"""Every seed with two recipes."""
 ROOMS = tuple(name for name in NAMES if name not in WITHOUT)
 VALIDATION = ("kitchen-90", "office-91", "room-92")
-LIBRARY_OF_ROOM = {name: LIBRARIES[(k + k // 6) % len(LIBRARIES)] for k, name in enumerate(NAMES)}
+LIBRARY_OF_ROOM = {name: LIBRARIES[(k + k // 6) % len(LIBRARIES)] for k, name in enumerate(NAMES, SEEDS)}
 
 
 @dataclass(frozen=True)
