@@ -37,6 +37,8 @@ HEADINGS, SWEPT, FALLEN = 8, (0.6, 1.4), 1.5
 far from where it was [m]."""
 HIDDEN = 0.015
 """A carrier that looks smaller or larger than it is by more is partly hidden, or taken with what is beside it [m]."""
+MOST_TURNED = 0.2
+"""Furniture is turned no farther than this from how the map has it [rad]."""
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
@@ -83,6 +85,8 @@ class CameraEyes:
         self._errors, self._random, self._radius = errors, random, radius
         self._names = dict(enumerate(room.records, start=1))
         """Instance number of a picture -> body of the room."""
+        self._mapped = {name: model.pose(name) for name, record in model.records.items() if not record.carriable}
+        """Furniture -> where the map has it (4, 4)."""
         self._parts: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
         self._things = SeenThings()
         self._carriers: dict[str, tuple[int, SeenCarrier]] = {}
@@ -152,7 +156,18 @@ class CameraEyes:
             return np.concatenate(points), np.concatenate(normals)
 
         ranges = [Range(joint.name, joint.lower, joint.upper) for joint in self._model.records[body].joints]
-        return fit_furniture(look.points, look.views, surface_at, ranges, joints)
+        return fit_furniture(
+            look.points, look.views, surface_at, ranges, joints, lambda m: self._near_its_place(body, m)
+        )
+
+    def _near_its_place(self, body: str, motion: np.ndarray) -> bool:
+        """Whether furniture that is moved by a motion (4, 4) from where it is believed stands about as the map has it;
+        elsewhere something else was fitted."""
+        middle = np.append(np.mean(self._model.world.bounds(body), axis=0), 1.0)
+        from_map = motion @ self._model.pose(body) @ inverse(self._mapped[body])
+        off = motion @ middle - self._mapped[body] @ inverse(self._model.pose(body)) @ middle
+        turn = abs(float(np.arctan2(from_map[1, 0], from_map[0, 0])))
+        return float(np.linalg.norm(off)) < self._radius / 2 and turn < MOST_TURNED
 
     def _parts_of(self, body: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Return points (N, 3) on each part of furniture and their outward normals (N, 3), its own frame."""

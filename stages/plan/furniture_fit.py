@@ -23,7 +23,7 @@ from stages.plan.pose_fit import FAR, KEPT, SURE
 ROUNDS = 15
 FEW, MANY = 500, 2000
 """Points seen that a first and a last fit go by."""
-STEPS, FINE = 13, 9
+STEPS, FINE = 13, 7
 """Values of a joint that are tried over its range, and then around the best of them."""
 AROUND, AROUND_OF = 16, 6000
 """Points by which a normal is told, of so many of all that were seen: far enough apart for their noise."""
@@ -71,11 +71,13 @@ def fit_furniture(
     surface_at: Callable[[dict[str, float]], Surface],
     ranges: Sequence[Range],
     believed: dict[str, float],
+    allowed: Callable[[np.ndarray], bool] = lambda motion: True,
 ) -> FittedFurniture:
     """Return how furniture stands by points (N, 3) of it that cameras saw, and by all that these saw.
 
     `surface_at` joint values gives its surface where it is believed. Where it is `believed` to stand, or else where a
-    joint has its stop, it stands if nothing else explains what is seen better by `SURE`.
+    joint has its stop, it stands if nothing else explains what is seen better by `SURE`. A motion (4, 4) that is not
+    `allowed` is none: where little but a door is seen, furniture that is turned as far explains it as well.
     """
     eyes = np.array([view.eye for view in views])
     few, many = _sides(seen, eyes, FEW), _sides(seen, eyes, MANY)
@@ -83,20 +85,24 @@ def fit_furniture(
     def placed(sides: Surface, values: dict[str, float], start: np.ndarray) -> FittedFurniture:
         surface = facing(surface_at(values), eyes, start)
         motion = fit_place(sides, surface, start)
+        motion = motion if allowed(motion) else start
         return FittedFurniture(motion, values, misfit(sides[0], views, surface, motion))
 
-    def best_of(sides: Surface, name: str, values: np.ndarray, found: FittedFurniture) -> FittedFurniture:
-        fits = [placed(sides, found.joints | {name: float(value)}, found.motion) for value in values]
+    def best_of(
+        sides: Surface, name: str, values: np.ndarray, found: FittedFurniture, starts: Sequence[np.ndarray]
+    ) -> FittedFurniture:
+        fits = [placed(sides, found.joints | {name: float(value)}, start) for start in starts for value in values]
         return min([found, *fits], key=lambda fit: fit.misfit)
 
     found = placed(few, dict(believed), np.eye(4))
     for joint in ranges:
-        found = best_of(few, joint.name, np.linspace(joint.lower, joint.upper, STEPS), found)
+        found = best_of(few, joint.name, np.linspace(joint.lower, joint.upper, STEPS), found, (np.eye(4), found.motion))
     found = placed(many, found.joints, found.motion)
     for joint in ranges:
         step = (joint.upper - joint.lower) / (STEPS - 1)
-        around = found.joints[joint.name] + np.linspace(-step, step, FINE)
-        found = best_of(many, joint.name, np.clip(around, joint.lower, joint.upper), found)
+        for reach in (step, step / 2):  # place and joint come home together
+            around = found.joints[joint.name] + np.linspace(-reach, reach, FINE)
+            found = best_of(many, joint.name, np.clip(around, joint.lower, joint.upper), found, (found.motion,))
         for rest in (believed[joint.name], joint.lower, joint.upper):
             resting = placed(many, found.joints | {joint.name: rest}, found.motion)
             if resting.misfit < found.misfit + SURE:

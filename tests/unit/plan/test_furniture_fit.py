@@ -84,3 +84,15 @@ def test_what_stands_where_it_is_believed_stays() -> None:
     found = fit_furniture(points, [view], surface_at, [Range("door", 0.0, 1.9)], {"door": 0.4})
     assert found.joints == {"door": 0.4}
     assert np.abs(found.motion - np.eye(4)).max() < 0.01
+
+
+def test_an_open_door_does_not_turn_the_furniture_behind_it() -> None:
+    """Little but the door is in sight, which is believed shut."""
+    points, view = look(0.9, np.eye(4), (0.5, -1.3, 0.3))
+
+    def near(motion: np.ndarray) -> bool:
+        return abs(float(np.arctan2(motion[1, 0], motion[0, 0]))) < 0.2
+
+    found = fit_furniture(points, [view], surface_at, [Range("door", 0.0, 1.9)], {"door": 0.0}, near)
+    assert found.joints["door"] == pytest.approx(0.9, abs=0.05)
+    assert np.abs(found.motion - np.eye(4)).max() < 0.03
