@@ -4,25 +4,25 @@ and how far its joints are open; shapes stay as planned, but for trays."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import scaled
 from stages.kit.geometry.transforms import apply, inverse, look_at
-from stages.kit.rendering.object_views import LEAST_PIXELS, cloud, take
+from stages.kit.rendering.object_views import LEAST_PIXELS, View, cloud, take
 from stages.kit.rendering.segmenter_errors import SegmenterErrors, quarter_turn
 from stages.kit.simulation.shapes import link_shapes, surface_points
 from stages.plan.affordances import CARRIER_CLASSES
 from stages.plan.correspondence import alike
 from stages.plan.erring_robot import ErringRobot
 from stages.plan.eyes import CELL, NEAR_BY, Room, Seen
+from stages.plan.furniture_fit import FittedFurniture, Range, fit_furniture
 from stages.plan.pictures import RoomPictures
-from stages.plan.pose_fit import fit_joint, fit_upright, misfit
-from stages.plan.scaled_body import scaled_text
+from stages.plan.pose_fit import fit_upright
 from stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
-from stages.plan.thing_fit import fit_thing
+from stages.plan.seen_things import SeenThings
 from stages.plan.world_model import WorldModel, body_planes, moved_record
 
 CAMERA = Camera(width=240, height=180, fx=260.0, fy=260.0, cx=119.5, cy=89.5)
@@ -36,14 +36,14 @@ HEADINGS, SWEPT, FALLEN = 8, (0.6, 1.4), 1.5
 """What is not where it is believed is looked for in so many directions, on the floor so far from the base [m], up to so
 far from where it was [m]."""
 HIDDEN = 0.015
-"""A carrier that looks smaller than it did by more is partly hidden [m]."""
+"""A carrier that looks smaller or larger than it is by more is partly hidden, or taken with what is beside it [m]."""
+MOST_TURNED = 0.2
+"""Furniture is turned no farther than this from how the map has it [rad]."""
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
-POINTS, FURNITURE_POINTS, SEEN_POINTS = 1500, 3000, 2000
-"""Of a shape that is fitted; of each part of furniture, and of what is seen of it."""
-MOST_MOVED = 0.1
-"""Furniture stands no farther from where the map has it [m]."""
+POINTS, FURNITURE_POINTS = 1500, 3000
+"""Of a shape that is fitted, and of each part of furniture."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Look:
 
     points: np.ndarray
     """(N, 3), map frame."""
-    eyes: tuple[np.ndarray, ...]
-    """Where the cameras stood that showed it (3,), map frame."""
+    views: tuple[View, ...]
+    """The pictures that showed it."""
 
 
 NOTHING = Look(np.zeros((0, 3)), ())
@@ -87,9 +87,10 @@ class CameraEyes:
         """Instance number of a picture -> body of the room."""
         self._mapped = {name: model.pose(name) for name, record in model.records.items() if not record.carriable}
         """Furniture -> where the map has it (4, 4)."""
-        self._parts: dict[str, dict[str, np.ndarray]] = {}
-        self._carriers: dict[str, SeenCarrier] = {}
-        """Planned body -> its shape, as the last look showed it that showed all of it."""
+        self._parts: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
+        self._things = SeenThings()
+        self._carriers: dict[str, tuple[int, SeenCarrier]] = {}
+        """Planned body -> how many points showed most of it, and its shape then."""
 
     def seen(self, body: str, here: str) -> Seen | None:
         """Return the planned body where the pictures show it; None where they do not, and for what is far away and
@@ -112,87 +113,69 @@ class CameraEyes:
             return record, text, body_planes(record, text)
         pose, joints = self._model.pose(body), {j.name: self._model.joint_value(body, j.name) for j in record.joints}
         if near and record.carriable and record.class_name not in CARRIER_CLASSES:
-            fit = fit_thing(points, np.array(look.eyes), self._model.surface(body), pose)
-            record, text = moved_record(record, fit.pose, {}), scaled_text(text, fit.scale)
+            eyes = np.array([view.eye for view in look.views])
+            pose, text = self._things.fitted(body, text, pose, points, eyes)
+            record = moved_record(record, pose, {})
             return record, text, body_planes(record, text)
         if record.carriable:
             seen_before = body in self._carriers
             pose = fit_upright(points, apply(pose, self._model.points(body, POINTS)), as_believed=seen_before) @ pose
         else:
-            motion, joints = self._furniture(body, points, joints)
-            pose = motion @ pose
+            fit = self._furniture(body, look, joints)
+            pose, joints = fit.motion @ pose, fit.joints
         return moved_record(record, pose, joints), text, planes
 
     def _carrier(self, body: str, points: np.ndarray) -> SeenCarrier | None:
-        """Return what points (N, 3) of a carrier show of its shape, None where that is less than was seen before: an
-        arm or what stands on it hides the rest."""
+        """Return how points (N, 3) of a carrier show it, None where an arm or what stands on it hides too much. Its
+        shape is that of the look that showed most points of it."""
         load = [[*self._model.pose(name)[:2, 3], self._model.footprint(name)[0]] for name in self._model.load(body)]
         pose = self._model.pose(body)
         shape = seen_carrier(points, np.array(load).reshape(-1, 3), float(np.arctan2(pose[1, 0], pose[0, 0])))
-        before = self._carriers.get(body)
-        if shape is None or (before is not None and np.any(shape.size < before.size - HIDDEN)):
+        if shape is None:
             return None
-        self._carriers[body] = shape
-        return shape
+        most, best = self._carriers.get(body, (0, shape))
+        if len(points) >= most:
+            self._carriers[body] = len(points), shape
+            return shape
+        return replace(shape, boxes=best.boxes) if np.all(np.abs(shape.size - best.size) < HIDDEN) else None
 
     def _distance(self, body: str) -> float:
         """Return how far from the base a body is believed [m]."""
         base = self._robot.robot.configuration().base
         return float(np.hypot(*(np.mean(self._model.world.bounds(body), axis=0)[:2] - base[:2])))
 
-    def _furniture(
-        self, body: str, points: np.ndarray, joints: dict[str, float]
-    ) -> tuple[np.ndarray, dict[str, float]]:
-        """Return how furniture stands from where it is believed (4, 4), and the joint values at which it fits the
-        points (N, 3): by turns place and joints, begun with either, whichever fits better. An open door tells nothing
-        of where a shut one stands, furniture beside its place nothing of how far a door is open."""
-        points = points[:: max(1, len(points) // SEEN_POINTS)]
-        fits = [self._by_turns(body, points, joints, turns) for turns in (2, 3)]
-        return min(fits, key=lambda fit: fit[0])[1:]
+    def _furniture(self, body: str, look: Look, joints: dict[str, float]) -> FittedFurniture:
+        """Return how furniture stands from where it is believed, and the joint values at which it fits a look."""
+        world, parts = self._model.world, self._parts_of(body)
 
-    def _by_turns(
-        self, body: str, points: np.ndarray, joints: dict[str, float], turns: int
-    ) -> tuple[float, np.ndarray, dict[str, float]]:
-        """Return the misfit [m], the motion (4, 4) and the joint values after so many fits of the joints, each but
-        the first of two after one of the place."""
-        model, found, motion = self._model, dict(joints), np.eye(4)
-        shapes = self._parts_of(body)
+        def surface_at(values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+            with world.joints_at(body, values):
+                poses = {link: world.link_pose(body, link) for link in parts}
+            points = [apply(poses[link], own) for link, (own, _) in parts.items()]
+            normals = [own @ poses[link][:3, :3].T for link, (_, own) in parts.items()]
+            return np.concatenate(points), np.concatenate(normals)
 
-        def points_at(values: dict[str, float]) -> np.ndarray:
-            with model.world.joints_at(body, values):
-                return np.concatenate([apply(model.world.link_pose(body, k), own) for k, own in shapes.items()])
+        ranges = [Range(joint.name, joint.lower, joint.upper) for joint in self._model.records[body].joints]
+        return fit_furniture(
+            look.points, look.views, surface_at, ranges, joints, lambda m: self._near_its_place(body, m)
+        )
 
-        for turn in range(turns):
-            if turn > 0 or turns > 2:
-                moved = fit_upright(points, points_at(found), as_believed=True, as_high=True)
-                if self._off_its_place(body, moved) > MOST_MOVED:
-                    break  # that is no error of a map: something else was fitted
-                motion = moved
-            seen = apply(inverse(motion), points)
-            for joint in model.records[body].joints:
+    def _near_its_place(self, body: str, motion: np.ndarray) -> bool:
+        """Whether furniture that is moved by a motion (4, 4) from where it is believed stands about as the map has it;
+        elsewhere something else was fitted."""
+        middle = np.append(np.mean(self._model.world.bounds(body), axis=0), 1.0)
+        from_map = motion @ self._model.pose(body) @ inverse(self._mapped[body])
+        off = motion @ middle - self._mapped[body] @ inverse(self._model.pose(body)) @ middle
+        turn = abs(float(np.arctan2(from_map[1, 0], from_map[0, 0])))
+        return float(np.linalg.norm(off)) < self._radius / 2 and turn < MOST_TURNED
 
-                def of_joint(value: float, name: str = joint.name) -> np.ndarray:
-                    return points_at(found | {name: value})
-
-                found[joint.name] = fit_joint(seen, of_joint, joint.lower, joint.upper, joints[joint.name])
-        return misfit(apply(inverse(motion), points), points_at(found)), motion, found
-
-    def _parts_of(self, body: str) -> dict[str, np.ndarray]:
-        """Return points (N, 3) on each part of furniture, its own frame."""
+    def _parts_of(self, body: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return points (N, 3) on each part of furniture and their outward normals (N, 3), its own frame."""
         if body not in self._parts:
             meshes = link_shapes(self._model.text(body))
             random = np.random.default_rng(0)
-            self._parts[body] = {
-                k: surface_points(own, FURNITURE_POINTS, random)[0] for k, own in meshes.items() if own
-            }
+            self._parts[body] = {k: surface_points(own, FURNITURE_POINTS, random) for k, own in meshes.items() if own}
         return self._parts[body]
-
-    def _off_its_place(self, body: str, motion: np.ndarray) -> float:
-        """Return how far [m] from where the map has furniture its middle comes by a motion (4, 4) from where it is
-        believed."""
-        middle = np.mean(self._model.world.bounds(body), axis=0)
-        mapped = self._mapped[body] @ inverse(self._model.pose(body))
-        return float(np.linalg.norm(apply(motion, middle[None])[0] - apply(mapped, middle[None])[0]))
 
     def _look_for(self, body: str, class_name: str, *, closely: bool = False) -> Look:
         """Return what the cameras show of the thing of its class that is nearest to where a body is believed;
@@ -245,7 +228,7 @@ class CameraEyes:
         if carriable:
             low = high = (low + high) / 2  # of furniture any side may be in sight
         renderer = self._pictures.sight(self._robot.world)
-        found, eyes = np.zeros((0, 3)), []
+        found, shown = np.zeros((0, 3)), []
         for eye, target in views:
             pose = look_at(eye, target)
             picture = take(renderer, camera, pose, self._random)
@@ -262,8 +245,8 @@ class CameraEyes:
             away = [float(np.linalg.norm(middle - np.clip(middle, low, high))) for middle in middles]
             if clouds and min(away) < (SAME if carriable and len(found) else radius or self._radius):
                 found = np.concatenate([found, clouds[int(np.argmin(away))]])
-                eyes.append(apply(map_from_true, eye[None])[0])
-        return Look(found, tuple(eyes))
+                shown.append(View(picture, map_from_true @ pose))
+        return Look(found, tuple(shown))
 
     def _of_another(self, body: str, class_name: str, points: np.ndarray) -> bool:
         """Whether points (N, 3) are rather of another thing of a class that is believed to be nearer to them, and as

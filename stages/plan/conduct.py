@@ -18,7 +18,6 @@ from stages.kit.motion.physical_robot import PhysicalRobot
 from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.simulation.robot import base_pose
 from stages.plan.action import MotionRequest, action_named
-from stages.plan.affordances import CARRIER_CLASSES
 from stages.plan.carriers import NOTHING, carrier
 from stages.plan.correspondence import match_joint
 from stages.plan.erring_robot import ErringRobot
@@ -282,14 +281,14 @@ class Conduct:
 
     def _looked(self, step: Step, before: Anchor | None) -> tuple[np.ndarray, np.ndarray] | None:
         """Look, and return base pose and grasp (or place) of the planned step, moved along with the body they are tied
-        to; None where there is no such body, and where it is a tray that eyes which err give another shape than the
-        motion was planned for: its frame is another, its rim elsewhere.
+        to; None where there is no such body, and where eyes which err give it another shape than the motion was planned
+        for: its frame is another, its rim or its handle elsewhere.
         """
         self._look(step.name, step.arguments)
         if before is None:
             return None
         model, action = self.model, action_named(step.name)
-        reshaped = model.text(before.body) != before.text and model.records[before.body].class_name in CARRIER_CLASSES
+        reshaped = model.text(before.body) != before.text
         if reshaped and self.eyes is not None and self.eyes.again:
             return None
         assert step.manipulation is not None

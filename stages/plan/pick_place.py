@@ -19,15 +19,20 @@ from stages.kit.simulation.robot import Configuration
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
-from stages.plan.tray_loading import lifts_left, lifts_left_beside, load_moments
+from stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
 from stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
 LIFT = 0.03
 DRAWER_LIFT = 0.2
 SLOW = 0.35
+FRICTION_USED = 0.3
+"""Half of the friction **assumed** of rubber on household things: a grasp asks for no more where there is one, as what
+is held is carried with starts and stops."""
 PALM_BEHIND, HAND_END = 0.04, 0.11
 """How far behind the tool point the palm begins and the hand ends [m]."""
+PALM_ROOM = 0.006
+"""Wanted between the palm and what is held [m]."""
 GraspStyle = Literal["any", "rather_level", "level", "steep"]
 """How the hand may come: `level` from the side (for what is put under a cover), `steep` from above (into a drawer);
 `rather_level` tries the ways from the side first."""
@@ -67,6 +72,34 @@ def palm_bottom(world_from_tool: np.ndarray, palm: tuple[float, float]) -> float
         [x * palm[1] / 2, y * palm[0] / 2, -z] for x in (-1, 1) for y in (-1, 1) for z in (PALM_BEHIND, HAND_END)
     ]
     return float(apply(world_from_tool, np.array(corners))[:, 2].min())
+
+
+def _two_finger_grasps(
+    model: WorldModel, item: str, widest: float, style: GraspStyle, random: np.random.Generator
+) -> list[Grasp]:
+    """Return the grasps of a thing that fingers open to `widest` [m] can take: those that ask for little friction and
+    keep it off the palm, where there are such."""
+    points, normals = model.surface(item)
+    for friction in (FRICTION_USED, np.inf):
+        grasps = sample_grasps(
+            points, normals, model.pose(item), opening=widest, random=random, pitches=PITCHES[style], friction=friction
+        )
+        if grasps:
+            return _palm_free(points, grasps, model.description.palm) or grasps
+    return []
+
+
+def _palm_free(points: np.ndarray, grasps: list[Grasp], palm: tuple[float, float]) -> list[Grasp]:
+    """Return the grasps in which a thing, points (N, 3) of it in its own frame, keeps `PALM_ROOM` from a palm of a
+    length and breadth [m]: what the palm presses on is pushed over when the fingers let go."""
+    half = np.array([palm[1], palm[0]]) / 2
+
+    def free(grasp: Grasp) -> bool:
+        own = apply(inverse(grasp.body_from_tool), points)
+        behind = (own[:, 2] < PALM_ROOM - PALM_BEHIND) & (own[:, 2] > -HAND_END)
+        return not bool(np.any(behind & np.all(np.abs(own[:, :2]) < half, axis=1)))
+
+    return [grasp for grasp in grasps if free(grasp)]
 
 
 def _bearable(model: WorldModel, item: str, grasps: list[Grasp]) -> list[Grasp]:
@@ -133,7 +166,7 @@ def plan_pick(
     gripper, otherwise what ended most attempts.
     """
     world_from_item = model.pose(item)
-    points, normals = model.surface(item)
+    points = model.points(item)
     # Fingers may touch the item, so that its believed shape, a little too wide, does not stop them.
     widest = model.description.opening + budgets.size_uncertainty
     # what is laden is held straight from above: the load stays level while the arm moves
@@ -143,7 +176,7 @@ def plan_pick(
         else []
     )
     if not grasps:
-        grasps = sample_grasps(points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style])
+        grasps = _two_finger_grasps(model, item, widest, style, random)
     if not grasps:
         grasps = rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty)
     if not grasps:
@@ -161,8 +194,8 @@ def plan_pick(
     bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, base)
     queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
     if model.laden(item):
-        moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
-        queue = [queue[index] for index in np.argsort(moments.round(1), kind="stable")]
+        poses = np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue])
+        queue = [queue[index] for index in easiest_first(model, item, poses)]
     lowest = float(apply(world_from_item, points)[:, 2].min())
     over = {
         id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
@@ -313,9 +346,9 @@ def plan_place(
 ) -> Manipulation:
     """Return the motion that puts the held `item` down on `target`, or in it behind `door`, base pose included.
 
-    `preferred` (base (3,), world_from_item (4, 4)) is tried first; `base` (3,): from there or not at all; `further`:
-    what is put there later. Raises MotionFailed: `no_placement` when no free place there carries the item's footprint,
-    otherwise what ended most attempts.
+    `preferred` (base (3,), world_from_item (4, 4)) is tried first, or last where it keeps a tray from being lifted;
+    `base` (3,): from there or not at all; `further`: what is put there later. Raises MotionFailed: `no_placement` when
+    no free place there carries the item's footprint, otherwise what ended most attempts.
     """
     assert state.tool_from_item is not None
     on_tray = model.records[target].carriable
@@ -328,25 +361,14 @@ def plan_place(
             (item, target),
             {"places": len(regions)},
         )
+    serves = True
     if on_tray and places:
-        poses = np.array([place.world_from_item for place in places])
-        left = lifts_left(model, target, item, poses, budgets.size_uncertainty)
-        later = left
-        if further and left.any():
-            spots = sample_placements(model, further[0], target, door, random)
-            beside = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
-            later = lifts_left_beside(model, target, item, poses, further[0], beside, budgets.size_uncertainty)
-        order = sorted(
-            range(len(places)),
-            key=lambda index: (not later[index], not places[index].roomy, -later[index], -left[index]),
-        )
-        places = [places[index] for index in order if left[index] or not left.any()]
+        places, serves = _liftable(model, item, target, door, budgets, random, places, preferred, further)
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     checker = model.checker
     queue: list[tuple[np.ndarray, Placement]] = []
-    if preferred is not None:
-        queue.append((preferred[0], Placement(preferred[1], *_cover(places, preferred[1]))))
+    wish = [] if preferred is None else [(preferred[0], Placement(preferred[1], *_cover(places, preferred[1])))]
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     checker.allow(touch=model.links(item))
@@ -358,11 +380,9 @@ def plan_place(
         else:
             bases = base[None]
         queue += [(at, place) for at in bases]
+    queue = wish + queue[: budgets.pairs] if serves else queue[: budgets.pairs] + wish
     try:
-        attempts = (
-            _try_place(model, state, item, target, at, place, arm_planner, tally)
-            for at, place in queue[: budgets.pairs]
-        )
+        attempts = (_try_place(model, state, item, target, at, place, arm_planner, tally) for at, place in queue)
         motion = _first_motion(attempts, budgets.paths)
         if motion is not None:
             return motion
@@ -371,6 +391,35 @@ def plan_place(
         checker.allow()
     tally.raise_for(f"place({item}, {target})", (item, target))
     raise AssertionError("unreachable")
+
+
+def _liftable(
+    model: WorldModel,
+    item: str,
+    tray: str,
+    door: str | None,
+    budgets: Budgets,
+    random: np.random.Generator,
+    places: list[Placement],
+    preferred: tuple[np.ndarray, np.ndarray] | None,
+    further: tuple[str, ...],
+) -> tuple[list[Placement], bool]:
+    """Return the places on a tray by which it can still be lifted, those that leave room for what is put there later
+    first, and whether the preferred one (see `plan_place`) does what the best of them do: it was chosen on a tray that
+    was believed to be another."""
+    wish = [] if preferred is None else [preferred[1]]
+    poses = np.array([*(place.world_from_item for place in places), *wish])
+    left = lifts_left(model, tray, item, poses, budgets.size_uncertainty)
+    later = left
+    if further and left.any():
+        spots = sample_placements(model, further[0], tray, door, random)
+        beside = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
+        later = lifts_left_beside(model, tray, item, poses, further[0], beside, budgets.size_uncertainty)
+    order = sorted(
+        range(len(places)), key=lambda index: (not later[index], not places[index].roomy, -later[index], -left[index])
+    )
+    serves = all(counts[-1] or not counts.any() for counts in (left, later))
+    return [places[index] for index in order if left[index] or not left.any()], serves
 
 
 def _cover(places: list[Placement], world_from_item: np.ndarray) -> tuple[bool, bool]:

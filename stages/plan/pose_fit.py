@@ -1,8 +1,6 @@
-"""Where a known shape stands, and how far open it is, by points of one side of it."""
+"""Where a known shape stands, by points of one side of it."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,17 +14,15 @@ FAR = 0.05
 """A point farther from the shape tells no more than one this far [m]."""
 SURE = 0.002
 """About the noise of a depth camera near by [m]."""
-STEPS, FINE = 25, 9
-"""Values of a joint that are tried over its range, and then around the best of them."""
 
 
-def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = False, as_high: bool = False) -> np.ndarray:
+def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = False) -> np.ndarray:
     """Return the motion (4, 4), a turn about the vertical and a shift, that brings a shape onto points of it.
 
     `seen` (N, 3): points of the side that cameras saw; `shape` (M, 3): all around it, where it is believed. Trimmed
     iterated closest points from the seen points to the shape, so that its hidden side pulls at nothing. It starts with
     the boxes' middles one over the other, tops level: a top is in sight more often than a foot; `as_believed`, where
-    it is believed: of what is large one side is in sight. `as_high`: no higher or lower than it is believed.
+    it is believed: of what is large one side is in sight.
     """
     low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
     own_low, own_high = shape.min(axis=0), shape.max(axis=0)
@@ -40,8 +36,6 @@ def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = Fals
         away, nearest = tree.query(back)
         near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
         step = align_upright(apply(motion, shape[nearest[near]]), seen[near])
-        if as_high:
-            step[2, 3] = 0.0
         motion = step @ motion
         if np.abs(step - np.eye(4)).max() < 1e-5:
             break
@@ -57,30 +51,3 @@ def align_upright(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     step[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     step[:3, 3] = goal - step[:3, :3] @ middle
     return step
-
-
-def fit_joint(
-    seen: np.ndarray,
-    points_at: Callable[[float], np.ndarray],
-    lower: float,
-    upper: float,
-    believed: float | None = None,
-) -> float:
-    """Return the value of a joint [rad or m] at which points of its furniture (N, 3) lie nearest to the shape that
-    `points_at` a value gives (M, 3): the mean distance of the seen points, each `FAR` at most. Where it is `believed`
-    to stand where that is no nearer by `SURE`: of a door that stands open little is seen, and points of what is behind
-    it lie as near to the shut one."""
-
-    def misfit_at(value: float) -> float:
-        return misfit(seen, points_at(value))
-
-    values = np.linspace(lower, upper, STEPS)
-    best = min(values.tolist(), key=misfit_at)
-    step = (upper - lower) / (STEPS - 1)
-    best = min(np.clip(np.linspace(best - step, best + step, FINE), lower, upper).tolist(), key=misfit_at)
-    return best if believed is None or misfit_at(best) < misfit_at(believed) - SURE else believed
-
-
-def misfit(seen: np.ndarray, shape: np.ndarray) -> float:
-    """Return the mean distance of seen points (N, 3) from points of a shape (M, 3), each `FAR` at most [m]."""
-    return float(np.minimum(cKDTree(shape).query(seen)[0], FAR).mean())

@@ -64,11 +64,15 @@ def rim_grasps(
         outward = np.array([np.cos(heading), np.sin(heading)])
         across = np.array([-outward[1], outward[0]])
         relative = top[:, :2] - middle
-        near = top[(np.abs(relative @ across - offset) < BREADTH) & (relative @ outward > 0)]
-        if len(near) < 6:
+        # Beyond the middle too: a bar that lies across it beside the middle would pass for a wall where it is cut.
+        beside_it = np.abs(relative @ across - offset) < BREADTH
+        along = (relative @ outward)[beside_it]
+        if np.sum(along > 0) < 6:
             continue
-        along = (near[:, :2] - middle) @ outward
-        wall = along[along > along.max() - THICKEST]
+        of_wall = along > along.max() - THICKEST
+        if top[beside_it, 2][of_wall].max() < high[2] - depth + LEAST_DEPTH:
+            continue  # fingers that are as deep as the highest of it leaves room for close over a low wall
+        wall = along[of_wall]
         thickness = float(along.max() - wall.min())
         behind = (along < wall.min() - 0.002) & (along > wall.min() - FINGER_ROOM)
         if thickness > THICKEST - 0.002 or behind.any():

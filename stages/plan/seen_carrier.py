@@ -16,6 +16,7 @@ from scipy.ndimage import convolve
 from stages.kit.geometry.box_cover import merge_cells
 from stages.kit.geometry.boxes import minimum_rectangle
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.plan.scaled_body import add_box
 
 CELL = 0.005
 """Edge of a cell of the height map [m]."""
@@ -124,13 +125,6 @@ def carrier_text(name: str, carrier: SeenCarrier, mass: float) -> str:
     turning = {"ixx": wide + high, "iyy": long + high, "izz": long + wide, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
     ElementTree.SubElement(inertial, "inertia", {axis: f"{value:.9g}" for axis, value in turning.items()})
     for center, size in carrier.boxes:
-        shape = ElementTree.SubElement(link, "collision")
-        ElementTree.SubElement(shape, "origin", {"xyz": _words(center), "rpy": "0 0 0"})
-        geometry = ElementTree.SubElement(shape, "geometry")
-        ElementTree.SubElement(geometry, "box", {"size": _words(size)})
+        add_box(link, center, size)
     ElementTree.indent(robot)  # pybullet breaks lines of more than a kilobyte, within a word if need be
     return ElementTree.tostring(robot, encoding="unicode")
-
-
-def _words(values: np.ndarray) -> str:
-    return " ".join(f"{float(value):.6g}" for value in values)

@@ -38,11 +38,32 @@ def holding_moments(tool_poses: np.ndarray, places: np.ndarray, masses: np.ndarr
     return GRAVITY * masses.sum() * np.linalg.norm(tool_poses[:, :2, 3] - middle, axis=1)
 
 
+def twisting_moments(tool_poses: np.ndarray, places: np.ndarray, masses: np.ndarray) -> np.ndarray:
+    """Return what of `holding_moments` (N,) [N m] turns the load about the axis along which fingers close (tool y):
+    pads resist that by friction alone."""
+    middle = masses @ places / masses.sum()
+    along = np.einsum("nd,nd->n", middle - tool_poses[:, :2, 3], tool_poses[:, :2, 0])
+    return GRAVITY * masses.sum() * np.abs(along)
+
+
+def _masses(model: WorldModel, tray: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return places (K, 2) and masses (K,) [kg] of a tray and of what stands on it."""
+    names = (tray, *model.load(tray))
+    places = np.array([model.pose(name)[:2, 3] for name in names])
+    return places, np.array([model.records[name].mass for name in names])
+
+
 def load_moments(model: WorldModel, tray: str, tool_poses: np.ndarray) -> np.ndarray:
     """Return the moment (N,) [N m] of a tray and what stands on it about each tool pose (N, 4, 4), world."""
-    names = (tray, *model.load(tray))
-    masses = np.array([model.records[name].mass for name in names])
-    return holding_moments(tool_poses, np.array([model.pose(name)[:2, 3] for name in names]), masses)
+    return holding_moments(tool_poses, *_masses(model, tray))
+
+
+def easiest_first(model: WorldModel, tray: str, tool_poses: np.ndarray) -> np.ndarray:
+    """Return the indices (N,) of tool poses (N, 4, 4), world, by the moment of a tray and its load in tenths [N m], and
+    of those alike by what of it twists them in the fingers."""
+    places, masses = _masses(model, tray)
+    moments, twists = (of(tool_poses, places, masses) for of in (holding_moments, twisting_moments))
+    return np.lexsort((twists.round(2), moments.round(1)))
 
 
 class Lifts:

@@ -43,12 +43,15 @@ def sample_grasps(
     angles: int = 16,
     pitches: tuple[float, ...] = (0.0, 0.35, 0.7, 1.1, np.pi / 2),
     heights: tuple[float, ...] = (0.35, 0.5, 0.65, 0.8),
+    friction: float = np.inf,
 ) -> list[Grasp]:
     """Return the grasps whose width fits the gripper and whose fingers meet the surface squarely, in random order.
 
     `points`, `normals` (N, 3) are of the item's surface, body frame. `opening` [m] is the widest distance of the
     fingers. At each height and tilt those headings are kept where the item is narrowest: on a box they lie flat on its
-    faces, on a round item they are all. The list is empty when the item is too wide everywhere.
+    faces, on a round item they are all. Where a finger touches, the surface leans by the angle whose tangent is
+    `friction` at most: one end of a pad on the near side of a round item squeezes it out of the hand. The list is empty
+    when the item is too wide everywhere.
     """
     world_points = apply(world_from_body, points)
     world_normals = normals @ world_from_body[:3, :3].T
@@ -59,7 +62,7 @@ def sample_grasps(
     for pitch in pitches:
         for height in heights if pitch < 1.2 else heights[:1]:
             tried = [
-                _grasp_at(world_points, world_normals, low, high, float(heading), pitch, height, opening)
+                _grasp_at(world_points, world_normals, low, high, float(heading), pitch, height, opening, friction)
                 for heading in headings
             ]
             fitting = [grasp for grasp in tried if grasp is not None]
@@ -71,11 +74,17 @@ def sample_grasps(
     return [grasps[index] for index in random.permutation(len(grasps)).tolist()]
 
 
-def _square(facing: np.ndarray) -> bool:
-    """Whether the outside of a surface faces a finger: (N,) cosines of normals there with the way out. The inner side
-    of a thin wall, which faces away, does not count."""
-    outside = facing[facing > 0]
-    return len(outside) > 0 and float(outside.mean()) >= SQUARE
+def _square(normals: np.ndarray, out: np.ndarray, friction: float) -> bool:
+    """Whether the outside of a surface faces a finger and does not slide along it: normals (N, 3) there, the way out
+    (3,), and what the tangent of their angle is at most. The inner side of a thin wall, which faces away, does not
+    count."""
+    facing = normals @ out
+    outside = normals[facing > 0]
+    if not len(outside) or float(facing[facing > 0].mean()) < SQUARE:
+        return False
+    mean = outside.mean(axis=0)
+    away = float(mean @ out)
+    return float(np.linalg.norm(mean - away * out)) <= friction * away
 
 
 def narrowest_width(points: np.ndarray) -> float:
@@ -99,6 +108,7 @@ def _grasp_at(
     pitch: float,
     height: float,
     opening: float,
+    friction: float,
 ) -> tuple[np.ndarray, float] | None:
     """Return world_from_tool (4, 4) and the width, or None where the item is too wide or fingers would slip."""
     approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
@@ -118,9 +128,9 @@ def _grasp_at(
     width = float(along.max() - along.min())
     if width > opening - MARGIN:
         return None
-    facing = normals[between] @ closing
-    if not _square(facing[along > along.max() - CONTACT_BAND]) or not _square(
-        -facing[along < along.min() + CONTACT_BAND]
+    touched = normals[between]
+    if not _square(touched[along > along.max() - CONTACT_BAND], closing, friction) or not _square(
+        touched[along < along.min() + CONTACT_BAND], -closing, friction
     ):
         return None
     pose = np.eye(4)

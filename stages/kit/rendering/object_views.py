@@ -31,6 +31,20 @@ class Picture:
     camera: Camera
 
 
+@dataclass(frozen=True)
+class View:
+    """A picture, and from where it was taken."""
+
+    picture: Picture
+    map_from_camera: np.ndarray
+    """(4, 4), as it is believed."""
+
+    @property
+    def eye(self) -> np.ndarray:
+        """Where the camera stood (3,)."""
+        return self.map_from_camera[:3, 3]
+
+
 def take(
     renderer: SceneRenderer, camera: Camera, world_from_camera: np.ndarray, random: np.random.Generator
 ) -> Picture:

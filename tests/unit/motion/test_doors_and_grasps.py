@@ -136,5 +136,20 @@ def test_a_thin_walled_box_is_not_grasped_at_its_corners() -> None:
 
 
 def test_what_only_faces_away_is_not_square() -> None:
-    assert not _square(np.array([])) and not _square(np.array([-1.0, -1.0, 0.0]))
-    assert _square(np.array([-1.0, 1.0, 1.0])) and not _square(np.array([0.7, 0.7, -1.0]))
+    out, side = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    assert not _square(np.zeros((0, 3)), out, np.inf) and not _square(np.array([-out, -out, side]), out, np.inf)
+    assert _square(np.array([-out, out, out]), out, np.inf)
+    leaning = np.array([0.4, 0.9, 0.0]) / np.hypot(0.4, 0.9)
+    assert _square(np.array([leaning, leaning]), out, 0.5) and not _square(np.array([leaning, leaning]), out, 0.3)
+
+
+def test_a_round_item_is_held_by_its_sides_and_not_squeezed_out() -> None:
+    points, normals = surface_points(
+        [trimesh.creation.cylinder(radius=0.03, height=0.2)], 4000, np.random.default_rng(0)
+    )
+    any_way, held = (
+        sample_grasps(points, normals, np.eye(4), opening=0.08, random=np.random.default_rng(1), friction=friction)
+        for friction in (np.inf, 0.3)
+    )
+    assert 0 < len(held) < len(any_way)
+    assert min(grasp.width for grasp in any_way) < 0.055 < min(grasp.width for grasp in held)

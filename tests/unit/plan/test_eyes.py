@@ -19,7 +19,7 @@ from stages.plan.camera_eyes import CameraEyes
 from stages.plan.erring_robot import ErringRobot
 from stages.plan.eyes import NoisyEyes, Room, TrueEyes
 from stages.plan.pictures import RoomPictures
-from stages.plan.pose_fit import fit_joint, fit_upright
+from stages.plan.pose_fit import fit_upright
 from stages.plan.world_model import WorldModel
 
 NEVER = SegmenterErrors(SegmenterRates(confusable=0.0, hidden=0.0, missed=0.0), Luck(0), ())
@@ -44,15 +44,6 @@ def test_a_shape_is_fitted_to_the_side_that_was_seen() -> None:
     found = fit_upright(seen, box_surface(random, 3000))
     assert np.linalg.norm((found - truth)[:3, 3]) < 0.004
     assert abs(np.arctan2(found[1, 0], found[0, 0]) - 0.15) < 0.03
-
-
-def test_a_door_is_found_as_far_open_as_it_stands() -> None:
-    def door(angle: float) -> np.ndarray:
-        along, up = np.meshgrid(np.linspace(0, 0.5, 30), np.linspace(0, 1, 30))
-        return np.stack([along * np.cos(angle), along * np.sin(angle), up], axis=-1).reshape(-1, 3)
-
-    noise = np.random.default_rng(1).normal(0, 0.003, (900, 3))
-    assert fit_joint(door(0.83) + noise, door, 0.0, 2.0) == pytest.approx(0.83, abs=0.03)
 
 
 @pytest.fixture

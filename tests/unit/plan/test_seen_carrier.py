@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.kit.geometry.transforms import apply, transform_from_yaw
+from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from stages.kit.simulation.shapes import link_shapes, surface_points
 from stages.plan.rim_grasps import rim_grasps
 from stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
@@ -50,6 +50,23 @@ def test_the_hand_takes_it_by_the_grips_that_it_sees() -> None:
     assert grasps
     for grasp in grasps:
         assert abs(abs(grasp.body_from_tool[0, 3]) - LONG / 2) < 0.015  # at its ends, where the grips are
+
+
+def test_a_tray_is_gripped_by_walls_as_high_as_the_fingers_are_deep() -> None:
+    """Its grips look 6 mm lower than they are, so that the strip below their tops takes in the low walls; a grip cut at
+    the middle of the tray is no wall across it."""
+    points = tray_from_above(np.random.default_rng(0))
+    own = apply(inverse(TRUE), points)
+    points[own[:, 2] > RIM + 0.01] -= (0.0, 0.0, 0.006)
+    carrier = seen_carrier(points, np.zeros((0, 3)), 0.3)
+    assert carrier is not None
+    for seed in range(5):
+        shape, _ = surface_points(
+            link_shapes(carrier_text("tray_1", carrier, 0.2))["tray_1"], 3000, np.random.default_rng(seed)
+        )
+        grasps = rim_grasps(shape, carrier.pose, np.random.default_rng(0))
+        assert grasps
+        assert all(abs(abs(grasp.body_from_tool[0, 3]) - LONG / 2) < 0.015 for grasp in grasps)
 
 
 def test_it_is_turned_as_it_was_believed_to_be() -> None:

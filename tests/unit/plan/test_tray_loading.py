@@ -23,6 +23,7 @@ from stages.plan.tray_loading import (
     lifts_left,
     lifts_left_beside,
     load_moments,
+    twisting_moments,
 )
 from stages.plan.world_model import WorldModel
 from tests.unit.simulation.handmade_scene import HandmadeBody, floor, table, write_scene
@@ -111,6 +112,14 @@ def test_moments_of_a_lever() -> None:
     ]
     found = holding_moments(poses, np.array([[0.1, 0.3], [-0.2, 0.1]]), np.array([0.2, 1.1]))
     assert found == pytest.approx(np.linalg.norm(torques, axis=1))
+
+
+def test_what_twists_in_the_fingers_is_the_lever_across_their_way() -> None:
+    poses = np.array([from_above(0.0, 0.0, 0.0), from_above(0.0, 0.0, np.pi / 2), from_above(0.0, 0.0, np.pi / 4)])
+    across = poses[:, :2, 0] @ np.array([0.3, 0.4])
+    twists = twisting_moments(poses, np.array([[0.3, 0.4]]), np.array([2.0]))
+    assert twists == pytest.approx(GRAVITY * 2.0 * np.abs(across))
+    assert np.all(twists <= holding_moments(poses, np.array([[0.3, 0.4]]), np.array([2.0])))
 
 
 # --- a tray in a scene ----------------------------------------------------------------------------------------

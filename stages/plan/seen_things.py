@@ -1,0 +1,68 @@
+"""Small things as looks from near by show them: the planned shape in the size that fits, with what sticks out of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.simulation.shapes import link_shapes, surface_points
+from stages.plan.scaled_body import scaled_text, shifted_text, with_boxes
+from stages.plan.sticking_out import sticking_out
+from stages.plan.thing_fit import fit_thing
+
+POINTS = 3000
+"""On a shape that is fitted."""
+
+
+class SeenThings:
+    """What looks have told of the shapes of things."""
+
+    def __init__(self) -> None:
+        self._planned: dict[str, str] = {}
+        """Thing -> URDF text of the shape that it was planned with."""
+        self._learned: dict[str, str] = {}
+        """Thing -> the same with what stuck out of it when that was seen last, in the planned size."""
+        self._middles: dict[str, np.ndarray] = {}
+        """Thing -> origin of the frame that it is believed in, frame of its planned shape (3,) [m]."""
+
+    def fitted(
+        self, name: str, text: str, pose: np.ndarray, points: np.ndarray, eyes: np.ndarray
+    ) -> tuple[np.ndarray, str]:
+        """Return pose (4, 4) and URDF text of a thing by points (N, 3) of it that cameras at `eyes` (K, 3) saw.
+
+        `text` and `pose` are believed of it now. Where something sticks out, the frame's origin is under the middle of
+        all of it, as places and radii of feet are counted from there.
+        """
+        planned = self._planned.setdefault(name, text)
+        believed = _moved(pose, -self._middles.get(name, np.zeros(3)))
+        best, shape, surface = None, planned, None
+        for candidate in [planned, *([self._learned[name]] if name in self._learned else [])]:
+            own = _surface(candidate)
+            fit = fit_thing(points, eyes, own, believed)
+            if best is None or fit.misfit < best.misfit:
+                best, shape, surface = fit, candidate, own
+        assert best is not None and surface is not None
+        if shape == planned:
+            more = sticking_out(apply(inverse(best.pose), points), best.scale * surface[0])
+            if more:
+                shape = with_boxes(planned, [(center / best.scale, size / best.scale) for center, size in more])
+                self._learned[name] = shape
+        middle = np.zeros(3)
+        if shape != planned:
+            own_points = best.scale * _surface(shape)[0]
+            middle[:2] = (own_points.min(axis=0) + own_points.max(axis=0))[:2] / 2
+        self._middles[name] = middle
+        return _moved(best.pose, middle), shifted_text(scaled_text(shape, best.scale), -middle)
+
+
+def _moved(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """Return a pose (4, 4) moved by a shift (3,) of its own frame."""
+    moved = pose.copy()
+    moved[:3, 3] += pose[:3, :3] @ shift
+    return moved
+
+
+def _surface(text: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (N, 3) around a rigid body and their outward normals, its frame."""
+    meshes = [mesh for entries in link_shapes(text).values() for mesh in entries]
+    return surface_points(meshes, POINTS, np.random.default_rng(0))
