@@ -1,6 +1,6 @@
 """Which things the maps of real logs hold, in how many pieces, and how many names are wrong, after `make real`.
 
-Arms: where the masks come from. `network`: nothing but what the repository has. `believed`: the same, and its names are
+Arms: where the masks come from. `network`: nothing but what the repository has. `believed`: the same, and its masks are
 believed in places that are strange to it (`fuse --least-recognised 0`). `detector`: yolox_nano. `witnessed`:
 the same with the semantic segmenter beside it. Cases: the logs of data/annotations/real; a vertex of the map belongs to
 the smallest annotated box around it. What lies in no box counts for nothing: the annotator passed it over.
@@ -148,10 +148,10 @@ EXPERIMENT = Experiment(
     title="Which things of the real logs are found, and how many names are wrong",
     simulated="Nothing, but the living room's images are rendered; things annotated by eye, with rough boxes.",
     knows="Colour, depth, camera and poses of the logs; thresholds were chosen while looking at these three logs.",
-    does_not_show="A place that nobody looked at: thresholds, the rule that withholds names and how tables are cut "
-    "from what stands at them were chosen while looking at these three logs (walls and cuts at kitchen and office "
-    "alone). Boxes are rough, one person's. What lies in no box counts for nothing: a name on a curtain that nobody "
-    "annotated is not false here.",
+    does_not_show="A place that nobody looked at: thresholds, the rule when geometry cuts instead of masks, and how "
+    "tables are cut from what stands at them were chosen while looking at these three logs (walls and cuts at kitchen "
+    "and office alone); frames of the living room taught our own network. Boxes are rough, one person's. What lies in "
+    "no box counts for nothing: a name on a curtain that nobody annotated is not false here.",
     arms={
         NETWORK: "our own network",
         BELIEVED: "our own network, believed",
