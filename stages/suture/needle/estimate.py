@@ -91,7 +91,7 @@ def estimate(
     rivals = _hypotheses(observation, eyes, sheets, seed, guess, near)
     if not rivals:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    features = presence_features(observation.rig, sheets, rivals[0].outline, rivals[0].evidence)
+    features = presence_features(observation.rig, sheets, rivals[0].outline)
     answer = _answer(rivals, presence_probability(features), np.random.default_rng(seed))
     answer = replace(answer, presence_features=tuple(features.tolist()))
     if not answer.abstained:
