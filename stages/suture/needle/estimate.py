@@ -239,7 +239,7 @@ def _disparity_points(observation: NeedleObservation, random: np.random.Generato
 
 def _answer(rivals: list[Hypothesis], presence: float, random: np.random.Generator) -> NeedleEstimate:
     """Return the pose about which most of the probability lies, with its covariance, or abstain. `presence`: how
-    probable it is that there is a needle."""
+    probable it is that the best outline is a needle's."""
     draws = random.standard_normal((DRAWS, 6))
     chances = [_chance(rival, rivals, draws) for rival in rivals]
     chance = max(chances)

@@ -61,5 +61,5 @@ def _explained(mask: np.ndarray, near: np.ndarray) -> tuple[float, float]:
 
 
 def presence_probability(features: np.ndarray) -> float:
-    """Return how probable it is that there is a needle, given FEATURES (3,)."""
+    """Return how probable it is that an outline is that of a needle, given FEATURES (3,)."""
     return float(1.0 / (1.0 + np.exp(-np.clip(BIAS + WEIGHTS @ features, -30.0, 30.0))))
