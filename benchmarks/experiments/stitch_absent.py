@@ -175,8 +175,7 @@ EXPERIMENT = Experiment(
     knows="The needle's radius; the rig; no disparity is given.",
     does_not_show="Needles in real pictures: there are none to be had. Highlights and blood are of the kind that the "
     "network was trained with, drawn by other code in the same rendered world, in which the test of presence was "
-    "fitted too. Ten frames of one recording are few. The aim for false needles is met, that nine of ten visible ones "
-    "be found in pictures is missed.",
+    "fitted too. Ten frames of one recording are few. That nine of ten visible needles be found, the aim, is missed.",
     arms={"ours": "ours"},
     cases=(*VIEWS, RECORDED),
     seed_group=NEEDLES,

@@ -27,6 +27,7 @@ from scipy.optimize import linear_sum_assignment
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.tabulation import Figure
 from schemas.scene_parts import Camera
+from stages.kit.measurement.bootstrap import Interval, figure_interval
 from stages.kit.stage import Parameters
 from stages.tableware.actions.stack import Stack
 from stages.tableware.dishes_file import estimated_setting
@@ -280,28 +281,52 @@ def photograph_seen(data: Path, trial: Trial) -> tuple[Counts, np.ndarray]:
     return counts, draw_outlines(color, outlines, "a photograph without depth: heights are unknown")
 
 
+def grouped(case: str, records: dict[str, dict[str, int]]) -> list[Counter[str]]:
+    """Return the counts of what is drawn together for intervals: a scene's frames, a photograph."""
+    if case not in SIZES:
+        return [Counter(record) for record in records.values()]
+    groups = []
+    for scene in scenes():
+        counts = sum((Counter(records[frame]) for frame in scene if frame in records), Counter[str]())
+        for name in ("true", "found", "right", "planned", "planned_right", "refused"):
+            counts[f"dish/{name}"] = sum(counts[f"{kind}/{name}"] for kind in ("cup", "bowl", "plate"))
+        groups.append(counts)
+    return groups
+
+
+def ratio(groups: Sequence[Counter[str]], part: str, whole: str) -> Interval | None:
+    """Return a share over all groups, with its interval over groups; None where there is nothing of `whole`."""
+
+    def share(drawn: Sequence[Counter[str]]) -> float | None:
+        among = sum(counts[whole] for counts in drawn)
+        return sum(counts[part] for counts in drawn) / among if among else None
+
+    return figure_interval(share, groups, np.random.default_rng(0), resamples=2000)
+
+
 def more_figures(results: Results) -> dict[str, Figure]:
     """`ours/<case>/<class>/<measure>` over all images, of how many things there are."""
     flat: dict[str, Figure] = {}
     for case in results.cases:
-        counts = sum((Counter(record) for record in results.of("ours", case)), Counter[str]())
-        for name in ("true", "found", "right", "planned", "planned_right", "refused") if case in SIZES else ():
-            counts[f"dish/{name}"] = sum(counts[f"{kind}/{name}"] for kind in ("cup", "bowl", "plate"))
+        records = dict(zip(results.seeds(case), results.of("ours", case), strict=True))
+        groups = grouped(case, records)
+        counts = sum(groups, Counter[str]())
         kinds = {name.split("/")[0] for name in counts} | ({"stackings"} if case in SIZES else set())
         for kind in sorted(kinds):
             true, found, right = (counts[f"{kind}/{name}"] for name in ("true", "found", "right"))
-            values: dict[str, float] = {"true": true, "found": found, "right": right, "false": found - right}
+            values: dict[str, int] = {"true": true, "found": found, "right": right, "false": found - right}
             if case in SIZES and kind not in ("unknown", "stackings"):
                 values["refused"] = counts[f"{kind}/refused"]
             if kind == "stackings":
-                values, found = {}, 0
+                values = {}
             if case in SIZES and kind != "unknown":
                 meant = counts[f"{kind}/planned_right"]
                 values |= {"planned_right": meant, "planned_false": counts[f"{kind}/planned"] - meant}
-            values |= ({"precision": right / found} if found else {}) | ({"recall": right / true} if true else {})
             for name, value in values.items():
-                unit = "" if name in ("precision", "recall") else "count"
-                flat[f"ours/{case}/{kind}/{name}"] = Figure(float(value), None, None, true, unit)
+                flat[f"ours/{case}/{kind}/{name}"] = Figure(float(value), None, None, true, "count")
+            for name, whole in (("precision", "found"), ("recall", "true")) if kind != "stackings" else ():
+                if (said := ratio(groups, f"{kind}/right", f"{kind}/{whole}")) is not None:
+                    flat[f"ours/{case}/{kind}/{name}"] = Figure(said.value, said.low, said.high, true, "")
     return flat
 
 

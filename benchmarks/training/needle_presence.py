@@ -3,8 +3,8 @@
     python -m benchmarks stitch_absent --tuning --out RUN
     python -m benchmarks.training.needle_presence --run RUN
 
-Prints the constants of stages/suture/needle/presence.py, and the errors by leaving out blocks of seeds. Views with a
-needle count where the best guess is right (a wrong outline should not be called a needle); both kinds weigh the same.
+Prints the constants of stages/suture/needle/presence.py, and the errors by leaving out blocks of seeds. The outline is
+a needle where there is one and the best guess is right; a wrong outline of a needle is none. Both kinds weigh the same.
 The ridge is that of the least logarithmic loss, left out, of three.
 """
 
@@ -30,16 +30,15 @@ class Options(Parameters):
     run: Path = Field(description="Folder of the tuning views")
 
 
-def samples(run: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return FEATURES (N, F), whether there is a needle (N,), and the view's seed (N,)."""
-    rows, answers, seeds = [], [], []
-    for trial, record in kept_records("stitch_absent", run).items():
-        needle = trial.case.startswith("needle")
-        if record.presence and (record.found or not needle):
-            rows.append(record.presence)
-            answers.append(float(needle))
-            seeds.append(int(trial.seed))
-    return np.array(rows), np.array(answers), np.array(seeds)
+def samples(run: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return FEATURES (N, F), whether the outline is a needle's (N,), the view's seed (N,) and its case (N,)."""
+    found = [(trial, record) for trial, record in kept_records("stitch_absent", run).items() if record.presence]
+    return (
+        np.array([record.presence for _, record in found]),
+        np.array([float(record.found) for _, record in found]),
+        np.array([int(trial.seed) for trial, _ in found]),
+        np.array([trial.case for trial, _ in found]),
+    )
 
 
 def fitted(features: np.ndarray, answers: np.ndarray) -> tuple[np.ndarray, float]:
@@ -59,18 +58,18 @@ def fitted(features: np.ndarray, answers: np.ndarray) -> tuple[np.ndarray, float
 
 def main() -> None:
     """Fit, and say how well."""
-    features, answers, seeds = samples(asked(Options).run)
+    features, answers, seeds, cases = samples(asked(Options).run)
     margins = np.empty(len(answers))
     for fold in range(FOLDS):
         left_out = seeds % FOLDS == fold
         weights, bias = fitted(features[~left_out], answers[~left_out])
         margins[left_out] = features[left_out] @ weights + bias
-    chances = 1 / (1 + np.exp(-margins))
-    for least in (0.5, 0.8, 0.9):
-        false, missed = (chances[answers == 0] >= least).mean(), (chances[answers == 1] < least).mean()
-        print(f"from {least}: {100 * false:.1f} % false, {100 * missed:.1f} % missed, left out")
+    for case in np.unique(cases):
+        for right in (0.0, 1.0):
+            of = (cases == case) & (answers == right)
+            kind = "right" if right else "wrong"
+            print(f"{case}, {of.sum()} {kind} outlines: {(margins[of] > 0.0).sum()} pass, left out")
     weights, bias = fitted(features, answers)
-    print(f"{len(answers)} views, {int(answers.sum())} with a needle")
     print("WEIGHTS =", dict(zip(FEATURES, np.round(weights, 2).tolist(), strict=True)), "BIAS =", round(bias, 2))
 
 

@@ -158,7 +158,7 @@ SCENE = Stage(
 )
 NEEDLE = Stage(
     name="suture needle",
-    version=7,
+    version=8,
     summary="Find the needle's pose in stereo pairs, with its covariance, or say why it cannot be known (STITCH)",
     parameters=NeedleParameters,
     reads={"sequence": Sequence, "disparity": Optionally(Disparity), "masks": MASKS, "segmenter": SEGMENTER},
@@ -187,7 +187,7 @@ THREAD = Stage(
 )
 SIMULATE = Stage(
     name="suture simulate",
-    version=5,
+    version=6,
     summary="Throw running sutures with two simulated arms until a failure that ends the trial, or six",
     parameters=SimulateParameters,
     reads={"perception": Optionally(External("error model of perception (TOML) that every arm sees by"))},

@@ -91,7 +91,7 @@ def estimate(
     rivals = _hypotheses(observation, eyes, sheets, seed, guess, near)
     if not rivals:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    features = presence_features(observation.rig, sheets, rivals[0].outline, rivals[0].evidence)
+    features = presence_features(observation.rig, sheets, rivals[0].outline)
     answer = _answer(rivals, presence_probability(features), np.random.default_rng(seed))
     answer = replace(answer, presence_features=tuple(features.tolist()))
     if not answer.abstained:
@@ -239,7 +239,7 @@ def _disparity_points(observation: NeedleObservation, random: np.random.Generato
 
 def _answer(rivals: list[Hypothesis], presence: float, random: np.random.Generator) -> NeedleEstimate:
     """Return the pose about which most of the probability lies, with its covariance, or abstain. `presence`: how
-    probable it is that there is a needle."""
+    probable it is that the best outline is a needle's."""
     draws = random.standard_normal((DRAWS, 6))
     chances = [_chance(rival, rivals, draws) for rival in rivals]
     chance = max(chances)

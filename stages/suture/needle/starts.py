@@ -2,8 +2,10 @@
 
 A row of a rectified pair meets the needle at the same points in both eyes. The middles of the masks' runs in one row
 are known to a fraction of a pixel, where a dense disparity of shiny wire is not; each pair of runs is a candidate
-point, right or wrong. Circles through three points of either kind are kept when their radius is near the needle's, and
-scored on both masks: how much of the best half circle lies on mask, and how much of the mask it explains.
+point, right or wrong. Where these give no circle, because the wire lies along the rows, the ends of longer runs do:
+they are the same places in both eyes too, though an error of the row moves them by more. Circles through three points
+of any kind are kept when their radius is near the needle's, and scored on both masks: how much of the best half circle
+lies on mask, and how much of the mask it explains.
 """
 
 from __future__ import annotations
@@ -42,11 +44,10 @@ def starts(
     distances = (eyes[0].distance(), eyes[1].distance())
     pixels = (eyes[0].some_pixels(sampled, random), eyes[1].some_pixels(sampled, random))
     scores, poses = [], []
-    for given, often, most in (
-        (*_row_points(rig, eyes), SCORED_ROWS),
-        (points, np.ones(len(points)), SCORED_DISPARITY),
+    for (centres, normals), most in (
+        (_row_circles(rig, eyes, random), SCORED_ROWS),
+        (_circles_through(points, np.ones(len(points)), TRIPLES, random), SCORED_DISPARITY),
     ):
-        centres, normals = _circles_through(given, often, TRIPLES, random)
         scored, posed = _scored(rig, eyes, distances, pixels, centres[:most], normals[:most])
         scores.append(scored)
         poses.append(posed)
@@ -69,7 +70,8 @@ def _differ(pose: np.ndarray, other: np.ndarray) -> bool:
 
 @numba.njit(cache=True)
 def _runs(mask: np.ndarray, longest: int) -> np.ndarray:
-    """Return (R, 2): row and middle column of the runs of mask of at most `longest` pixels."""
+    """Return (R, 3), row, column and kind of the runs of mask: 0 for the middle of one of at most `longest` pixels, 1
+    and 2 for the left and the right end of a longer one."""
     runs = []
     for row in range(mask.shape[0]):
         start = -1
@@ -79,21 +81,37 @@ def _runs(mask: np.ndarray, longest: int) -> np.ndarray:
                 start = column
             elif not inside and start >= 0:
                 if column - start <= longest:
-                    runs.append((float(row), 0.5 * (start + column - 1)))
+                    runs.append((float(row), 0.5 * (start + column - 1), 0.0))
+                else:
+                    runs.append((float(row), float(start), 1.0))
+                    runs.append((float(row), float(column - 1), 2.0))
                 start = -1
-    result = np.empty((len(runs), 2))
-    for index, pair in enumerate(runs):
-        result[index, 0], result[index, 1] = pair
+    result = np.empty((len(runs), 3))
+    for index, entry in enumerate(runs):
+        result[index, 0], result[index, 1], result[index, 2] = entry
     return result
 
 
-def _row_points(rig: StereoRig, eyes: tuple[EyeMask, EyeMask]) -> tuple[np.ndarray, np.ndarray]:
+def _row_circles(
+    rig: StereoRig, eyes: tuple[EyeMask, EyeMask], random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return centres (C, 3) and unit normals (C, 3) of circles through points that both eyes see in one row."""
+    centres, normals = _circles_through(*_row_points(rig, eyes, ends=False), TRIPLES, random)
+    if len(centres) == 0:
+        centres, normals = _circles_through(*_row_points(rig, eyes, ends=True), TRIPLES, random)
+    return centres, normals
+
+
+def _row_points(rig: StereoRig, eyes: tuple[EyeMask, EyeMask], ends: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return candidate points (N, 3) [m], pairs of runs in one row of both eyes between NEAREST and FARTHEST, and how
-    often (N,) to draw each: less where many lie on one piece of the left mask, so that small pieces are not missed."""
-    left, right = _runs(eyes[0].mask, LONGEST_RUN), _runs(eyes[1].mask, LONGEST_RUN)
+    often (N,) to draw each: less where many lie on one piece of the left mask, so that small pieces are not missed.
+    `ends`: pairs of the left or the right ends of long runs too."""
+    left, right = (_runs(eye.mask, LONGEST_RUN) for eye in eyes)
+    if not ends:
+        left, right = left[left[:, 2] == 0.0], right[right[:, 2] == 0.0]
     _, labels = cv2.connectedComponents(eyes[0].mask.astype(np.uint8))
     piece = labels[left[:, 0].astype(int), left[:, 1].astype(int)] if len(left) else np.empty(0, dtype=int)
-    left, right = left + [eyes[0].row, eyes[0].column], right + [eyes[1].row, eyes[1].column]
+    left, right = left + [eyes[0].row, eyes[0].column, 0], right + [eyes[1].row, eyes[1].column, 0]
     first = np.searchsorted(right[:, 0], left[:, 0], side="left")
     last = np.searchsorted(right[:, 0], left[:, 0], side="right")
     counts = last - first
@@ -104,10 +122,10 @@ def _row_points(rig: StereoRig, eyes: tuple[EyeMask, EyeMask]) -> tuple[np.ndarr
     of_right = np.repeat(first, counts) + within
     disparity = left[of_left, 1] - right[of_right, 1]
     reach = rig.focal * rig.baseline
-    keep = (disparity > reach / FARTHEST) & (disparity < reach / NEAREST)
+    keep = (disparity > reach / FARTHEST) & (disparity < reach / NEAREST) & (left[of_left, 2] == right[of_right, 2])
     of_piece = piece[of_left][keep]
     often = 1.0 / np.sqrt(np.bincount(of_piece)[of_piece])
-    return rig.triangulate(left[of_left][keep][:, ::-1], disparity[keep]), often
+    return rig.triangulate(left[of_left][keep][:, 1::-1], disparity[keep]), often
 
 
 def _circles_through(

@@ -7,15 +7,18 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from stages.kit.geometry.transforms import transform_from
 from stages.suture.needle.estimate import estimate
 from stages.suture.needle.evidence import _crossings
 from stages.suture.needle.filter import difference, fuse
 from stages.suture.needle.filter import moved as moved_pose
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation, violet
+from stages.suture.needle.starts import _runs
 from stages.suture.needle.thesis import farthest_pair, ransac_circle, ransac_plane, thesis_estimate
-from stages.suture.rig import TWO_CAMERAS
+from stages.suture.rig import TWO_CAMERAS, NeedlePose
 from tests.unit.suture.needle_cases import drawn_mask, observed, pose_at
 
 
@@ -46,6 +49,23 @@ def test_ours_finds_it_without_any_disparity(clean):
     ends = sorted([np.linalg.norm(answer.pose.tip - truth.tip), np.linalg.norm(answer.pose.tip - truth.swage)])
     assert ends[0] < 1.5e-3
     assert np.all(np.linalg.eigvalsh(answer.covariance) > 0)
+
+
+@pytest.mark.parametrize("roll", [0.0, 5.0])
+def test_a_needle_that_lies_along_the_rows_is_found_by_the_ends_of_its_runs(roll):
+    """Nearly edge-on, its rows are longer than any wire is wide: a middle of such a run is no place on the needle."""
+    rotation = Rotation.from_euler("xz", [82.0, roll], degrees=True).as_matrix()
+    truth = NeedlePose(transform_from(rotation, np.array([0.03, 0.004, 0.35])))
+    answer = estimate(replace(observed(truth), disparity=None))
+    assert not answer.abstained
+    assert np.linalg.norm(answer.pose.centre - truth.centre) < 1e-3
+    assert _plane_degrees(answer.pose, truth) < 5.0
+
+
+def test_a_long_run_gives_its_two_ends_and_a_short_one_its_middle():
+    mask = np.zeros((3, 60), dtype=bool)
+    mask[0, 10:15] = mask[2, 20:50] = True
+    np.testing.assert_array_equal(_runs(mask, 16), [[0, 12, 0], [2, 20, 1], [2, 49, 2]])
 
 
 @pytest.mark.parametrize("at_swage", [True, False])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from benchmarks.experiments.tidy_detect.score import Match, compare, measures, reliability
-from benchmarks.experiments.tidy_detect_real import matched, overlap
+from benchmarks.experiments.tidy_detect_real import grouped, matched, overlap, ratio
 from schemas.errors import BadInput, UsageError
 from schemas.tableware_detections import TablewareDetection, TablewareDetections, TablewareDetectionsFile
 from stages.kit.progress import SilentProgress
@@ -200,6 +201,14 @@ def test_the_calibration_error_is_the_mean_distance_of_bins() -> None:
     bins, error = reliability([*right, *wrong, Match(kind="cup", found=None), Match(kind=None, found="unknown")])
     assert [(count, share) for _, _, count, _, share in bins] == [(1, 0.0), (4, 0.75)]
     assert error == pytest.approx((0.6 * 1 + 0.22 * 4) / 5)
+
+
+def test_shares_of_real_frames_have_intervals_over_scenes() -> None:
+    scenes = grouped("frames_left_out", {"000000": {"cup/true": 2, "cup/right": 1}, "000008": {"bowl/true": 3}})
+    assert sum(counts["dish/true"] for counts in scenes) == 5
+    said = ratio([Counter(right=1, true=2), Counter(right=3, true=3)], "right", "true")
+    assert said is not None and (said.low, said.value, said.high) == (0.5, 0.8, 1.0)
+    assert ratio([Counter(right=1)], "right", "true") is None
 
 
 def test_boxes_are_matched_by_overlap() -> None:
