@@ -23,10 +23,22 @@ TUNING = (
 RECIPES = ("kitchen", "office", "bedroom", "room")
 TUNING_UNTRAINED = tuple(f"{recipe}-{seed}" for seed in (2000, 2001) for recipe in RECIPES)
 """Looked at as well, where the masks of our own network matter: it was trained on rooms of the seeds of TUNING."""
+INDEPENDENT_RECIPES = ("household", "lodging")
+"""Maps and CAD replacement were never tuned on their rooms."""
+TUNING_INDEPENDENT = ("household-2000", "lodging-2000")
 ROOMS = "rooms"
 """Group of the reporting seeds (reporting_seeds.toml)."""
-REPORTING = newest(ROOMS).seeds
+
+
+def recipe_of(name: str) -> str:
+    """Return the recipe of a room's name."""
+    return name.rsplit("-", 1)[0]
+
+
+REPORTING = tuple(name for name in newest(ROOMS).seeds if recipe_of(name) in RECIPES)
 """For figures alone (seeds of the recipes' reporting range): the newest set."""
+INDEPENDENT = tuple(name for name in newest(ROOMS).seeds if recipe_of(name) in INDEPENDENT_RECIPES)
+"""Its rooms by other recipes than those of tuning."""
 FIRST_REPORTING = read_sets()[0].seeds
 """The rooms of the first figures, which have been seen: the network's are of them."""
 DRAWS = 2
@@ -92,14 +104,16 @@ def make_room(
     path: str = "tour",
     rounds: int = 1,
     rearranged: int = 0,
+    rescaled: float = 0.0,
 ) -> RoomFolder:
     """Make a room of this name under `root` unless it is up to date; size (width, height) [px]; up to so many doors and
     drawers are `opened` or shut half-way; frames are of so many `cameras` in turn, along so many rounds of a `path`;
-    which other draw of what lies about (`rearranged`). Raises StepFailed."""
+    which other draw of what lies about (`rearranged`); by what share things are larger or smaller than their models
+    (`rescaled`). Raises StepFailed."""
     library, room = make_library(root), room_at(root, name, frames)
-    recipe, seed = name.rsplit("-", 1)
+    recipe, seed = recipe_of(name), name.rsplit("-", 1)[1]
     options = ("--recipe", recipe, "--seed", seed, "--clutter", clutter, "--frames", frames, "--opened", opened)
-    drawn = ("--rearranged", rearranged)
+    drawn = ("--rearranged", rearranged, "--rescaled", rescaled)
     camera = ("--width", size[0], "--height", size[1], "--cameras", cameras, "--path", path, "--rounds", rounds)
     made("synthesize", room.ground_truth, "--library", library, *options, *drawn, *camera)
     made(

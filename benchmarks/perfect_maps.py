@@ -12,9 +12,12 @@ from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
 from schemas.vocabulary import load_vocabulary
 
+TILE = 0.009
+"""Edge of the squares that stand for points a centimetre apart [m]."""
+
 
 def tiles(
-    points: np.ndarray, normals: np.ndarray, edge: float = 0.009, colors: np.ndarray | None = None
+    points: np.ndarray, normals: np.ndarray, edge: float = TILE, colors: np.ndarray | None = None
 ) -> trimesh.Trimesh:
     """Return a mesh of one little square of `edge` [m] for each point (N, 3) with normal (N, 3), of its colour (N, 3)
     uint8 where given."""
@@ -73,7 +76,8 @@ def write_map(root: Path, meshes: dict[int, trimesh.Trimesh], classes: dict[int,
 def perfect_map(truth: GroundTruth, root: Path) -> PanopticMap:
     """Write the map that a perfect reconstruction of what was seen would give: true surface points with true labels.
 
-    Points come from visible.npz, their normals and colours from the nearest triangle of mesh.ply.
+    Points come from visible.npz, their normals and colours from the nearest triangle of mesh.ply; of floor, walls and
+    ceiling every fourth or so, in tiles as much larger.
     """
     with np.load(truth.path("visible.npz"), allow_pickle=False) as archive:
         points, instance = archive["points"].astype(float), archive["instance"]
@@ -90,9 +94,11 @@ def perfect_map(truth: GroundTruth, root: Path) -> PanopticMap:
     colors = np.asarray(mesh.visual.vertex_colors)  # type: ignore[union-attr]
     paint = colors[mesh.faces[closest["primitive_ids"].numpy(), 0], :3]
     classes = {entry.instance: entry.class_name for entry in truth.info.objects}
-    meshes = {
-        int(k): tiles(points[own], normals[own], colors=paint[own])
-        for k in np.unique(instance)
-        if int(k) in classes and (own := instance == k).any()
-    }
+    vocabulary, meshes = load_vocabulary(), {}
+    for k in sorted(set(np.unique(instance).tolist()) & set(classes)):
+        own, edge = np.flatnonzero(instance == k), TILE
+        if vocabulary.by_name(classes[k]).node == "layout":
+            cells = np.floor(points[own] / (2 * TILE)).astype(int)
+            own, edge = own[np.sort(np.unique(cells, axis=0, return_index=True)[1])], 2 * TILE
+        meshes[k] = tiles(points[own], normals[own], edge, paint[own])
     return write_map(root, meshes, {k: classes[k] for k in meshes})

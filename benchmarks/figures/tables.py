@@ -78,6 +78,8 @@ def table(experiment: Experiment, spec: Mapping[str, Any], own_page: bool) -> st
     if empty:
         raise FiguresError(f"{experiment.name}.json has nothing for the columns {', '.join(empty)}")
     labels = spec.get("labels", [""] * len(rows[0].labels))
+    if any(len(row.labels) != len(labels) for row in rows):
+        raise FiguresError(f"a table of {experiment.name} has {len(labels)} labels for rows like {rows[0].labels}")
     cases = [{figure.cases for figure in row.known} for row in rows]
     varied = len({count for counts in cases for count in counts}) > 1 and all(len(counts) == 1 for counts in cases)
     header, cells = [*labels], [[*row.labels] for row in rows]

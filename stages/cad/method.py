@@ -45,6 +45,11 @@ class CadMethod(Protocol):
         ...
 
     @property
+    def stretches(self) -> bool:
+        """Whether a model may be made longer along one axis than along another."""
+        ...
+
+    @property
     def asks_grounds(self) -> bool:
         """Whether joints of a model that nothing in the map speaks for are held."""
         ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -164,7 +165,13 @@ def facing_side(normals: np.ndarray) -> np.ndarray:
 
 def load_surface(folder: Path, model: CadModel) -> ModelSurface:
     """Read a model folder of the library. Raises BadInput when meshes are missing."""
-    visual, collision = load_visual_parts(folder), load_collision_parts(folder)
+    return surface_of(model, load_visual_parts(folder), load_collision_parts(folder))
+
+
+def surface_of(
+    model: CadModel, visual: Mapping[str, trimesh.Trimesh], collision: Mapping[str, Sequence[trimesh.Trimesh]]
+) -> ModelSurface:
+    """Return the surface of a model with these meshes of its parts, part frames."""
     surfaces, corners = {}, {}
     sides: dict[str, dict[int, Triangles]] = {}
     numbers: dict[str, dict[int, np.ndarray]] = {}

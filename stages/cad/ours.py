@@ -57,6 +57,11 @@ class Ours:
         return self.parameters.built_ins
 
     @property
+    def stretches(self) -> bool:
+        """As the options say."""
+        return self.parameters.stretched
+
+    @property
     def asks_grounds(self) -> bool:
         """A class name says what such things can do, not that this one does."""
         return True

@@ -126,6 +126,9 @@ class CadParameters(Parameters):
     built_ins: bool = Field(
         True, description="ours: a thing that no model fits becomes a run of boxes made for it, where that explains it"
     )
+    stretched: bool = Field(
+        True, description="ours: what no model is as large as may become one that is stretched along its own axes"
+    )
     surroundings: bool = Field(
         True, description="ours: what the map shows and nothing has a name for becomes a static body of the scene"
     )
@@ -139,7 +142,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=9,
+    version=10,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={

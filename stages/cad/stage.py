@@ -31,6 +31,7 @@ from stages.cad.parameters import CadParameters
 from stages.cad.recognition import is_doubtful, might_be, named_by_people, recognised, renamed
 from stages.cad.records import cad_graph, scene_file
 from stages.cad.shapes import Placement
+from stages.cad.stretching import SOURCE, is_stretched, with_stretched, write_stretched
 from stages.cad.surroundings import footing
 from stages.cad.surroundings_files import area_of, surroundings_of, write_surroundings
 from stages.cad.target import Surroundings, Target
@@ -171,7 +172,10 @@ def find_candidates(
         )
         target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
         found = shortlist(target, method)
-        if method.recognises and node.id not in told and is_doubtful(found, method):
+        doubtful = is_doubtful(found, method)
+        if method.stretches:
+            found = with_stretched(found, target, method, library)
+        if method.recognises and node.id not in told and doubtful:
             alike = [model for model in models if might_be(model, target)]
             load_surfaces(library, alike, surfaces)
             found = recognised(found, target, alike, method)
@@ -196,7 +200,9 @@ def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) ->
         if written.name not in models:
             shutil.rmtree(written)
     for model_id, model in sorted(models.items()):
-        if not is_built_in(model):
+        if is_stretched(model):
+            write_stretched(model, model_folder(library, str(model.recipe[SOURCE])), folder / model_id)
+        elif not is_built_in(model):
             shutil.copytree(model_folder(library, model_id), folder / model_id)
 
 

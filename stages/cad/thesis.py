@@ -37,6 +37,11 @@ class Thesis:
         return False
 
     @property
+    def stretches(self) -> bool:
+        """Models have one scale (2.10)."""
+        return False
+
+    @property
     def asks_grounds(self) -> bool:
         """What the model can do, the thing can."""
         return False

@@ -27,7 +27,7 @@ LIFT = 0.03
 DRAWER_LIFT = 0.2
 SLOW = 0.35
 FRICTION_USED = 0.3
-"""Half of the friction **assumed** of rubber on household things: a grasp asks for no more where there is one, as what
+"""Half of the friction **assumed** of rubber on household things: grasps that ask for no more are tried first, as what
 is held is carried with starts and stops."""
 PALM_BEHIND, HAND_END = 0.04, 0.11
 """How far behind the tool point the palm begins and the hand ends [m]."""
@@ -76,17 +76,20 @@ def palm_bottom(world_from_tool: np.ndarray, palm: tuple[float, float]) -> float
 
 def _two_finger_grasps(
     model: WorldModel, item: str, widest: float, style: GraspStyle, random: np.random.Generator
-) -> list[Grasp]:
-    """Return the grasps of a thing that fingers open to `widest` [m] can take: those that ask for little friction and
-    keep it off the palm, where there are such."""
+) -> tuple[list[Grasp], list[Grasp]]:
+    """Return the grasps of a thing that fingers open to `widest` [m] can take, in two halves: first those that ask for
+    little friction and keep it off the palm."""
     points, normals = model.surface(item)
-    for friction in (FRICTION_USED, np.inf):
-        grasps = sample_grasps(
+
+    def sampled(friction: float) -> list[Grasp]:
+        return sample_grasps(
             points, normals, model.pose(item), opening=widest, random=random, pitches=PITCHES[style], friction=friction
         )
-        if grasps:
-            return _palm_free(points, grasps, model.description.palm) or grasps
-    return []
+
+    firm, loose = sampled(FRICTION_USED), sampled(np.inf)
+    wanted = _palm_free(points, firm, model.description.palm) or _palm_free(points, loose, model.description.palm)
+    kept = {id(grasp) for grasp in wanted}
+    return wanted, [grasp for grasp in (*firm, *loose) if id(grasp) not in kept]
 
 
 def _palm_free(points: np.ndarray, grasps: list[Grasp], palm: tuple[float, float]) -> list[Grasp]:
@@ -175,11 +178,12 @@ def plan_pick(
         if model.laden(item)
         else []
     )
+    others: list[Grasp] = []
     if not grasps:
-        grasps = _two_finger_grasps(model, item, widest, style, random)
-    if not grasps:
+        grasps, others = _two_finger_grasps(model, item, widest, style, random)
+    if not grasps and not others:
         grasps = rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty)
-    if not grasps:
+    if not grasps and not others:
         width = narrowest_width(apply(world_from_item, points))
         raise MotionFailed(
             "no_grasp",
@@ -192,14 +196,16 @@ def plan_pick(
     checker = model.checker
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, base)
-    queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
+    queue = [
+        (bases[i], some[j]) for some in (grasps, others) for i, j in _pairs(bases, len(some), random, budgets.pairs)
+    ]
     if model.laden(item):
         poses = np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue])
         queue = [queue[index] for index in easiest_first(model, item, poses)]
     lowest = float(apply(world_from_item, points)[:, 2].min())
     over = {
         id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
-        for grasp in grasps
+        for grasp in (*grasps, *others)
     }
     sideways = style == "rather_level"
     # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge.

@@ -46,6 +46,9 @@ class SynthesizeParameters(Parameters):
     rearranged: int = Field(
         0, ge=0, le=1000, description="The same furniture with other things on it, elsewhere: which draw; 0: as it was"
     )
+    rescaled: float = Field(
+        0.0, ge=0, le=0.3, description="Largest share by which a thing is larger or smaller than its model"
+    )
     opened: int = Field(
         0,
         ge=0,

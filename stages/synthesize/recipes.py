@@ -105,6 +105,17 @@ class Recipe(Model):
     place: tuple[Place, ...]
 
 
+def rescaled(recipe: Recipe, share: float) -> Recipe:
+    """Return a recipe whose things are up to this share larger or smaller than by `recipe`, each by its own draw."""
+    if not share:
+        return recipe
+    places = [
+        place.model_copy(update={"scale": (place.scale[0] * (1.0 - share), place.scale[1] * (1.0 + share))})
+        for place in recipe.place
+    ]
+    return recipe.model_copy(update={"place": tuple(places)})
+
+
 def recipe_names() -> tuple[str, ...]:
     """Return the names of the recipes that ship."""
     return tuple(sorted(file.stem for file in RECIPE_FOLDER.glob("*.toml")))

@@ -27,7 +27,7 @@ from stages.synthesize.free_space import find_free_space
 from stages.synthesize.furniture import Catalogue
 from stages.synthesize.opening import TwoStates, open_some
 from stages.synthesize.parameters import SynthesizeParameters
-from stages.synthesize.recipes import Recipe, load_recipe
+from stages.synthesize.recipes import Recipe, load_recipe, rescaled
 from stages.synthesize.seen_surface import SeenSurface
 from stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true_mesh, true_objects
 from stages.synthesize.viewpoints import blocked_floor, choose_views
@@ -53,7 +53,7 @@ def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Conte
 
     Raises UsageError for an unknown recipe, BadInput when the library lacks a class or no room can be found.
     """
-    recipe = load_recipe(parameters.recipe)
+    recipe = rescaled(load_recipe(parameters.recipe), parameters.rescaled)
     camera = make_camera(parameters)
     with context.progress.step("furnish"):
         catalogue = Catalogue(library)

@@ -59,6 +59,7 @@ class MappingParameters(Parameters):
     voxel_size: float = Field(0.02, gt=0, description="Voxel edge of all arms [m] (the publications: 0.01)")
     frames: int = Field(60, ge=1, description="Frames of every room")
     width: int = Field(640, ge=64, description="Width of the pictures [pixels]; their height is three quarters of it")
+    rescaled: float = Field(0.0, ge=0, le=0.3, description="By what share things are larger or smaller than models")
     untrained: bool = Field(False, description="With --tuning: rooms that our own network never saw")
 
 
@@ -119,7 +120,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
 def room_for(root: Path, seed: str, parameters: MappingParameters) -> RoomFolder:
     """Make the room of a trial's seed unless it is up to date."""
     size = (parameters.width, 3 * parameters.width // 4)
-    return make_room(root, room_of(seed), parameters.frames, size=size)
+    return make_room(root, room_of(seed), parameters.frames, size=size, rescaled=parameters.rescaled)
 
 
 def read_frames(reader: FrameReader, arms: Sequence[Arm]) -> list[SharedFrame]:

@@ -50,10 +50,17 @@ ARMS = (
 OF_MAPS = frozenset({"thesis_chosen", "thesis_on_ours", "ours_on_thesis"})
 """Arms that differ from others by their map alone, which a perfect one has not."""
 
-PERFECT, RECONSTRUCTED, DRIFTING, HELD_OUT, REAL = "perfect", "reconstructed", "drifting", "held_out_shapes", "real"
-CASES = (PERFECT, RECONSTRUCTED, DRIFTING, HELD_OUT)
+PERFECT, RECONSTRUCTED, DRIFTING, REAL = "perfect", "reconstructed", "drifting", "real"
+PERFECT_HELD_OUT, HELD_OUT = "perfect_held_out", "held_out"
+PERFECT_INDEPENDENT, INDEPENDENT = "perfect_independent", "independent"
+CASES = (PERFECT, PERFECT_HELD_OUT, PERFECT_INDEPENDENT, RECONSTRUCTED, DRIFTING, HELD_OUT, INDEPENDENT)
 """Of the generated rooms. `perfect`: true surface that was seen, true labels. `reconstructed`: each arm's own map of
 noisy depth and true masks with errors that last (the headline of `make bench-mapping`); `drifting`: the same with poses
-that drift. `held_out_shapes`: the maps of `reconstructed`, and a library of other sizes of the same styles."""
-MAPS = {RECONSTRUCTED: LASTING, HELD_OUT: LASTING, DRIFTING: DRIFTING_POSES}
+that drift. `held_out`: the same maps as without it, and a library of other shapes that lacks the styles of the room.
+`independent`: such a library, and rooms by recipes that nothing was tuned on, whose things are larger or smaller than
+any model."""
+OF_PERFECT = frozenset({PERFECT, PERFECT_HELD_OUT, PERFECT_INDEPENDENT})
+OF_INDEPENDENT = frozenset({PERFECT_INDEPENDENT, INDEPENDENT})
+OF_HELD_OUT = frozenset({PERFECT_HELD_OUT, HELD_OUT}) | OF_INDEPENDENT
+MAPS = {RECONSTRUCTED: LASTING, HELD_OUT: LASTING, INDEPENDENT: LASTING, DRIFTING: DRIFTING_POSES}
 """Case -> case of `mapping`."""

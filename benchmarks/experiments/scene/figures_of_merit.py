@@ -107,6 +107,8 @@ FIGURES: dict[str, Figure] = {
     "joint_value_error_revolute_rad": over_objects("joint_value_error_revolute_rad_mean", "joints_compared"),
     "joint_value_error_prismatic_m": over_objects("joint_value_error_prismatic_m_mean", "joints_compared"),
     "functional": over_objects("functional"),
+    "without_style": lambda outcomes: _ratio(outcomes, "without_style", "true_objects"),
+    "functional_without_style": over_objects("functional_without_style", "without_style"),
     "functional_class_and_relations": over_objects("functional_class_and_relations"),
     "functional_affordance": over_objects("functional_affordance"),
     "functional_size_and_shape": over_objects("functional_size_and_shape"),

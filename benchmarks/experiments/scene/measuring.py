@@ -15,14 +15,14 @@ from pydantic import Field
 from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.mapping.experiment import EXPERIMENT as MAPPING
 from benchmarks.experiments.mapping.measuring import MappingParameters, room_for
-from benchmarks.experiments.scene.arms import ARMS, HELD_OUT, MAPS, PERFECT, REAL, Arm
-from benchmarks.experiments.scene.stand_ins import nearest_stand_in
-from benchmarks.generated_rooms import make_library, room_at, room_of
+from benchmarks.experiments.scene.arms import ARMS, MAPS, OF_HELD_OUT, OF_PERFECT, REAL, Arm
+from benchmarks.experiments.scene.stand_ins import lacking, nearest_stand_in, without_styles
+from benchmarks.generated_rooms import INDEPENDENT_RECIPES, make_library, recipe_of, room_at, room_of
 from benchmarks.graph_scores import OPTIONS, distance_figures, judge
 from benchmarks.keeping import measure_missing
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import StepFailed, context_in, made, opened, unrecorded
-from schemas.cad_library import CadLibrary
+from schemas.cad_library import CadLibrary, CadModel, LibraryFile
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.ground_truth import GroundTruth
@@ -45,6 +45,8 @@ ARM = {arm.name: arm for arm in ARMS}
 SEED = 0
 HELD_OUT_SEED = 501
 """Of the library whose shapes no room has."""
+RESCALED = 0.2
+"""Largest share by which things of the independent rooms are larger or smaller than their models."""
 ANNOTATIONS = Path(__file__).resolve().parents[3] / "data" / "annotations" / "real"
 
 
@@ -86,8 +88,10 @@ class Room:
     world_from_log: np.ndarray
     maps: Mapping[tuple[str, str], Path]
     """(case, arm of `mapping`) -> its map of this room."""
-    libraries: Mapping[bool, CadLibrary]
-    """Held out? -> library."""
+    library: CadLibrary
+    """That it was furnished from."""
+    held_out: CadLibrary
+    """Of other shapes, without its styles."""
 
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outcome]]:
@@ -108,8 +112,18 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
 
 
 def held_out_library(bench: Bench) -> Path:
-    """Where the library stands that shares no shape with the rooms."""
+    """Where the library stands that shares no shape with the rooms, whole."""
     return bench.out / "held_out_library"
+
+
+def library_lacking(library: CadLibrary, room: Sequence[CadModel], folder: Path) -> CadLibrary:
+    """Write a library without the styles of a room's models (`without_styles`), which has the folders of `library`."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "models").symlink_to(library.path("models").resolve(), target_is_directory=True)
+    models = tuple(without_styles(library.info.models, room))
+    LibraryFile(seed=library.info.seed, models=models).write(folder / "library.json")
+    return CadLibrary(folder)
 
 
 def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
@@ -126,7 +140,9 @@ def load_room(bench: Bench, name: str, wanted: Collection[tuple[str, str]]) -> R
     """
     parameters: SceneParameters = bench.parameters
     rooms = parameters.maps / "rooms"
-    of_maps = MappingParameters.model_validate({"frames": parameters.frames, "width": parameters.width})
+    rescaled = RESCALED if recipe_of(room_of(name)) in INDEPENDENT_RECIPES else 0.0
+    told = {"frames": parameters.frames, "width": parameters.width, "rescaled": rescaled}
+    of_maps = MappingParameters.model_validate(told)
     folder = room_at(rooms, room_of(name), parameters.frames)
     if not (parameters.as_is and folder.ground_truth.is_dir() and folder.sequence.is_dir()):
         folder = room_for(rooms, name, of_maps)
@@ -137,9 +153,11 @@ def load_room(bench: Bench, name: str, wanted: Collection[tuple[str, str]]) -> R
     sequence, artifact = opened(SequenceArtifact, folder.sequence), opened(GroundTruth, folder.ground_truth)
     world_from_log = np.array(sequence.info.gravity.world_from_log)
     truth = load_truth(artifact, world_from_log, OPTIONS.minimum_visible_points)
-    libraries = {False: CadLibrary(rooms / "cad_library"), True: CadLibrary(held_out_library(bench))}
+    library, used = CadLibrary(rooms / "cad_library"), {thing.model_id for thing in artifact.info.objects}
+    own = [model for model in library.info.models if model.id in used]
+    held_out = library_lacking(CadLibrary(held_out_library(bench)), own, bench.out / "libraries" / name)
     maps = {(trial.case, trial.arm): mapping.folder(trial) / "panoptic_map" for trial in trials}
-    return Room(name, artifact, truth, world_from_log, maps, libraries)
+    return Room(name, artifact, truth, world_from_log, maps, library, held_out)
 
 
 @dataclass(frozen=True)
@@ -149,6 +167,8 @@ class Found:
     shortlists: dict[str, Shortlist]
     surfaces: dict[str, ModelSurface]
     seconds: float
+    scene: Path
+    """Where the built-ins were written that it names (`models/`)."""
 
 
 class Shared:
@@ -167,17 +187,17 @@ def run_case(
     """Yield the outcome of every arm. Artifacts are written under `scratch` and deleted again unless `keep`."""
     folder = scratch / room.name / case
     shutil.rmtree(folder, ignore_errors=True)
-    if case == PERFECT:
+    if case in OF_PERFECT:
         perfect_map(room.truth_artifact, folder / "map")
     for arm in arms:
-        map_folder = folder / "map" if case == PERFECT else room.maps[MAPS[case], arm.map_arm]
+        map_folder = folder / "map" if case in OF_PERFECT else room.maps[MAPS[case], arm.map_arm]
         yield _run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, shared)
     if not keep:
         shutil.rmtree(folder)
 
 
 def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, shared: Shared) -> Outcome:
-    library, method = room.libraries[case == HELD_OUT], arm.graph.method
+    library, method = room.held_out if case in OF_HELD_OUT else room.library, arm.graph.method
     of_graph = (panoptic_map.root, method)
     if of_graph not in shared.graphs:
         built = unrecorded("graph", folder / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map)
@@ -190,8 +210,10 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
         surfaces: dict[str, ModelSurface] = {}
         start = time.process_time()
         shortlists = find_candidates(graph, panoptic_map, library, surfaces, replacing, context)
-        shared.found[key] = Found(shortlists, surfaces, time.process_time() - start)
+        shared.found[key] = Found(shortlists, surfaces, time.process_time() - start, context.output)
     found = shared.found[key]
+    if found.scene != context.output and (found.scene / "models").is_dir():
+        shutil.copytree(found.scene / "models", context.output / "models", dirs_exist_ok=True)
     start = time.process_time()
     scene = choose_and_write(graph, panoptic_map, library, found.shortlists, found.surfaces, replacing, context)
     seconds = found.seconds + time.process_time() - start
@@ -210,13 +232,16 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
     distance, edges = measure_graph(room.truth, graph, overlaps)
     summary = scene.info
-    own = {model.id: model for model in room.libraries[False].info.models}
-    off = [nearest_stand_in(own[r.true_model], library.info.models) for r in measured.objects if r.true_model in own]
-    known = [value for value in off if value is not None]
+    own = {model.id: model for model in room.library.info.models}
+    models = library.info.models
+    known = [off for r in measured.objects if (off := nearest_stand_in(own[r.true_model], models)) is not None]
+    without = [r.functional for r in measured.objects if lacking(own[r.true_model], models)]
     # The ids of the two libraries are the same words for other models.
-    undefined = ("true_model_first", "true_model_among_candidates") if case == HELD_OUT else ()
+    undefined = ("true_model_first", "true_model_among_candidates") if case in OF_HELD_OUT else ()
     extra: dict[str, float | None] = {
         **dict.fromkeys(undefined),
+        "without_style": float(len(without)),
+        "functional_without_style": float(np.mean(without)) if without else None,
         "nearest_stand_in": float(np.median(known)) if known else None,
         "seconds_per_object": seconds / max(1, objects),
         "conflicts_before": float(summary.conflicts_before),

@@ -1,4 +1,5 @@
-"""How near a library comes to the models that a room was furnished with, at its best scale."""
+"""How near a library comes to the models that a room was furnished with, at its best scale; libraries that come less
+near."""
 
 from __future__ import annotations
 
@@ -28,3 +29,25 @@ def nearest_stand_in(true: CadModel, library: Sequence[CadModel]) -> float | Non
     """Return how far the nearest model of the same class is off a true one; None where the library has none."""
     found = [off_by(extents(true), extents(model)) for model in library if model.class_name == true.class_name]
     return min(found, default=None)
+
+
+def style_of(model: CadModel) -> tuple[str, float | int | str | None]:
+    """Return class and style of a model: what its generator calls it, None where it has one style alone."""
+    return model.class_name, model.recipe.get("style")
+
+
+def without_styles(library: Sequence[CadModel], room: Sequence[CadModel]) -> list[CadModel]:
+    """Return the models of the library in no style that the models of the room have.
+
+    A class stays whole where it has one style, or none that the room lacks: shapes differ all the same when the library
+    was drawn by another seed. What comes of it is told by `lacking`.
+    """
+    taken = {style_of(model) for model in room if style_of(model)[1] is not None}
+    kept = [model for model in library if style_of(model) not in taken]
+    left = {model.class_name for model in kept}
+    return [model for model in library if style_of(model) not in taken or model.class_name not in left]
+
+
+def lacking(true: CadModel, library: Sequence[CadModel]) -> bool:
+    """Return whether the library has no model of the class and style of a true one."""
+    return style_of(true) not in {style_of(model) for model in library}

@@ -190,6 +190,7 @@ def test_the_index_of_results_is_one_screen() -> None:
         "<!-- table brushes\nrows = ['ours/roof']\ncolumns = ['time']\n-->\n<!-- /table -->",
         "<!-- table brushes\nrows = ['*/wall']\ncolumns = ['price']\n-->\n<!-- /table -->",
         "<!-- table brushes\nrow = ['*/wall']\ncolumns = ['time']\n-->\n<!-- /table -->",
+        "<!-- table brushes\nlabels = ['arm']\nrows = ['*/wall']\ncolumns = ['time']\n-->\n<!-- /table -->",
         "<!-- about combs -->\n<!-- /about -->",
     ],
 )

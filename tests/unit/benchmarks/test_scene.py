@@ -9,13 +9,14 @@ import pytest
 
 from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.scene import measuring
-from benchmarks.experiments.scene.arms import ARMS, MAPS, PERFECT, REAL, RECONSTRUCTED
+from benchmarks.experiments.scene.arms import ARMS, INDEPENDENT, MAPS, PERFECT, REAL, RECONSTRUCTED
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
 from benchmarks.experiments.scene.measuring import Outcome, SceneParameters, physics_of
-from benchmarks.experiments.scene.stand_ins import off_by
-from benchmarks.generated_rooms import RoomFolder
+from benchmarks.experiments.scene.stand_ins import lacking, off_by, without_styles
+from benchmarks.generated_rooms import INDEPENDENT_RECIPES, RoomFolder, recipe_of
 from benchmarks.results import figures_of, table
+from schemas.cad_library import CadModel
 from stages.urdf.scene_penetration import Overlap
 from stages.urdf.settle_report import BodyMotion, SettleReport
 
@@ -134,3 +135,30 @@ def test_a_stand_in_is_as_far_off_as_its_worst_edge_at_the_best_scale() -> None:
     assert worse == pytest.approx(
         min(np.abs(s * np.array([1.0, 1.2, 0.9]) - 1).max() for s in np.linspace(0.8, 1.2, 4001)), abs=1e-3
     )
+
+
+def model(name: str, style: str | None = None) -> CadModel:
+    recipe = {} if style is None else {"style": style}
+    plain = {"articulated": False, "mass": 1.0, "states": (), "movable": True, "parts": ("body",), "recipe": recipe}
+    return CadModel.model_validate({"id": name, "class_name": name.rsplit("_", 1)[0], **plain})
+
+
+def test_a_library_without_the_styles_of_a_room_keeps_classes_that_have_no_other() -> None:
+    library = [model("chair_0", "slats"), model("chair_1", "shell"), model("cup_0", "mug"), model("bed_0")]
+    room = [model("chair_9", "shell"), model("cup_9", "mug"), model("bed_9")]
+    left = without_styles(library, room)
+    assert [entry.id for entry in left] == ["chair_0", "cup_0", "bed_0"]
+    assert [lacking(entry, left) for entry in room] == [True, False, False]
+
+
+def test_independent_rooms_are_of_other_recipes_and_rescaled(tmp_path: Path, monkeypatch) -> None:
+    assert EXPERIMENT.seeds_of
+    asked = {}
+    for case in (RECONSTRUCTED, INDEPENDENT):
+        (seed, *_) = EXPERIMENT.seeds_of(bench_in(tmp_path), case)
+        made = []
+        monkeypatch.setattr(measuring, "room_for", lambda root, name, parameters, made=made: made.append(parameters))
+        with pytest.raises(AttributeError):
+            measuring.load_room(bench_in(tmp_path), seed, ())
+        asked[case] = recipe_of(seed) in INDEPENDENT_RECIPES, made[0].rescaled
+    assert asked == {RECONSTRUCTED: (False, 0.0), INDEPENDENT: (True, measuring.RESCALED)}

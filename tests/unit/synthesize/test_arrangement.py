@@ -17,7 +17,7 @@ from stages.synthesize.arrangement import Arrangement, arrange
 from stages.synthesize.collision import CollisionWorld, box_shape, convex_shape
 from stages.synthesize.furniture import Catalogue, main_joint
 from stages.synthesize.placement import PlacedObject
-from stages.synthesize.recipes import Recipe, load_recipe, recipe_names
+from stages.synthesize.recipes import Recipe, load_recipe, recipe_names, rescaled
 
 SEEDS = (0, 1, 2, 3)
 
@@ -250,3 +250,10 @@ def test_rearranged_room_keeps_its_furniture_and_moves_what_lies_on_it(catalogue
     assert changed and changed <= carried
     assert poses(other) != after
     assert all(penetration(a, b) < 1e-3 for a, b in itertools.combinations(again.objects, 2))
+
+
+def test_things_of_a_rescaled_room_are_larger_and_smaller_than_their_models(catalogue: Catalogue) -> None:
+    recipe = rescaled(load_recipe("room"), 0.2)
+    scales = [thing.furnishing.scale for thing in arrange(recipe, catalogue, "medium", 0).objects]
+    assert all(0.8 <= scale <= 1.2 for scale in scales) and min(scales) < 0.95 < 1.05 < max(scales)
+    assert rescaled(recipe, 0.0) is recipe
