@@ -30,7 +30,7 @@ from stages.suture.world.scene import moved_scene, random_motions
 FRAMES = 8
 OWN, WHOLE = "own_masks", "whole"
 CALIBRATION_ERROR = 0.15
-TUNING, REPORTING = range(20, 40), range(3110, 3130)
+TUNING, REPORTING = range(20, 40), range(3110, 3120)
 
 
 @dataclass(frozen=True)
