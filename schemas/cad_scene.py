@@ -24,6 +24,13 @@ class CadCandidate(Model):
     """Equation 2.7."""
     alignment_error: float
     """Root mean square distance from object vertices to the CAD surface [m]."""
+    stretched_from: Name | None = Field(default=None, exclude_if=lambda source: source is None)
+    """The model of the library that it was stretched from; None, and absent from the file, where it is one itself."""
+
+    @property
+    def library_model(self) -> str:
+        """The model of the library that this one is, or was."""
+        return self.stretched_from or self.model_id
 
 
 Ground = Literal["user", "moved", "open", "handle", "seam", "thing"]

@@ -190,7 +190,7 @@ def compare(sample: Path, models: Path, panoptic_map: PanopticMap, scene: CadSce
         if chosen is None:
             found.append(Aligned(name, replacement.decision, rank=rank))
             continue
-        stands = placed_candidate(chosen, {chosen.model_id: model_shape(models / "models" / chosen.model_id)})
+        stands = placed_candidate(chosen, {chosen.model_id: model_shape(scene.path("models") / chosen.model_id)})
         assert stands is not None
         error = alignment_error(true, stands, is_round=entry["sym"] == "__SYM_ROTATE_UP_INF")
         right = stands.shape.class_name == shape.class_name and error.succeeds()

@@ -12,6 +12,7 @@ from stages.cad.conflicts import Selection
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.placing import placed_box, placed_planes
 from stages.cad.shapes import Placement
+from stages.cad.stretching import source_of
 from stages.kit.geometry.transforms import transform_from
 
 
@@ -19,6 +20,7 @@ def candidate_record(placement: Placement) -> CadCandidate:
     """Return a placement as it is written."""
     return CadCandidate(
         model_id=placement.shape.model.id,
+        stretched_from=source_of(placement.shape.model),
         joints=placement.shape.joints,
         scale=placement.scale,
         world_from_model=as_transform(transform_from(placement.rotation, placement.translation)),

@@ -31,7 +31,7 @@ from stages.cad.parameters import CadParameters
 from stages.cad.recognition import is_doubtful, might_be, named_by_people, recognised, renamed
 from stages.cad.records import cad_graph, scene_file
 from stages.cad.shapes import Placement
-from stages.cad.stretching import SOURCE, is_stretched, with_stretched, write_stretched
+from stages.cad.stretching import source_of, with_stretched, write_stretched
 from stages.cad.surroundings import footing
 from stages.cad.surroundings_files import area_of, surroundings_of, write_surroundings
 from stages.cad.target import Surroundings, Target
@@ -200,8 +200,9 @@ def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) ->
         if written.name not in models:
             shutil.rmtree(written)
     for model_id, model in sorted(models.items()):
-        if is_stretched(model):
-            write_stretched(model, model_folder(library, str(model.recipe[SOURCE])), folder / model_id)
+        source = source_of(model)
+        if source is not None:
+            write_stretched(model, model_folder(library, source), folder / model_id)
         elif not is_built_in(model):
             shutil.copytree(model_folder(library, model_id), folder / model_id)
 

@@ -20,7 +20,7 @@ from schemas.cad_library import CadLibrary, CadModel, ModelState
 from schemas.scene_parts import Joint, SurfacePlane
 from stages.cad.candidates import Shortlist, shortlist
 from stages.cad.method import CadMethod
-from stages.cad.model_surfaces import ModelSurface, surface_of
+from stages.cad.model_surfaces import PLAIN, ModelSurface, surface_of
 from stages.cad.parameters import CadParameters
 from stages.cad.placing import is_upright, size_misfit
 from stages.cad.target import Target
@@ -35,12 +35,11 @@ AS_LARGE = 0.02
 """A model whose extents are off by no more than this is as large as what was seen [m, root mean square]."""
 ALONG_AXES = 0.999
 """Cosine from which on an axis of a joint lies along one of the model's: others would bend."""
-PLAIN = (153, 153, 153)
 
 
-def is_stretched(model: CadModel) -> bool:
-    """Whether a model of the library was stretched to be this one."""
-    return SOURCE in model.recipe
+def source_of(model: CadModel) -> str | None:
+    """Return the id of the model of the library that this one was stretched from, None where it was not."""
+    return str(model.recipe[SOURCE]) if SOURCE in model.recipe else None
 
 
 def with_stretched(entry: Shortlist, target: Target, method: CadMethod, library: CadLibrary) -> Shortlist:
@@ -195,7 +194,7 @@ def by_color(mesh: trimesh.Trimesh) -> tuple[list[trimesh.Trimesh], list[tuple[i
     """Return a mesh in pieces of one colour (sRGB, 0 to 255) each, and the colours."""
     painted, faces = vertex_colors(mesh), np.asarray(mesh.faces)
     if painted is None:
-        return [mesh], [PLAIN]
+        return [mesh], [(PLAIN, PLAIN, PLAIN)]
     of_faces = np.round(painted[faces].mean(axis=1)).astype(int)
     colors, which = np.unique(of_faces, axis=0, return_inverse=True)
     pieces = [trimesh.Trimesh(mesh.vertices, faces[which == k], process=False) for k in range(len(colors))]

@@ -104,7 +104,7 @@ def _compare(
     if replacement is None or replacement.decision != "cad" or replacement.chosen is None:
         return comparison
     chosen = replacement.chosen
-    ranked = list(dict.fromkeys([chosen.model_id, *(c.model_id for c in replacement.alternatives)]))
+    ranked = list(dict.fromkeys([chosen.library_model, *(c.library_model for c in replacement.alternatives)]))
     pose, true_pose = np.array(chosen.world_from_model), np.array(true.world_from_model)
     in_space, on_ground = position_error(true_pose[:3, 3], pose[:3, 3])
     yaw, true_yaw = yaw_of(pose[:3, :3]), yaw_of(true_pose[:3, :3])

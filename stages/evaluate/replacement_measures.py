@@ -190,10 +190,10 @@ def retrieval_rank(replacement: Replacement, true_model: str) -> int | None:
     """Return the place of the true model among the candidates' models, 1 = first, None when it is not among them.
 
     Candidates stand in the order in which they fitted the object by itself: `best_single` (where it is recorded), the
-    chosen one, the alternatives; a model counts once.
+    chosen one, the alternatives; a model counts once, stretched or not.
     """
     candidates = [replacement.best_single, replacement.chosen, *replacement.alternatives]
-    ranked = list(dict.fromkeys(candidate.model_id for candidate in candidates if candidate is not None))
+    ranked = list(dict.fromkeys(candidate.library_model for candidate in candidates if candidate is not None))
     return ranked.index(true_model) + 1 if true_model in ranked else None
 
 

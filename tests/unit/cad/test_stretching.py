@@ -8,7 +8,7 @@ import pytest
 from schemas.cad_library import CadLibrary
 from stages.cad.model_surfaces import load_surface
 from stages.cad.parameters import CadParameters
-from stages.cad.stretching import anisotropy, factors_for, is_stretched, stretched, stretched_surface, write_stretched
+from stages.cad.stretching import anisotropy, factors_for, source_of, stretched, stretched_surface, write_stretched
 from stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
 from stages.kit.formats.urdf_check import require_sound
 from tests.panoptic_maps import floor_mesh, seen_surface
@@ -28,7 +28,7 @@ def test_a_table_of_no_size_that_there_is_becomes_a_stretched_one(library, repla
     room = seen_surface({1: floor_mesh((-1.6, -1.3), (1.6, 1.6)), 2: longer_table(library, FACTORS)}, EYES, noise=0.003)
     found = decisions(replace_objects(room, {1: "floor", 2: "table"}))["table_2"]
     assert found.chosen.model_id == "table_long_for_table_2" and "table_long stretched by" in found.reason
-    assert found.chosen.alignment_error < 0.01
+    assert found.chosen.alignment_error < 0.01 and found.chosen.library_model == "table_long"
     whole = decisions(replace_objects(room, {1: "floor", 2: "table"}, "one_scale", stretched=False))["table_2"]
     assert whole.chosen is None or whole.chosen.alignment_error > 2 * found.chosen.alignment_error
 
@@ -70,7 +70,7 @@ def test_planes_doors_and_mass_are_those_of_the_stretched_meshes(library, tmp_pa
     assert np.allclose(door.origin, FACTORS * model.joints[0].origin)
     assert longer.mass == pytest.approx(model.mass * FACTORS.prod())
     assert all(not any(state.joints.values()) for state in longer.states), "an open door is no stretched open door"
-    assert is_stretched(longer) and not is_stretched(model)
+    assert source_of(longer) == "fridge_tall" and source_of(model) is None
 
 
 def test_factors_are_those_of_the_turn_that_stretches_less(library):
