@@ -212,8 +212,9 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
         shortlists = find_candidates(graph, panoptic_map, library, surfaces, replacing, context)
         shared.found[key] = Found(shortlists, surfaces, time.process_time() - start, context.output)
     found = shared.found[key]
-    if found.scene != context.output and (found.scene / "models").is_dir():
-        shutil.copytree(found.scene / "models", context.output / "models", dirs_exist_ok=True)
+    if found.scene != context.output:
+        for built_in in sorted((found.scene / "models").glob("*_built_in")):
+            shutil.copytree(built_in, context.output / "models" / built_in.name)
     start = time.process_time()
     scene = choose_and_write(graph, panoptic_map, library, found.shortlists, found.surfaces, replacing, context)
     seconds = found.seconds + time.process_time() - start
