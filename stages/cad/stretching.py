@@ -85,7 +85,7 @@ def factors_for(model: CadModel, size: np.ndarray, parameters: CadParameters) ->
     or y of the box, whichever stretches it less; None where that is more than a scale may be, or bends a joint."""
     state = model.states[0]
     own = np.subtract(state.box_maximum, state.box_minimum)
-    if np.any(own <= 0) or not all(_lies_along_axes(joint) for joint in model.joints):
+    if np.any(own <= 0) or np.any(size <= 0) or not all(_lies_along_axes(joint) for joint in model.joints):
         return None
     factors = min((size / own, size[[1, 0, 2]] / own), key=lambda each: float(np.ptp(np.log(each))))
     fits = np.all((factors >= parameters.minimum_scale) & (factors <= parameters.maximum_scale))

@@ -80,6 +80,7 @@ def test_factors_are_those_of_the_turn_that_stretches_less(library):
     assert found == pytest.approx([1.2, 1.2, 1.2], rel=1e-3)
     assert anisotropy(stretched(model, found, "same")) == pytest.approx(0.0, abs=1e-3)
     assert factors_for(model, own * [2.0, 1.0, 1.0], CadParameters()) is None, "more than a scale may be"
+    assert factors_for(model, own * [1.0, 0.0, 1.0], CadParameters()) is None, "a box without depth"
 
 
 def test_a_joint_that_would_bend_is_not_stretched(library):
