@@ -24,7 +24,8 @@ RECIPES = ("kitchen", "office", "bedroom", "room")
 TUNING_UNTRAINED = tuple(f"{recipe}-{seed}" for seed in (2000, 2001) for recipe in RECIPES)
 """Looked at as well, where the masks of our own network matter: it was trained on rooms of the seeds of TUNING."""
 INDEPENDENT_RECIPES = ("household", "lodging")
-"""Of maps and CAD nothing was tuned on their rooms but whether models may be stretched (on one lodging)."""
+"""Outside of the recipes that maps and CAD were tuned on; `plan` was tuned on households, and one lodging was looked at
+when models came to be stretched."""
 TUNING_INDEPENDENT = ("household-2000", "lodging-2000")
 ROOMS = "rooms"
 """Group of the reporting seeds (reporting_seeds.toml)."""

@@ -57,7 +57,7 @@ CASES = (PERFECT, PERFECT_HELD_OUT, PERFECT_INDEPENDENT, RECONSTRUCTED, DRIFTING
 """Of the generated rooms. `perfect`: true surface that was seen, true labels. `reconstructed`: each arm's own map of
 noisy depth and true masks with errors that last (the headline of `make bench-mapping`); `drifting`: the same with poses
 that drift. `held_out`: the same maps as without it, and a library of other shapes that lacks the styles of the room.
-`independent`: such a library, and rooms by recipes that nothing was tuned on, whose things are larger or smaller than
+`independent`: such a library, and rooms by recipes outside of those of tuning, whose things are larger or smaller than
 any model."""
 OF_PERFECT = frozenset({PERFECT, PERFECT_HELD_OUT, PERFECT_INDEPENDENT})
 OF_INDEPENDENT = frozenset({PERFECT_INDEPENDENT, INDEPENDENT})
