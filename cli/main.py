@@ -140,7 +140,8 @@ def main() -> None:
         _check_surroundings()
         os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first, warns about its version
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate when busy
-        code = run(sys.argv[1:])
+        with interruption.heard():
+            code = run(sys.argv[1:])
         interruption.ignore()
         sys.stdout.flush()
     except KeyboardInterrupt:  # before `run` could catch it, or a second one while it did

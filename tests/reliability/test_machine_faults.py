@@ -586,6 +586,25 @@ def test_interruptions_wait_insist_and_end(monkeypatch: pytest.MonkeyPatch) -> N
             signal.signal(number, handler)
 
 
+def test_an_interruption_that_a_library_makes_an_import_error_of_ends_in_one_line() -> None:
+    """numpy does so while it loads, and `run` loads it before it can catch anything."""
+    script = (
+        "import os, signal, sys\n"
+        "from cli import main\n"
+        "def run(arguments):\n"
+        "    try:\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "        [None for _ in range(1000)]\n"
+        "    except KeyboardInterrupt:\n"
+        "        raise ImportError('failed to import') from None\n"
+        "main.run = run\n"
+        "main.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.returncode == 130
+    assert done.stderr == "error: interrupted; every finished artifact is as it was\n"
+
+
 def test_an_interruption_lost_in_a_finalizer_prints_nothing() -> None:
     """The interpreter prints what a finalizer raises; of a repeated interruption nothing, of anything else all."""
     script = (
