@@ -1,4 +1,4 @@
-"""Ours: every chosen model on its support and in nothing else.
+"""Ours: everything on its support and in nothing else.
 
 Min-conflicts exchanges models; neighbours that were seen to touch overlap by a centimetre or two whatever the model,
 and a physics engine throws them apart.
@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from schemas.scene_parts import Box
-from stages.cad.arranging import Placed, Seat
+from stages.cad.arranging import Placed, Seat, shifted_box
 from stages.cad.bearing import shift_to_bearing
 from stages.cad.conflicts import Solid, placed_solid
 from stages.cad.fitting import shape_at
@@ -64,13 +64,34 @@ class Apart:
             holder = self.surfaces[seat.parent.shape.model.id]
             aside = shift_to_bearing(seat.parent, holder, box, bottom(box), outline.mean(axis=0))
             moved = replace(moved, translation=moved.translation + [*aside, 0.0])
-            box = box.model_copy(update={"center": tuple(np.asarray(box.center) + [*aside, 0.0])})
+            box = shifted_box(box, np.array([*aside, 0.0]))
         solid = placed_solid(moved, surface)
         spot = free_spot(
             solid, list(others), partial(stays_on, box, outline), tolerance=self.tolerance, maximum_shift=reach
         )
         moved = replace(moved, translation=moved.translation + spot.offset)
         return spot.depth, Placed(moved, stand, solid.shifted(spot.offset))
+
+    def shift(self, box: Box, seat: Seat, solid: Solid, others: Sequence[Solid]) -> np.ndarray:
+        """Return how far (3,) [m] a thing goes that keeps its mesh: along with its parent, out of what carries it and,
+        where that makes it free, aside."""
+        shift = seat.along.copy()
+        stand = seat.stand(shifted_box(box, shift))
+        if stand is not None and stand.on_top:
+            # In physics it ends where its shape does, not its box. What ends above its support is borne all the same.
+            sunk = bottom(box) + stand.move[2] - float(solid.low[:, 2].min())
+            move = np.array([*stand.move[:2], max(0.0, sunk)])
+            if np.linalg.norm(move) <= self.maximum_shift:
+                shift += move
+        outline = None if stand is None else stand.outline
+        spot = free_spot(
+            solid.shifted(shift),
+            list(others),
+            partial(stays_on, shifted_box(box, shift), outline),
+            tolerance=self.tolerance,
+            maximum_shift=self.maximum_shift,
+        )
+        return shift + spot.offset if spot.depth == 0.0 else shift
 
     def _options(self, placement: Placement, alternatives: Sequence[Placement]) -> Iterator[Placement]:
         """Yield the placement, then what may take its place: smaller, less open, another candidate."""

@@ -25,6 +25,8 @@ class Arrangement:
     placements: dict[str, Placement]
     relations: dict[str, Relation]
     """Node -> relation to its parent, with the index of the CAD surface."""
+    shifts: dict[str, np.ndarray]
+    """Node that keeps its mesh -> how far (3,) it went [m]."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,9 @@ class Seat:
 
     def stand(self, box: Box) -> Stand | None:
         """Return how a box stands here."""
-        return stand_on(self.graph, self.name, box, self.planes, self.levels, area_threshold=self.area_threshold)
+        return stand_on(
+            self.graph, self.name, box, self.planes, self.levels, area_threshold=self.area_threshold, rise=self.along[2]
+        )
 
     def standing(self, placement: Placement, surface: ModelSurface) -> tuple[Placement, Box, Stand | None]:
         """Return the placement, moved along and onto its support, its box, and how it stands."""
@@ -55,7 +59,7 @@ class Seat:
         stand = self.stand(box)
         if stand is not None:
             moved = replace(moved, translation=moved.translation + stand.move)
-            box = box.model_copy(update={"center": tuple(np.asarray(box.center) + stand.move)})
+            box = shifted_box(box, stand.move)
         return moved, box, stand
 
 
@@ -69,10 +73,14 @@ class Placed:
 
 
 class Placer(Protocol):
-    """Puts one chosen model into the scene."""
+    """Puts one thing into the scene."""
 
     def place(self, placement: Placement, seat: Seat, others: Sequence[Solid]) -> Placed:
-        """Return where it goes. `others`: what stands already and is not carried by it."""
+        """Return where a chosen model goes. `others`: what stands already and is not carried by it."""
+        ...
+
+    def shift(self, box: Box, seat: Seat, solid: Solid, others: Sequence[Solid]) -> np.ndarray:
+        """Return how far (3,) [m] a thing goes that keeps its mesh, of which `solid` is the shape in physics."""
         ...
 
 
@@ -88,6 +96,10 @@ class Standing:
         moved, _, stand = seat.standing(placement, surface)
         return Placed(moved, stand, placed_solid(moved, surface))
 
+    def shift(self, box: Box, seat: Seat, solid: Solid, others: Sequence[Solid]) -> np.ndarray:
+        """Leave it where it was seen."""
+        return np.zeros(3)
+
 
 def arrange(
     graph: ContactGraphFile,
@@ -98,16 +110,19 @@ def arrange(
     levels: Mapping[str, float],
     area_threshold: float,
 ) -> Arrangement:
-    """Return placements that stand on their supports (2.1), one after the other from the root down, large ones first.
+    """Return placements that stand on their supports (2.1), one after the other from the root down, on a level what
+    keeps its mesh first, and large ones before small.
 
     `obstacles`: layout, and things that keep their mesh. `levels`: floor node -> height [m] that its slab has in
-    physics. What a model carries goes along with it.
+    physics. What a thing carries goes along with it.
     """
     placements: dict[str, Placement] = {}
     relations: dict[str, Relation] = {}
+    shifts: dict[str, np.ndarray] = {}
     planes: dict[str, tuple[SurfacePlane, ...]] = {}
     went: dict[str, np.ndarray] = {}
     solids: dict[str, Solid] = dict(obstacles)
+    meshes = {name for name in obstacles if graph.node(name).node_type != "layout"}
     for name in _in_order(graph, chosen):
         link = graph.parent_link(name)
         parent = "" if link is None else link.source
@@ -120,8 +135,15 @@ def arrange(
             levels,
             area_threshold,
         )
+        carried = _carried_by(graph, name)
         if name not in chosen:
             box = graph.node(name).box
+            if box is not None and name in meshes:
+                meshes.remove(name)
+                others = [solid for other, solid in solids.items() if other not in carried | meshes | {name}]
+                went[name] = shifts[name] = placer.shift(box, seat, solids[name], others)
+                solids[name] = solids[name].shifted(shifts[name])
+                box = shifted_box(box, shifts[name])
             if box is not None:
                 stand = seat.stand(box)
                 if stand is not None:
@@ -129,7 +151,6 @@ def arrange(
             elif link is not None:
                 relations[name] = link
             continue
-        carried = _carried_by(graph, name)
         others = [solid for other, solid in solids.items() if other not in carried]
         placed = placer.place(chosen[name], seat, others)
         solids[name] = placed.solid
@@ -138,7 +159,12 @@ def arrange(
         went[name] = (placed.placement.translation - chosen[name].translation) * [1.0, 1.0, 0.0]
         if placed.stand is not None:
             relations[name] = placed.stand.relation.model_copy(update={"gap": 0.0} if placed.stand.on_top else {})
-    return Arrangement(placements, relations)
+    return Arrangement(placements, relations, shifts)
+
+
+def shifted_box(box: Box, shift: np.ndarray) -> Box:
+    """Return a box that went by `shift` (3,) [m]."""
+    return box.model_copy(update={"center": tuple(np.asarray(box.center) + shift)})
 
 
 def _carried_by(graph: ContactGraphFile, name: str) -> set[str]:
@@ -153,7 +179,8 @@ def _carried_by(graph: ContactGraphFile, name: str) -> set[str]:
 
 
 def _in_order(graph: ContactGraphFile, chosen: Mapping[str, Placement]) -> list[str]:
-    """Return node ids level by level from the root down; on a level large ones first, as the small give way."""
+    """Return node ids level by level from the root down; on a level what keeps its mesh first, and large ones before
+    small, which give way."""
     order = tree_order(graph)
     level: dict[str, int] = {}
     for name in order:
@@ -161,10 +188,10 @@ def _in_order(graph: ContactGraphFile, chosen: Mapping[str, Placement]) -> list[
         level[name] = 0 if link is None else level.get(link.source, -1) + 1
 
     def volume(name: str) -> float:
-        if name not in chosen:
-            return math.inf
-        placement = chosen[name]
-        return float(np.prod(placement.scale * placement.shape.size))
+        if name in chosen:
+            return float(np.prod(chosen[name].scale * chosen[name].shape.size))
+        box = graph.node(name).box
+        return math.inf if box is None else float(np.prod(box.size))
 
     place = {name: k for k, name in enumerate(order)}
-    return sorted(order, key=lambda name: (level[name], -volume(name), place[name]))
+    return sorted(order, key=lambda name: (level[name], name in chosen, -volume(name), place[name]))

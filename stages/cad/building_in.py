@@ -17,9 +17,12 @@ from stages.cad.choosing import may_touch
 from stages.cad.conflicts import Solid, penetration, placed_solid
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.parameters import CadParameters
+from stages.cad.placing import placed_box
+from stages.cad.settling import UNEXPLAINED_GAP
 from stages.cad.shapes import Placement
-from stages.cad.target import Target, stands_in_wall, unsupported_children
+from stages.cad.target import Surroundings, Target, stands_in_wall, unsupported_children
 from stages.kit.formats.entity_meshes import EntityMesh
+from stages.kit.geometry.boxes import bottom
 
 
 def built_in_instead(
@@ -43,6 +46,7 @@ def built_in_instead(
     missing = unsupported_children(placement, target.around, parameters)
     why = "it stands in a wall" if stands_in_wall(placement, target, parameters) else ""
     why = why or (f"nothing of it would support {', '.join(missing)}" if missing else "")
+    why = why or ("it would end above what it stands on" if hovers(placement, found.surface, target.around) else "")
     if why:
         shutil.rmtree(folder)
         return replace(entry, reason=f"{entry.reason}; not built in: {why}")
@@ -51,6 +55,14 @@ def built_in_instead(
         f"built in: {found.boxes} boxes, {found.leaves} leaves, {fits} (its box {1000 * found.box_fit.distance:.0f})"
     )
     return replace(entry, placements=(placement,), reason=reason)
+
+
+def hovers(placement: Placement, surface: ModelSurface, around: Surroundings) -> bool:
+    """Whether a built-in of a thing that stands, of which only boards are full, would have to drop to do so."""
+    box = around.node.box
+    if around.hangs or box is None:
+        return False
+    return bottom(placed_box(placement, surface)) - bottom(box) > UNEXPLAINED_GAP
 
 
 def yielded(entry: Shortlist) -> Shortlist:

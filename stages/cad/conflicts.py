@@ -25,9 +25,9 @@ class Solid:
     objects: tuple[fcl.CollisionObject, ...]
 
     def shifted(self, offset: np.ndarray) -> Solid:
-        """Return the solid as it was built, moved by `offset` (3,) [m]; the shapes are shared."""
-        place = fcl.Transform(np.asarray(offset, dtype=float))
-        moved = tuple(fcl.CollisionObject(shape, place) for shape in self.shapes)
+        """Return the solid moved by `offset` (3,) [m]; the shapes are shared."""
+        places = [fcl.Transform(each.getTranslation() + offset) for each in self.objects]
+        moved = tuple(fcl.CollisionObject(shape, place) for shape, place in zip(self.shapes, places, strict=True))
         return Solid(self.low + offset, self.high + offset, self.shapes, moved)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,16 @@ import trimesh
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.formats.mobility import mobility
+from stages.kit.formats.scene_supports import (
+    Carried,
+    carried_by,
+    cut_below,
+    furniture_pieces,
+    levelled,
+    resting_height,
+    standing_points,
+)
 from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.boxes import box_yaw
 from stages.kit.geometry.layout_slabs import level_of_layout
@@ -26,16 +37,31 @@ def obstacles_of(
     solids = {}
     for name, pieces in layout_pieces(graph, layout_folder).items():
         solids[name] = [_hull(piece.vertices) for piece in pieces]
+    nodes = {node.id: node for node in graph.nodes}
     for node in graph.nodes:
         file = mesh_folder / f"{node.id}.ply"
         mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
-        if mesh is None or len(mesh.faces) == 0:
-            continue
-        if load_vocabulary().by_name(node.class_name).movable:
-            solids[node.id] = [_hull(np.asarray(mesh.vertices))]
-        else:
-            solids[node.id] = _cover(node, mesh)
+        if mesh is not None and len(mesh.faces):
+            solids[node.id] = _in_physics(graph, nodes, node, mesh)
     return solids
+
+
+def _in_physics(
+    graph: ContactGraphFile, nodes: dict[str, GraphNode], node: GraphNode, mesh: trimesh.Trimesh
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the pieces that the exported scene gives a thing with its mesh, as what it is free there: boxes where it
+    stays, convex pieces as furniture, a hull where an arm carries it."""
+    points, rests_at, carried = np.asarray(mesh.vertices, dtype=float), None, carried_by(graph, nodes, node.id)
+    carriable = {entry.name for entry in load_vocabulary().classes if entry.movable}
+    mobile = mobility(graph, node, carriable, ())
+    if mobile.movable:
+        rests_at = resting_height(graph, nodes, node.id)
+    if mobile.furniture:
+        pieces = furniture_pieces(points, np.asarray(mesh.faces), rests_at)
+        return [_hull(piece) for piece in cut_below(pieces, np.eye(4), carried)]
+    if mobile.movable:
+        return [_hull(points if rests_at is None else standing_points(points, rests_at))]
+    return _cover(node, mesh, carried)
 
 
 def floor_levels(graph: ContactGraphFile, layout_folder: Path) -> dict[str, float]:
@@ -50,11 +76,11 @@ def floor_levels(graph: ContactGraphFile, layout_folder: Path) -> dict[str, floa
     return levels
 
 
-def _cover(node: GraphNode, mesh: trimesh.Trimesh) -> list[tuple[np.ndarray, np.ndarray]]:
+def _cover(node: GraphNode, mesh: trimesh.Trimesh, carried: Sequence[Carried]) -> list[tuple[np.ndarray, np.ndarray]]:
     yaw = 0.0 if node.box is None else box_yaw(node.box)
     turn = transform_from_yaw(yaw, np.zeros(3))[:3, :3]
     pieces = []
-    for center, size in cover_with_boxes(mesh, yaw):
+    for center, size in levelled(cover_with_boxes(mesh, yaw), yaw, np.eye(4), carried):
         solid = trimesh.creation.box(extents=size)
         pieces.append(((np.asarray(solid.vertices) + center) @ turn.T, np.asarray(solid.faces)))
     return pieces

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from schemas.base import as_transform
 from schemas.cad_scene import CadCandidate, CadSceneFile, JointEvidence, Replacement
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import TREE_RELATIONS
-from stages.cad.arranging import Arrangement
+from stages.cad.arranging import Arrangement, shifted_box
 from stages.cad.candidates import Shortlist
 from stages.cad.conflicts import Selection
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.placing import placed_box, placed_planes
 from stages.cad.shapes import Placement
 from stages.cad.stretching import source_of
+from stages.kit.geometry.planes import moved_planes
 from stages.kit.geometry.transforms import transform_from
 
 
@@ -64,9 +67,9 @@ def scene_file(
             )
         elif node.id in shortlists:
             entry = shortlists[node.id]
-            replacements.append(
-                Replacement(node=node.id, decision="mesh", reason=entry.reason, rejected=entry.rejected)
-            )
+            went = float(np.linalg.norm(arranged.shifts.get(node.id, 0.0)))
+            reason = f"{entry.reason}; went {1000 * went:.0f} mm to be free" if went else entry.reason
+            replacements.append(Replacement(node=node.id, decision="mesh", reason=reason, rejected=entry.rejected))
     return CadSceneFile(
         replacements=tuple(replacements),
         conflicts_before=selection.conflicts_before,
@@ -81,7 +84,7 @@ def cad_graph(graph: ContactGraphFile, arranged: Arrangement, surfaces: dict[str
     for node in graph.nodes:
         placement = arranged.placements.get(node.id)
         if placement is None:
-            nodes.append(node)
+            nodes.append(shifted_node(node, arranged.shifts[node.id]) if node.id in arranged.shifts else node)
             continue
         nodes.append(
             node.model_copy(
@@ -102,3 +105,10 @@ def cad_graph(graph: ContactGraphFile, arranged: Arrangement, surfaces: dict[str
         for link in graph.links
     )
     return graph.model_copy(update={"nodes": tuple(nodes), "links": links})
+
+
+def shifted_node(node: GraphNode, shift: np.ndarray) -> GraphNode:
+    """Return a node with a box whose mesh went by `shift` (3,) [m]."""
+    assert node.box is not None  # nothing else goes
+    planes = moved_planes(node.planes, np.eye(3), shift)
+    return node.model_copy(update={"box": shifted_box(node.box, shift), "planes": planes})

@@ -55,20 +55,22 @@ def stand_on(
     levels: Mapping[str, float],
     *,
     area_threshold: float,
+    rise: float = 0.0,
 ) -> Stand | None:
     """Return how a node with (placed) `box` comes to satisfy (2.1) on its parent, None for what has no parent.
 
     `parent_planes`: those of the parent's placed CAD model, None when the parent has none. A child of a CAD model goes
     on the nearest of its surfaces in which it fits, else on the nearest in height, and then sideways until it stands on
     it. A child of a layout or mesh node goes onto the observed plane; of a floor that is level in physics, onto its
-    height (`levels`: floor node -> [m]). What hangs stays where it was seen.
+    height (`levels`: floor node -> [m]). `rise`: how far a parent that keeps its mesh was raised [m]. What hangs stays
+    where it was seen.
     """
     node, link = graph.node(name), graph.parent_link(name)
     if link is None:
         return None
     if link.relation not in ("supports", "contains") or link.source == SCENE_NODE:
         return Stand(np.zeros(3), link)
-    seen_bottom = bottom(node.box) if node.box is not None else bottom(box)
+    seen_bottom = bottom(node.box) + rise if node.box is not None else bottom(box)
     shift, outline = np.zeros(2), None
     if parent_planes is not None:
         index, height, shift = _surface_for(parent_planes, box, seen_bottom, area_threshold)
@@ -76,7 +78,7 @@ def stand_on(
             outline = surface_outline(parent_planes[index])
     elif link.plane is not None:
         plane = graph.node(link.source).planes[link.plane]
-        index, height = link.plane, levels.get(link.source, _height_at(plane, np.asarray(box.center[:2])))
+        index, height = link.plane, levels.get(link.source, _height_at(plane, np.asarray(box.center[:2])) + rise)
         if abs(height - seen_bottom) > UNEXPLAINED_GAP:
             # The graph found nothing that this stands on and named the floor for want of a better.
             index, height = None, seen_bottom

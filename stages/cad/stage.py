@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -33,7 +34,7 @@ from stages.cad.records import cad_graph, scene_file
 from stages.cad.shapes import Placement
 from stages.cad.stretching import source_of, with_stretched, write_stretched
 from stages.cad.surroundings import footing
-from stages.cad.surroundings_files import area_of, surroundings_of, write_surroundings
+from stages.cad.surroundings_files import area_of, surroundings_of, write_surface
 from stages.cad.target import Surroundings, Target
 from stages.cad.thesis import Thesis
 from stages.kit.formats.cad_models import model_folder
@@ -98,11 +99,13 @@ def choose_and_write(
         arranged, conflicts_after = adjust(
             graph, chosen, shortlists, surfaces, solids, floor_levels(graph, layout), method
         )
+        move_meshes(arranged, context.output / "meshes")
     built = [name for name, placement in arranged.placements.items() if is_built_in(placement.shape.model)]
     nameless: EntityMesh | None = None
     if method.keeps_surroundings:
         with context.progress.step("surroundings"):
-            pieces = [piece for some in obstacles.values() for piece in some]
+            still = np.zeros(3)
+            pieces = [(v + arranged.shifts.get(name, still), f) for name, some in obstacles.items() for v, f in some]
             for placement in arranged.placements.values():
                 placed = placed_pieces(placement, surfaces[placement.shape.model.id])
                 pieces += [*placed, footing(placed)]
@@ -110,7 +113,7 @@ def choose_and_write(
             nameless = surroundings_of(panoptic_map, pieces, left, method.parameters)
     with context.progress.step("writing"):
         if nameless is not None:
-            write_surroundings(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
+            write_surface(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
         evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
         scene = scene_file(graph, shortlists, arranged, colors, evidence, selection, conflicts_after)
@@ -218,6 +221,14 @@ def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: 
         if not source.is_file():
             raise BadInput(f"{source}: mesh of node {node.id} is missing", hint="make the panoptic map again")
         shutil.copyfile(source, folder / f"{node.id}.ply")
+
+
+def move_meshes(arranged: Arrangement, folder: Path) -> None:
+    """Put the meshes (`<node>.ply`) of things that keep theirs where they went."""
+    for name, shift in arranged.shifts.items():
+        if shift.any():
+            mesh = load_entity_mesh(folder / f"{name}.ply")
+            write_surface(replace(mesh, vertices=mesh.vertices + shift), folder / f"{name}.ply")
 
 
 def colors_of_parts(

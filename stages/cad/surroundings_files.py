@@ -48,7 +48,7 @@ def area_of(surface: EntityMesh) -> float:
     return float(trimesh.triangles.area(surface.vertices[surface.faces]).sum())
 
 
-def write_surroundings(surface: EntityMesh, path: Path) -> None:
+def write_surface(surface: EntityMesh, path: Path) -> None:
     """Write the surface as PLY, vertices and faces in canonical order."""
     path.parent.mkdir(exist_ok=True)
     colored = ColoredMesh(surface.vertices.astype(np.float32), surface.faces.astype(np.int32), surface.colors)

@@ -16,9 +16,9 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Box
 from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.formats.mobility import NAMELESS, STANDS, Mobility, mobility
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.geometry.boxes import box_from_bounds
-from stages.urdf.mobility import NAMELESS, STANDS, Mobility, mobility
 
 
 def scene_bodies(

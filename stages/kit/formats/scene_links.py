@@ -18,17 +18,14 @@ from schemas.scene_parts import Box, Joint
 from stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
 from stages.kit.formats.model_writer import write_obj
 from stages.kit.formats.part_colors import recolored_shapes, vertex_colors
-from stages.kit.formats.scene_supports import Carried, cut_below, levelled, pads, standing_points
+from stages.kit.formats.scene_supports import Carried, cut_below, furniture_pieces, levelled, pads, standing_points
 from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
 from stages.kit.geometry.box_cover import cover_with_boxes
-from stages.kit.geometry.convex_pieces import convex_pieces
 from stages.kit.geometry.layout_slabs import Slab
 from stages.kit.geometry.solids import MassProperties, Solid, box, hull, mass_properties
 from stages.kit.geometry.transforms import inverse, transform_from, transform_from_quaternion, transform_from_yaw
 
 LAYOUT_DENSITY = 1000.0
-FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
-"""What of furniture counts as its feet above the floor, and how thick they are made [m]."""
 GREY = (0.6, 0.6, 0.6, 1.0)
 URDF_MESHES = (".obj", ".stl")
 """What every loader of URDF reads; pybullet refuses a whole file that names a GLB."""
@@ -214,21 +211,12 @@ def furniture_links(
     """Return the link of furniture without CAD model: `visual` to look at, convex pieces of its mesh (body frame) to
     collide with, weighing what the hull of it all weighs at `density` [kg/m^3].
 
-    It stands on one foot more at the height `rests_at` [m] of the body frame: the hull of what reaches down there, as
-    far as 10 cm above, 1 cm thick, so that legs of which the camera missed the ends carry it all the same. Pieces are
-    cut level below what it carries (`world_from_body`: where it was reconstructed), and a pad lies under each of these.
+    It stands on one foot more (`furniture_pieces`; `rests_at` [m], body frame). Pieces are cut level below what it
+    carries (`world_from_body`: where it was reconstructed), and a pad lies under each of these.
     """
     points = np.asarray(mesh.vertices, dtype=float)
     whole = _hull(points, density)[1]
-    pieces = convex_pieces(points, np.asarray(mesh.faces))
-    if rests_at is not None:
-        for piece in pieces:
-            piece[:, 2] = np.maximum(piece[:, 2], rests_at)
-        low = points[points[:, 2] < rests_at + FOOT_REACH]
-        if len(low):
-            foot = np.concatenate([low, low])
-            foot[:, 2] = np.repeat([rests_at, rests_at + FOOT_THICKNESS], len(low))
-            pieces.append(foot)
+    pieces = furniture_pieces(points, np.asarray(mesh.faces), rests_at)
     pieces = cut_below(pieces, world_from_body, carried)
     solids = [_hull(piece, density)[0] for piece in pieces]
     collisions = _pads_of(world_from_body, carried)

@@ -17,9 +17,12 @@ from shapely.geometry import MultiPoint, Polygon
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import Box
 from stages.kit.geometry.boxes import box_yaw
+from stages.kit.geometry.convex_pieces import convex_pieces
 
 LARGEST_STEP = 0.04
 """What a surface may stick out of the plane that stands for it, or a thing hover over it [m]: twice the usual voxel."""
+FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
+"""What of furniture counts as its feet above the floor, and how thick they are made [m]."""
 PAD_THICKNESS = 0.02
 MARGIN = 0.01
 """Room around a carried thing that is levelled too [m]."""
@@ -160,3 +163,23 @@ def standing_points(vertices: np.ndarray, height: float) -> np.ndarray:
     bottom = raised.copy()
     bottom[:, 2] = height
     return np.concatenate([raised, bottom])
+
+
+def furniture_pieces(points: np.ndarray, faces: np.ndarray, rests_at: float | None) -> list[np.ndarray]:
+    """Return the corner points (N, 3) of convex pieces of free furniture, from its mesh (V, 3) [m], (F, 3).
+
+    Where it stands at a height `rests_at` [m], none reaches below, and there is one foot more: the hull of what reaches
+    down there, as far as 10 cm above, 1 cm thick, so that legs of which the camera missed the ends carry it all the
+    same.
+    """
+    pieces = convex_pieces(points, faces)
+    if rests_at is None:
+        return pieces
+    for piece in pieces:
+        piece[:, 2] = np.maximum(piece[:, 2], rests_at)
+    low = points[points[:, 2] < rests_at + FOOT_REACH]
+    if len(low):
+        foot = np.concatenate([low, low])
+        foot[:, 2] = np.repeat([rests_at, rests_at + FOOT_THICKNESS], len(low))
+        pieces.append(foot)
+    return pieces

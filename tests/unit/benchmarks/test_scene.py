@@ -13,10 +13,12 @@ from benchmarks.experiments.scene.arms import ARMS, INDEPENDENT, MAPS, PERFECT, 
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
 from benchmarks.experiments.scene.measuring import Outcome, SceneParameters, physics_of
+from benchmarks.experiments.scene.shown import whole_and_named
 from benchmarks.experiments.scene.stand_ins import lacking, off_by, without_styles
 from benchmarks.generated_rooms import INDEPENDENT_RECIPES, RoomFolder, recipe_of
 from benchmarks.results import figures_of, table
 from schemas.cad_library import CadModel
+from stages.segment.panoptic import PanopticFrame, PanopticMask
 from stages.urdf.scene_penetration import Overlap
 from stages.urdf.settle_report import BodyMotion, SettleReport
 
@@ -162,3 +164,15 @@ def test_independent_rooms_are_of_other_recipes_and_rescaled(tmp_path: Path, mon
             measuring.load_room(bench_in(tmp_path), seed, ())
         asked[case] = recipe_of(seed) in INDEPENDENT_RECIPES, made[0].rescaled
     assert asked == {RECONSTRUCTED: (False, 0.0), INDEPENDENT: (True, measuring.RESCALED)}
+
+
+def test_a_thing_is_shown_where_a_mask_of_its_class_is_mostly_it() -> None:
+    thing, wall = PanopticMask(3, True), PanopticMask(1, False)
+    ids = np.zeros((10, 40), dtype=np.int32)
+    ids[:, :10], ids[:, 10:20], ids[:, 20:30], ids[0, 30:33], ids[5:, 30:] = 1, 2, 3, 4, 5
+    true = PanopticFrame(ids, {1: thing, 2: thing, 3: thing, 4: thing, 5: wall})
+    seen = np.zeros_like(ids)
+    seen[:, :15], seen[:, 20:26] = 7, 8  # the first with half of the second, of the third a little more than half
+    masks = PanopticFrame(seen, {7: thing, 8: thing})
+    assert whole_and_named(true, masks, 10) == {1: True, 2: False, 3: True}
+    assert not any(whole_and_named(true, PanopticFrame(seen, {7: PanopticMask(4, True)}), 10).values())

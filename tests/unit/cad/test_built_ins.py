@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
 
 from schemas.articulations import Articulation
+from stages.cad.building_in import hovers
 from stages.cad.built_in_leaves import leaves_of
 from stages.cad.carcasses import Cells, Patches, cells_of, own_yaw, patches_of
 from stages.kit.formats.cad_models import load_collision_parts, read_model
 from stages.kit.formats.entity_meshes import EntityMesh
+from stages.kit.geometry.boxes import box_from_bounds
 from stages.kit.geometry.transforms import apply
 from tests.panoptic_maps import floor_mesh, placed, seen_surface
+from tests.unit.cad.test_cad_stage import placement_at
 
 EYES = [(-1.4, -1.8, 1.5), (1.4, -1.8, 1.6), (0.1, -1.7, 1.0)]
 COUNTER = ((-1.0, 0.4, 0.0), (1.0, 1.0, 0.9))
@@ -183,6 +188,16 @@ def test_a_built_in_yields_to_what_stands_there(replace_objects):
     scene = replace_objects(surface, {1: "floor", 2: "object", 3: "wardrobe"})
     built = [entry.node for entry in scene.info.replacements if entry.reason.startswith("built in")]
     assert len(built) <= 1
+
+
+def test_a_built_in_reaches_down_to_what_it_stands_on(library):
+    """A board inside a fridge without a model would drop out of its place; one of a thing that hangs stays."""
+    box = box_from_bounds((-0.5, -0.5, 0.0), (0.5, 0.5, 0.8))
+    stands = SimpleNamespace(node=SimpleNamespace(box=box), hangs=False)
+    hangs = SimpleNamespace(node=SimpleNamespace(box=box), hangs=True)
+    for height, expected in ((0.0, False), (0.04, False), (0.4, True)):
+        surface, placement = placement_at(library, "table_square", (0, 0, height), 0.0, 1.0)
+        assert hovers(placement, surface, stands) is expected and not hovers(placement, surface, hangs)
 
 
 def test_patches_without_upright_surface_have_no_turn():

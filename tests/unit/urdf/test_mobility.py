@@ -11,11 +11,11 @@ import trimesh
 from schemas.cad_scene import CadScene, CadSceneFile
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.scene_parts import Box, Relation, SurfacePlane
+from stages.kit.formats.mobility import Mobility, mobility
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.geometry.convex_pieces import convex_pieces
 from stages.urdf.bodies import held_under_fixed
-from stages.urdf.mobility import Mobility, mobility
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.stage import run
 from tests.unit.urdf.small_room import context
