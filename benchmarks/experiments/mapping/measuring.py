@@ -151,7 +151,7 @@ def build_maps(
     """Return the map of every arm after all frames of a case; adds the time of each to `seconds`."""
     vocabulary = load_vocabulary()
     mappers = {arm.name: new_mapper(arm.fuse, vocabulary) for arm in arms}
-    asked = SegmentParameters.model_validate(_masks_of(case))
+    asked = SegmentParameters.model_validate(masks_of(case))
     backend = choose_backend(BackendRequest(asked, sequence=sequence, reader=reader, seed=seed))
     faults = drawn_faults(np.random.default_rng([seed, FAULT_STREAM])) if case == BENT else None
     poses = np.array([entry.frame.world_from_camera for entry in shared])
@@ -178,7 +178,7 @@ def build_maps(
     return mappers
 
 
-def _masks_of(case: str) -> dict[str, Any]:
+def masks_of(case: str) -> dict[str, Any]:
     """Return the options of `segment` of a case."""
     if case == NETWORK:
         return {"backend": NETWORK}

@@ -69,6 +69,8 @@ FIGURES: dict[str, Figure] = {
     "wrong_support": per_room("graph", "wrong_support"),
     "missing_detection": per_room("graph", "missing_detection"),
     "wrong_detection": per_room("graph", "wrong_detection"),
+    "shown": over_objects("shown"),
+    "shown_in_several": over_objects("shown_in_several"),
     "detected": lambda outcomes: _ratio(outcomes, "detected", "true_objects"),
     "replaced": lambda outcomes: _ratio(outcomes, "replaced", "true_objects"),
     "class_right": over_objects("class_right"),

@@ -16,6 +16,7 @@ from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.mapping.experiment import EXPERIMENT as MAPPING
 from benchmarks.experiments.mapping.measuring import MappingParameters, room_for
 from benchmarks.experiments.scene.arms import ARMS, MAPS, OF_HELD_OUT, OF_PERFECT, REAL, Arm
+from benchmarks.experiments.scene.shown import shown_by_masks
 from benchmarks.experiments.scene.stand_ins import lacking, nearest_stand_in, without_styles
 from benchmarks.generated_rooms import INDEPENDENT_RECIPES, make_library, recipe_of, room_at, room_of
 from benchmarks.graph_scores import OPTIONS, distance_figures, judge
@@ -36,8 +37,8 @@ from stages.evaluate.map_measures import label_true_points, load_map
 from stages.evaluate.replacement_measures import ObjectResult, replacements_of
 from stages.evaluate.shape_loading import true_shapes
 from stages.evaluate.truth import TrueRoom, load_truth
+from stages.kit.formats.mobility import BUILT_IN, STANDS
 from stages.kit.stage import Parameters
-from stages.urdf.mobility import BUILT_IN, STANDS
 from stages.urdf.mujoco_settle import mujoco_motions
 from stages.urdf.settle_report import BodyMotion, SettleReport, settle_report
 
@@ -92,6 +93,8 @@ class Room:
     """That it was furnished from."""
     held_out: CadLibrary
     """Of other shapes, without its styles."""
+    shown: Mapping[str, Mapping[str, float]]
+    """Case of `mapping` -> what its masks alone show."""
 
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outcome]]:
@@ -157,7 +160,8 @@ def load_room(bench: Bench, name: str, wanted: Collection[tuple[str, str]]) -> R
     own = [model for model in library.info.models if model.id in used]
     held_out = library_lacking(CadLibrary(held_out_library(bench)), own, bench.out / "libraries" / name)
     maps = {(trial.case, trial.arm): mapping.folder(trial) / "panoptic_map" for trial in trials}
-    return Room(name, artifact, truth, world_from_log, maps, library, held_out)
+    shown = {case: shown_by_masks(name, sequence, case) for case in sorted({case for case, _ in wanted})}
+    return Room(name, artifact, truth, world_from_log, maps, library, held_out, shown)
 
 
 @dataclass(frozen=True)
@@ -241,6 +245,7 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     undefined = ("true_model_first", "true_model_among_candidates") if case in OF_HELD_OUT else ()
     extra: dict[str, float | None] = {
         **dict.fromkeys(undefined),
+        **room.shown.get(MAPS.get(case, ""), {}),
         "without_style": float(len(without)),
         "functional_without_style": float(np.mean(without)) if without else None,
         "nearest_stand_in": float(np.median(known)) if known else None,

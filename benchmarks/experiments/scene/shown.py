@@ -1,0 +1,65 @@
+"""What the masks alone show of a room: a bound on what can be found by name, whatever the map makes of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from benchmarks.experiments.mapping.measuring import masks_of
+from benchmarks.generated_rooms import error_seed
+from schemas.sequence import Sequence as SequenceArtifact
+from stages.kit.formats.frames import FrameReader
+from stages.segment.choice import BackendRequest, choose_backend
+from stages.segment.geometric import segment_depth
+from stages.segment.panoptic import PanopticFrame
+from stages.segment.parameters import SegmentParameters
+from stages.segment.settings import geometric_settings
+
+LEAST_PIXELS = 30
+"""Of a thing in a picture 320 wide that counts as a view of it."""
+SEVERAL = 3
+WHOLE = 0.5
+"""Overlap (IoU) from which a mask shows a thing whole: that by which things of maps are found."""
+
+
+def whole_and_named(true: PanopticFrame, masks: PanopticFrame, least_pixels: float) -> dict[int, bool]:
+    """Return the true things of a frame of at least so many pixels -> whether a mask of its class shows each whole."""
+    found = {}
+    for number, mask in true.masks.items():
+        own = true.ids == number
+        pixels = np.count_nonzero(own)
+        if not mask.is_thing or pixels < least_pixels:
+            continue
+        ids, counts = np.unique(masks.ids[own], return_counts=True)
+        found[number] = any(
+            masks.masks[k].category_id == mask.category_id
+            and count >= WHOLE * (np.count_nonzero(masks.ids == k) + pixels - count)
+            for k, count in zip(ids.tolist(), counts.tolist(), strict=True)
+            if k in masks.masks
+        )
+    return found
+
+
+def shown_by_masks(name: str, sequence: SequenceArtifact, case: str) -> dict[str, float]:
+    """Return the shares of the things in sight that views of a case of `mapping` show whole and rightly named: one view
+    at least, and `SEVERAL`. `name`: of the room and the draw of its errors."""
+    drawn, seen, shown = error_seed(name), set[int](), Counter[int]()
+    settings = geometric_settings(SegmentParameters.model_validate({}))
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        asked = [SegmentParameters.model_validate(each) for each in ({"backend": "ground-truth"}, masks_of(case))]
+        requests = [BackendRequest(each, sequence=sequence, reader=reader, seed=drawn) for each in asked]
+        true_masks, spoiled_masks = map(choose_backend, requests)
+        for frame in reader.frames():
+            if frame.depth is None or frame.world_from_camera is None:
+                continue
+            geometric = segment_depth(frame.depth, reader.cameras[frame.camera_name], settings)
+            true, spoiled = (
+                backend(frame, geometric, np.random.default_rng([drawn, frame.index]))
+                for backend in (true_masks, spoiled_masks)
+            )
+            found = whole_and_named(true, spoiled, LEAST_PIXELS * (frame.depth.shape[1] / 320) ** 2)
+            seen |= found.keys()
+            shown.update(number for number, is_shown in found.items() if is_shown)
+    least = {"shown": 1, "shown_in_several": SEVERAL}
+    return {key: sum(n >= views for n in shown.values()) / max(1, len(seen)) for key, views in least.items()}
