@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -127,6 +128,16 @@ def _check_surroundings() -> None:
 
 def main() -> None:
     """Run the command line of this process."""
+    try:
+        _run_and_exit()
+    except KeyboardInterrupt:  # while the first modules load, before any signal handler of ours stands
+        if sys.stderr is not None:
+            sys.stderr.write(f"error: {INTERRUPTED_TEXT}\n")
+            sys.stderr.flush()
+        os._exit(128 + signal.SIGINT)
+
+
+def _run_and_exit() -> None:
     _refuse_foreign_packages()
     from cli import streams
     from cli.output import say_error

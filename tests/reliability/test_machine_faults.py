@@ -605,6 +605,18 @@ def test_an_interruption_that_a_library_makes_an_import_error_of_ends_in_one_lin
     assert done.stderr == "error: interrupted; every finished artifact is as it was\n"
 
 
+def test_an_interruption_before_any_handler_stands_ends_in_one_line() -> None:
+    script = (
+        "import os, signal\n"
+        "from cli import main\n"
+        "main._refuse_foreign_packages = lambda: os.kill(os.getpid(), signal.SIGINT)\n"
+        "main.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.returncode == 130
+    assert done.stderr == "error: interrupted; every finished artifact is as it was\n"
+
+
 def test_an_interruption_lost_in_a_finalizer_prints_nothing() -> None:
     """The interpreter prints what a finalizer raises; of a repeated interruption nothing, of anything else all."""
     script = (
