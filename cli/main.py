@@ -51,15 +51,17 @@ def _set_up_logging(level: int) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code."""
-    import typer
-    from typer.exceptions import TyperException
-
-    from cli.output import say_error
-    from cli.streams import INTERRUPTED, ReaderLeft
-    from schemas.errors import MachineFailure, ScenewrightError
     from stages.engine import interruption
-    from stages.engine.machine_faults import is_machines
-    from stages.engine.runner import NO_CODE_CACHE, NO_CODE_CACHE_HINT, NO_CODE_CACHE_TEXT
+
+    with interruption.waiting():  # numpy, for one, makes an import error of an interruption
+        import typer
+        from typer.exceptions import TyperException
+
+        from cli.output import say_error
+        from cli.streams import INTERRUPTED, ReaderLeft
+        from schemas.errors import MachineFailure, ScenewrightError
+        from stages.engine.machine_faults import is_machines
+        from stages.engine.runner import NO_CODE_CACHE, NO_CODE_CACHE_HINT, NO_CODE_CACHE_TEXT
 
     debug = "--debug" in arguments
     _set_up_logging(logging.WARNING if "--quiet" in arguments else logging.DEBUG if debug else logging.INFO)
@@ -151,8 +153,7 @@ def _run_and_exit() -> None:
         _check_surroundings()
         os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first, warns about its version
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate when busy
-        with interruption.heard():
-            code = run(sys.argv[1:])
+        code = run(sys.argv[1:])
         interruption.ignore()
         sys.stdout.flush()
     except KeyboardInterrupt:  # before `run` could catch it, or a second one while it did

@@ -586,32 +586,25 @@ def test_interruptions_wait_insist_and_end(monkeypatch: pytest.MonkeyPatch) -> N
             signal.signal(number, handler)
 
 
-def test_an_interruption_that_a_library_makes_an_import_error_of_ends_in_one_line() -> None:
-    """numpy does so while it loads, and `run` loads it before it can catch anything."""
-    script = (
-        "import os, signal, sys\n"
-        "from cli import main\n"
-        "def run(arguments):\n"
-        "    try:\n"
-        "        os.kill(os.getpid(), signal.SIGINT)\n"
-        "        [None for _ in range(1000)]\n"
-        "    except KeyboardInterrupt:\n"
-        "        raise ImportError('failed to import') from None\n"
-        "main.run = run\n"
-        "main.main()\n"
-    )
-    done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
-    assert done.returncode == 130
-    assert done.stderr == "error: interrupted; every finished artifact is as it was\n"
+IMPORT = """
+class Numpy:
+    def find_spec(self, name, path, target=None):
+        if name == "numpy":
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                [None for _ in range(1000)]
+            except KeyboardInterrupt:
+                raise ImportError("failed to import") from None
+sys.meta_path.insert(0, Numpy())
+"""
+"""numpy makes an import error of an interruption while it loads."""
 
 
-def test_an_interruption_before_any_handler_stands_ends_in_one_line() -> None:
-    script = (
-        "import os, signal\n"
-        "from cli import main\n"
-        "main._refuse_foreign_packages = lambda: os.kill(os.getpid(), signal.SIGINT)\n"
-        "main.main()\n"
-    )
+@pytest.mark.parametrize(
+    "interrupted", [IMPORT, "main._refuse_foreign_packages = lambda: os.kill(os.getpid(), signal.SIGINT)\n"]
+)
+def test_an_interruption_while_code_loads_ends_in_one_line(interrupted: str) -> None:
+    script = f"import os, signal, sys\nfrom cli import main\n{interrupted}main.main()\n"
     done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
     assert done.returncode == 130
     assert done.stderr == "error: interrupted; every finished artifact is as it was\n"
