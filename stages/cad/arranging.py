@@ -122,7 +122,7 @@ def arrange(
     planes: dict[str, tuple[SurfacePlane, ...]] = {}
     went: dict[str, np.ndarray] = {}
     solids: dict[str, Solid] = dict(obstacles)
-    meshes = {name for name in obstacles if graph.node(name).node_type != "layout"}
+    waiting = {name for name in obstacles if graph.node(name).node_type != "layout"}
     for name in _in_order(graph, chosen):
         link = graph.parent_link(name)
         parent = "" if link is None else link.source
@@ -138,9 +138,9 @@ def arrange(
         carried = _carried_by(graph, name)
         if name not in chosen:
             box = graph.node(name).box
-            if box is not None and name in meshes:
-                meshes.remove(name)
-                others = [solid for other, solid in solids.items() if other not in carried | meshes | {name}]
+            if box is not None and name in waiting:
+                others = [solid for other, solid in solids.items() if other not in carried | waiting]
+                waiting.remove(name)
                 went[name] = shifts[name] = placer.shift(box, seat, solids[name], others)
                 solids[name] = solids[name].shifted(shifts[name])
                 box = shifted_box(box, shifts[name])

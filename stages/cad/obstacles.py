@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,25 +37,24 @@ def obstacles_of(
     solids = {}
     for name, pieces in layout_pieces(graph, layout_folder).items():
         solids[name] = [_hull(piece.vertices) for piece in pieces]
-    nodes = {node.id: node for node in graph.nodes}
+    carriable = {entry.name for entry in load_vocabulary().classes if entry.movable}
     for node in graph.nodes:
         file = mesh_folder / f"{node.id}.ply"
         mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
         if mesh is not None and len(mesh.faces):
-            solids[node.id] = _in_physics(graph, nodes, node, mesh)
+            solids[node.id] = _in_physics(graph, node, mesh, carriable)
     return solids
 
 
 def _in_physics(
-    graph: ContactGraphFile, nodes: dict[str, GraphNode], node: GraphNode, mesh: trimesh.Trimesh
+    graph: ContactGraphFile, node: GraphNode, mesh: trimesh.Trimesh, carriable: Collection[str]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the pieces that the exported scene gives a thing with its mesh, as what it is free there: boxes where it
-    stays, convex pieces as furniture, a hull where an arm carries it."""
-    points, rests_at, carried = np.asarray(mesh.vertices, dtype=float), None, carried_by(graph, nodes, node.id)
-    carriable = {entry.name for entry in load_vocabulary().classes if entry.movable}
+    """Return the pieces that the exported scene gives a thing with its mesh, by what is free there (and `urdf` does not
+    hold): boxes where it stays, convex pieces as furniture, a hull where an arm carries it."""
+    nodes = {entry.id: entry for entry in graph.nodes}
+    points, carried = np.asarray(mesh.vertices, dtype=float), carried_by(graph, nodes, node.id)
     mobile = mobility(graph, node, carriable, ())
-    if mobile.movable:
-        rests_at = resting_height(graph, nodes, node.id)
+    rests_at = resting_height(graph, nodes, node.id) if mobile.movable else None
     if mobile.furniture:
         pieces = furniture_pieces(points, np.asarray(mesh.faces), rests_at)
         return [_hull(piece) for piece in cut_below(pieces, np.eye(4), carried)]

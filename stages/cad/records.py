@@ -68,7 +68,7 @@ def scene_file(
         elif node.id in shortlists:
             entry = shortlists[node.id]
             went = float(np.linalg.norm(arranged.shifts.get(node.id, 0.0)))
-            reason = f"{entry.reason}; went {1000 * went:.0f} mm to be free" if went else entry.reason
+            reason = f"{entry.reason}; moved by {1000 * went:.0f} mm" if went > 5e-4 else entry.reason
             replacements.append(Replacement(node=node.id, decision="mesh", reason=reason, rejected=entry.rejected))
     return CadSceneFile(
         replacements=tuple(replacements),

@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.experiments.mapping.measuring import masks_of
 from benchmarks.generated_rooms import error_seed
+from benchmarks.graph_scores import OPTIONS
 from schemas.sequence import Sequence as SequenceArtifact
 from stages.kit.formats.frames import FrameReader
 from stages.segment.choice import BackendRequest, choose_backend
@@ -19,12 +20,14 @@ from stages.segment.settings import geometric_settings
 LEAST_PIXELS = 30
 """Of a thing in a picture 320 wide that counts as a view of it."""
 SEVERAL = 3
-WHOLE = 0.5
-"""Overlap (IoU) from which a mask shows a thing whole: that by which things of maps are found."""
+"""Views in which a map that counts them believes a name."""
 
 
-def whole_and_named(true: PanopticFrame, masks: PanopticFrame, least_pixels: float) -> dict[int, bool]:
-    """Return the true things of a frame of at least so many pixels -> whether a mask of its class shows each whole."""
+def shown_and_named(
+    true: PanopticFrame, masks: PanopticFrame, least_pixels: float, overlap: float = OPTIONS.node_match_iou
+) -> dict[int, bool]:
+    """Return the true things of a frame of at least so many pixels -> whether a mask of its class shows each: by an
+    `overlap` (IoU) by which things of maps count as found too."""
     found = {}
     for number, mask in true.masks.items():
         own = true.ids == number
@@ -34,7 +37,7 @@ def whole_and_named(true: PanopticFrame, masks: PanopticFrame, least_pixels: flo
         ids, counts = np.unique(masks.ids[own], return_counts=True)
         found[number] = any(
             masks.masks[k].category_id == mask.category_id
-            and count >= WHOLE * (np.count_nonzero(masks.ids == k) + pixels - count)
+            and count >= overlap * (np.count_nonzero(masks.ids == k) + pixels - count)
             for k, count in zip(ids.tolist(), counts.tolist(), strict=True)
             if k in masks.masks
         )
@@ -42,8 +45,8 @@ def whole_and_named(true: PanopticFrame, masks: PanopticFrame, least_pixels: flo
 
 
 def shown_by_masks(name: str, sequence: SequenceArtifact, case: str) -> dict[str, float]:
-    """Return the shares of the things in sight that views of a case of `mapping` show whole and rightly named: one view
-    at least, and `SEVERAL`. `name`: of the room and the draw of its errors."""
+    """Return the shares of the things in sight that views of a case of `mapping` show and name rightly: one view at
+    least, and `SEVERAL`. `name`: of the room and the draw of its errors."""
     drawn, seen, shown = error_seed(name), set[int](), Counter[int]()
     settings = geometric_settings(SegmentParameters.model_validate({}))
     with FrameReader(sequence.path("frames.mcap")) as reader:
@@ -58,7 +61,7 @@ def shown_by_masks(name: str, sequence: SequenceArtifact, case: str) -> dict[str
                 backend(frame, geometric, np.random.default_rng([drawn, frame.index]))
                 for backend in (true_masks, spoiled_masks)
             )
-            found = whole_and_named(true, spoiled, LEAST_PIXELS * (frame.depth.shape[1] / 320) ** 2)
+            found = shown_and_named(true, spoiled, LEAST_PIXELS * (frame.depth.shape[1] / 320) ** 2)
             seen |= found.keys()
             shown.update(number for number, is_shown in found.items() if is_shown)
     least = {"shown": 1, "shown_in_several": SEVERAL}

@@ -13,7 +13,7 @@ from benchmarks.experiments.scene.arms import ARMS, INDEPENDENT, MAPS, PERFECT, 
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
 from benchmarks.experiments.scene.measuring import Outcome, SceneParameters, physics_of
-from benchmarks.experiments.scene.shown import whole_and_named
+from benchmarks.experiments.scene.shown import shown_and_named
 from benchmarks.experiments.scene.stand_ins import lacking, off_by, without_styles
 from benchmarks.generated_rooms import INDEPENDENT_RECIPES, RoomFolder, recipe_of
 from benchmarks.results import figures_of, table
@@ -174,5 +174,6 @@ def test_a_thing_is_shown_where_a_mask_of_its_class_is_mostly_it() -> None:
     seen = np.zeros_like(ids)
     seen[:, :15], seen[:, 20:26] = 7, 8  # the first with half of the second, of the third a little more than half
     masks = PanopticFrame(seen, {7: thing, 8: thing})
-    assert whole_and_named(true, masks, 10) == {1: True, 2: False, 3: True}
-    assert not any(whole_and_named(true, PanopticFrame(seen, {7: PanopticMask(4, True)}), 10).values())
+    assert shown_and_named(true, masks, 10, 0.5) == {1: True, 2: False, 3: True}
+    assert shown_and_named(true, masks, 10) == {1: True, 2: True, 3: True}, "a third is enough for a thing of a map"
+    assert not any(shown_and_named(true, PanopticFrame(seen, {7: PanopticMask(4, True)}), 10).values())
