@@ -1,7 +1,7 @@
 """Names for pieces that geometry has cut, where most of what was said of their surface is one of them.
 
-Ours. In a place that is not like those a network was taught in its masks cut worse than geometry does, but what most
-looks at a piece call it is mostly right.
+Ours. A cup that a mask took for a part of the desk, and whatever is in a place that a network was not taught in, is cut
+better by geometry than by masks, but what most looks at a piece call it is mostly right.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from stages.kit.formats.map_files import mesh_name
 from stages.kit.stage import Progress
 
 FLAT_TOPPED = ("table", "desk")
-"""Classes of things that end at their level top."""
+"""Classes of things that are a level top on legs."""
 
 
 @dataclass(frozen=True)
@@ -114,18 +114,19 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
                 wall=vocabulary.by_name("wall").id,
                 ceiling=vocabulary.by_name("ceiling").id,
                 unnamed=unnamed,
+                things=things,
                 tables=frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED),
             )
             size = {"voxel": parameters.voxel_size, "minimum_area": parameters.unnamed_area}
             if strange:
                 entities, labelled = by_geometry(surface, entities, labelled, classes, **size)
-                least = parameters.minimum_prediction_share
-                entities, labelled = with_agreed_names(
-                    entities, labelled, scores, mapper.sightings, vocabulary, unnamed, least
-                )
             else:
                 told = share_told(labelled, scores, mapper.sightings)
                 entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=told)
+            least = parameters.minimum_prediction_share
+            entities, labelled = with_agreed_names(
+                entities, labelled, scores, mapper.sightings, vocabulary, unnamed, least
+            )
     file = EntitiesFile(
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,

@@ -23,8 +23,9 @@ class Classes:
     wall: int
     ceiling: int
     unnamed: int
+    things: frozenset[int] = frozenset()
     tables: frozenset[int] = frozenset()
-    """Of things that end at their level top."""
+    """Of things that are a level top on legs."""
 
 
 def with_unnamed_pieces(
@@ -55,6 +56,7 @@ def with_unnamed_pieces(
         room | walls,
         voxel=voxel,
         minimum_area=minimum_area,
+        topped={e.instance for e in entities if e.class_id in classes.things},
         tables={e.instance for e in entities if e.class_id in classes.tables},
         told=told,
     )

@@ -61,6 +61,7 @@ def unnamed_pieces(
     voxel: float,
     minimum_area: float,
     proposed: np.ndarray | None = None,
+    topped: Collection[int] = (),
     tables: Collection[int] = (),
     told: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -69,11 +70,11 @@ def unnamed_pieces(
 
     vertices (V, 3) [m], z up, the floor at 0; normals (V, 3); instance (V,), 0 where no mask named the surface; `room`
     (V,): floor, walls and ceiling; `proposed` (V,): what doubtful masks took for one thing each, 0 for none; `voxel`
-    [m]; `tables`: instances that end at their level top, so that what their mask took with them is a piece where it
-    rises over the top, unless most of its views say that it is of the table: `told` (V,), 0..1, by default 0. Left out
-    is what has less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and what lies within
-    the outline of a named thing and begins below its top: a leg, or a leaf that its mask missed, which is of the thing
-    where it touches it. Under a table are legs of chairs too: they stay unnamed.
+    [m]; `topped`: instances of which what rises over a level top is a piece, whether their mask took it with them or
+    not, unless most of its views say that it is of the thing: `told` (V,), 0..1, by default 0. Left out is what has
+    less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and what lies within the outline of a
+    named thing and begins below its top: a leg, or a leaf that its mask missed, which is of the thing where it touches
+    it. Under `tables` are legs of chairs too: they stay unnamed.
     """
     piece = np.zeros(len(vertices), np.int32)
     members = np.flatnonzero((instance == 0) & ~room & (vertices[:, 2] > FLOOR))
@@ -84,8 +85,8 @@ def unnamed_pieces(
     names, part_of, freed = np.where(room, 0, instance), np.full(len(vertices), NO_PART), set()
     part_of[members] = parts
     told = np.zeros(len(vertices)) if told is None else told
-    for table in sorted(set(tables) & set(np.unique(names).tolist())):
-        own, on_top = _cut_from_table(vertices, normals, names, part_of, told, table, voxel)
+    for thing in sorted(set(topped) & set(np.unique(names).tolist())):
+        own, on_top = _cut_from_named(vertices, normals, names, part_of, told, thing, voxel)
         freed |= own
         standing |= on_top
     members = np.flatnonzero(part_of != NO_PART)
@@ -223,22 +224,22 @@ def _over_top(points: np.ndarray, top: np.ndarray, voxel: float) -> np.ndarray:
     return points[:, 2] - level - terms(points[:, :2]) @ shape
 
 
-def _cut_from_table(
+def _cut_from_named(
     vertices: np.ndarray,
     normals: np.ndarray,
     names: np.ndarray,
     part_of: np.ndarray,
     told: np.ndarray,
-    table: int,
+    name: int,
     voxel: float,
 ) -> tuple[set[int], set[int]]:
-    """Make parts, in place, of what rises over the top of a named table, whether its mask took it along or nobody named
+    """Make parts, in place, of what rises over the top of a named thing, whether its mask took it along or nobody named
     it: `names` (V,) has 0 there then, `part_of` (V,) new parts. Return these, and those of them that stand on the top.
     A shelf over a desk, which most views `told` (V,) to be of it, is of it.
     """
     members = np.flatnonzero(part_of != NO_PART)
-    loose = members[_of_named(vertices[members], part_of[members], vertices[names == table])]
-    around = np.concatenate([np.flatnonzero(names == table), loose])
+    loose = members[_of_named(vertices[members], part_of[members], vertices[names == name])]
+    around = np.concatenate([np.flatnonzero(names == name), loose])
     cut, on_top = _cut_at_tops(vertices[around], normals[around], np.zeros(len(around), int), voxel)
     mean = np.bincount(cut, weights=told[around]) / np.maximum(np.bincount(cut), 1)
     cut[mean[cut] >= TOLD] = 0

@@ -57,15 +57,15 @@ def of_instances(
     area: float = 0.05,
     proposed: np.ndarray | None = None,
     tables: tuple[int, ...] = (),
+    topped: tuple[int, ...] = (),
     told: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     vertices, faces, owner = scene
     normals = vertex_normals(vertices, faces)
     walls = of_walls(vertices, normals, (instance == 0) & (vertices[:, 2] > FLOOR), VOXEL)
     room = walls | (owner == 0)
-    return unnamed_pieces(
-        vertices, normals, instance, room, voxel=VOXEL, minimum_area=area, proposed=proposed, tables=tables, told=told
-    )
+    cut = {"topped": topped + tables, "tables": tables, "told": told}
+    return unnamed_pieces(vertices, normals, instance, room, voxel=VOXEL, minimum_area=area, proposed=proposed, **cut)
 
 
 def of_part(piece: np.ndarray, owner: np.ndarray, part: int) -> int:
@@ -160,6 +160,16 @@ def test_what_a_mask_took_with_a_table_is_cut_from_it() -> None:
     shelf = np.where(owner == 5, TOLD, 0.0)  # what nearly all views had in the table's mask is a shelf over it
     piece, own = of_instances(scene, instance, tables=(7,), told=shelf)
     assert (own[owner == 5] == 7).all() and of_part(piece, owner, 4) > 0
+
+
+def test_what_a_mask_took_with_any_furniture_is_cut_from_its_level_top() -> None:
+    scene = room(COUNTER, ON_IT)
+    owner = scene[2]
+    instance = np.where(np.isin(owner, (2, 3)), 7, 0)
+    assert not of_instances(scene, instance)[0].any()
+    piece, own = of_instances(scene, instance, topped=(7,))
+    assert of_part(piece, owner, 3) > 0 and not own[piece > 0].any()
+    assert (own[owner == 2] == 7).mean() > 0.9
 
 
 def test_a_leaf_that_touches_is_of_the_named_thing() -> None:
