@@ -72,9 +72,9 @@ def unnamed_pieces(
     (V,): floor, walls and ceiling; `proposed` (V,): what doubtful masks took for one thing each, 0 for none; `voxel`
     [m]; `topped`: instances of which what rises over a level top is a piece, whether their mask took it with them or
     not, unless most of its views say that it is of the thing: `told` (V,), 0..1, by default 0. Left out is what has
-    less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and what lies within the outline of a
-    named thing and begins below its top: a leg, or a leaf that its mask missed, which is of the thing where it touches
-    it. Under `tables` are legs of chairs too: they stay unnamed.
+    less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and what lies within the outline
+    of a named thing and begins below its top: a leg, or a leaf that its mask missed, which is of the thing where it
+    touches it. Under `tables` are legs of chairs too: they stay unnamed.
     """
     piece = np.zeros(len(vertices), np.int32)
     members = np.flatnonzero((instance == 0) & ~room & (vertices[:, 2] > FLOOR))

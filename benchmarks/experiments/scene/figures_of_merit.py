@@ -48,12 +48,17 @@ def _ratio(outcomes: Sequence[Outcome], part: str, whole: str) -> float | None:
     return sum(o.cad.get(part) or 0.0 for o in outcomes) / total if total else None
 
 
-def _of_loose(name: str) -> Figure:
+BY_TRUTH = "_by_truth"
+"""Ending of figures of the things that have to be free by what they truly are, not by what the map calls them."""
+
+
+def _of_loose(name: str, ending: str = "") -> Figure:
     """Share of all things that have to be free, over all rooms."""
 
     def figure(outcomes: Sequence[Outcome]) -> float | None:
-        loose = sum(o.physics["loose"] for o in outcomes)
-        return sum(o.physics[name] for o in outcomes) / loose if loose else None
+        known = [o.physics for o in outcomes if f"loose{ending}" in o.physics]  # records of before lack some
+        loose = sum(physics[f"loose{ending}"] for physics in known)
+        return sum(physics[f"{name}{ending}"] for physics in known) / loose if loose else None
 
     return figure
 
@@ -96,6 +101,8 @@ FIGURES: dict[str, Figure] = {
     "colliding": _of_loose("colliding"),
     "held": _of_loose("held"),
     "loose": per_room("physics", "loose"),
+    **{f"{name}{BY_TRUTH}": _of_loose(name, BY_TRUTH) for name in ("at_rest_both", "colliding", "held")},
+    f"loose{BY_TRUTH}": per_room("physics", f"loose{BY_TRUTH}"),
     "unsettled": per_room("physics", "unsettled"),
     "unsettled_mujoco": per_room("physics", "unsettled_mujoco"),
     "movable": per_room("physics", "movable"),

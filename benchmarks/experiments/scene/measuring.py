@@ -25,7 +25,7 @@ from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import StepFailed, context_in, made, opened, unrecorded
 from schemas.cad_library import CadLibrary, CadModel, LibraryFile
 from schemas.cad_scene import CadScene
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence as SequenceArtifact
@@ -222,10 +222,11 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     start = time.process_time()
     scene = choose_and_write(graph, panoptic_map, library, found.shortlists, found.surfaces, replacing, context)
     seconds = found.seconds + time.process_time() - start
-    physics, moved = settle(scene, graph, folder / "interactive_scene")
     if panoptic_map.root not in shared.overlaps:
         shared.overlaps[panoptic_map.root] = overlaps_of(room.truth, panoptic_map)
     overlaps = shared.overlaps[panoptic_map.root]
+    loose = {"": loose_things(graph), "_by_truth": loose_by_truth(graph, room.truth.graph, overlaps)}
+    physics, moved = settle(scene, loose, folder / "interactive_scene")
     measured = replacements_of(
         true_shapes(room.truth_artifact, room.world_from_log),
         room.truth,
@@ -263,24 +264,45 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     )
 
 
-def settle(scene: CadScene, graph: ContactGraphFile, folder: Path) -> tuple[dict[str, float], tuple[str, ...]]:
+def settle(
+    scene: CadScene, loose: Mapping[str, frozenset[str]], folder: Path
+) -> tuple[dict[str, float], tuple[str, ...]]:
     """Write the URDF scene as it was reconstructed, without a rest in the engine before, and let it go in Bullet and in
-    MuJoCo; return figures, and what did not stay in words."""
+    MuJoCo; return figures, and what did not stay in words. `loose`: as in `physics_of`."""
     unrecorded("urdf", folder, {"rest": False, "settle_seconds": 0.0}, seed=SEED, cad_scene=scene)
     report = settle_report(folder)
     other = {body.name: body for body in mujoco_motions(folder, report.seconds)}
-    return physics_of(report, other, loose_things(graph)), what_moved(report)
+    return physics_of(report, other, loose), what_moved(report)
 
 
 def loose_things(graph: ContactGraphFile) -> frozenset[str]:
     """Return the things that stand on the floor or on something and are not built in: those that have to be free."""
     names = set()
-    for node in graph.nodes:
+    for node in things_of(graph):
         link = graph.parent_link(node.id)
-        stands = link is None or link.relation in STANDS
-        if node.id != SCENE_NODE and node.node_type != "layout" and stands and node.class_name not in BUILT_IN:
+        if (link is None or link.relation in STANDS) and node.class_name not in BUILT_IN:
             names.add(node.id)
     return frozenset(names)
+
+
+def loose_by_truth(
+    graph: ContactGraphFile, true_graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float]
+) -> frozenset[str]:
+    """Return the things that have to be free by what they truly are, whatever the graph calls them and hangs them on:
+    those that show a true thing which has to be. What shows nothing true is judged as in `loose_things`.
+
+    `overlaps`: (true instance, predicted instance) -> IoU."""
+    loose = loose_things(true_graph)
+    of_true = {node.instance: node.id in loose for node in things_of(true_graph)}
+    shown = [(iou, true, found) for (true, found), iou in overlaps.items() if iou >= OPTIONS.node_match_iou]
+    is_loose = {found: of_true[true] for _, true, found in sorted(shown) if true in of_true}
+    own = loose_things(graph)
+    return frozenset(node.id for node in things_of(graph) if is_loose.get(node.instance, node.id in own))
+
+
+def things_of(graph: ContactGraphFile) -> list[GraphNode]:
+    """Return the nodes of a graph that are neither the scene nor of the building."""
+    return [node for node in graph.nodes if node.id != SCENE_NODE and node.node_type != "layout"]
 
 
 def annotated_runs(real: Path | None) -> list[str]:
@@ -309,7 +331,8 @@ def run_real(folder: Path, scratch: Path, arms: Sequence[Arm]) -> Iterator[tuple
         scene = unrecorded(
             "cad", scratch / arm.name / "cad_scene", arm.cad, seed=SEED, contact_graph=graph, library=library, **given
         )
-        physics, moved = settle(scene, graph.info, scratch / arm.name / "interactive_scene")
+        loose = {"": loose_things(graph.info), "_by_truth": loose_by_truth(graph.info, truth.graph, overlaps)}
+        physics, moved = settle(scene, loose, scratch / arm.name / "interactive_scene")
         distance, edges = measure_graph(truth, graph.info, overlaps)
         yield arm.name, Outcome(distance, edges, physics=physics, unsettled=moved)
 
@@ -330,31 +353,39 @@ def measure_graph(
     return parts, {name: (found.true_count, found.predicted_count, found.agreed) for name, found in edges.items()}
 
 
-def physics_of(report: SettleReport, other: Mapping[str, BodyMotion], loose: Collection[str]) -> dict[str, float]:
+def physics_of(
+    report: SettleReport, other: Mapping[str, BodyMotion], loose: Mapping[str, Collection[str]]
+) -> dict[str, float]:
     """Return the figures of a settle test.
 
-    `other`: movable bodies as another engine saw them; `loose`: things that have to be free: one that is held, since
-    nothing level is below it or it lies in something, is none that is at rest.
+    `other`: movable bodies as another engine saw them; `loose`: ending of a figure's name -> things that have to be
+    free: one that is held, since nothing level is below it or it lies in something, is none that is at rest.
     """
     struck = {name for pair in report.collisions for name in (pair.first, pair.second)}
     stay = {body.name for body in report.bodies if body.stays}
     stay_there = {name for name, body in other.items() if body.stays}
-    return {
+    free = {body.name for body in report.bodies}
+    figures = {
         "settled_rooms": float(report.settled),
         "settled_rooms_mujoco": float(report.settled and all(body.stays for body in other.values())),
         "movable": float(len(report.bodies)),
         "unsettled": float(len(report.unsettled)),
         "unsettled_mujoco": float(len(other) - len(stay_there)),
-        "loose": float(len(loose)),
-        "at_rest": float(len(stay & set(loose))),
-        "at_rest_both": float(len(stay & stay_there & set(loose))),
-        "colliding": float(len(struck & set(loose))),
-        "held": float(len(set(loose) - {body.name for body in report.bodies})),
         "joints": float(len(report.joints)),
         "blocked_joints": float(len(report.blocked)),
         "max_penetration_mm": report.max_penetration_mm,
         "collisions": float(len(report.collisions)),
     }
+    for ending, names in loose.items():
+        own = set(names)
+        figures |= {
+            f"loose{ending}": float(len(own)),
+            f"at_rest{ending}": float(len(stay & own)),
+            f"at_rest_both{ending}": float(len(stay & stay_there & own)),
+            f"colliding{ending}": float(len(struck & own)),
+            f"held{ending}": float(len(own - free)),
+        }
+    return figures
 
 
 def what_moved(report: SettleReport) -> tuple[str, ...]:

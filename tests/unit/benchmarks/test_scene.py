@@ -12,12 +12,14 @@ from benchmarks.experiments.scene import measuring
 from benchmarks.experiments.scene.arms import ARMS, INDEPENDENT, MAPS, PERFECT, REAL, RECONSTRUCTED
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
-from benchmarks.experiments.scene.measuring import Outcome, SceneParameters, physics_of
+from benchmarks.experiments.scene.measuring import Outcome, SceneParameters, loose_by_truth, loose_things, physics_of
 from benchmarks.experiments.scene.shown import shown_and_named
 from benchmarks.experiments.scene.stand_ins import lacking, off_by, without_styles
 from benchmarks.generated_rooms import INDEPENDENT_RECIPES, RoomFolder, recipe_of
 from benchmarks.results import figures_of, table
 from schemas.cad_library import CadModel
+from schemas.contact_graph import ContactGraphFile, GraphNode
+from schemas.scene_parts import Relation
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 from stages.urdf.scene_penetration import Overlap
 from stages.urdf.settle_report import BodyMotion, SettleReport
@@ -112,12 +114,28 @@ def test_what_has_to_be_free_and_is_held_is_not_at_rest() -> None:
     stays, leaves = BodyMotion("cup_1", 0.0, 0.0, False), BodyMotion("chair_2", 0.2, 0.0, False)
     report = SettleReport(3.0, (stays, leaves), (), (Overlap("desk_3", "cup_1", "desk_3", "cup_1", 0.009),))
     there = {"cup_1": stays, "chair_2": BodyMotion("chair_2", 0.0, 0.0, False)}
-    found = physics_of(report, there, {"cup_1", "chair_2", "desk_3", "lamp_4"})
+    found = physics_of(report, there, {"": {"cup_1", "chair_2", "desk_3", "lamp_4"}, "_by_truth": {"cup_1", "chair_2"}})
     assert (found["loose"], found["at_rest"], found["at_rest_both"], found["held"]) == (4, 1, 1, 2)
     assert (found["colliding"], found["settled_rooms"], found["unsettled_mujoco"]) == (2, 0, 0)
     of_rooms = outcome(10, 4, 1.0)
     of_rooms.physics.update(found)
+    assert FIGURES["at_rest_both_by_truth"]([of_rooms]) == 0.5 and FIGURES["held_by_truth"]([of_rooms]) == 0
     assert FIGURES["at_rest"]([of_rooms]) == 0.25 and FIGURES["colliding"]([of_rooms]) == 0.5
+
+
+def test_what_is_truly_built_in_need_not_be_free_and_what_is_not_has_to_whatever_it_is_called() -> None:
+    def graph(*things: tuple[str, int]) -> ContactGraphFile:
+        nodes = [GraphNode(id="scene", instance=0, class_name="scene", node_type="scene")]
+        floor = GraphNode(id="floor_9", instance=9, class_name="floor", node_type="layout")
+        named = [GraphNode(id=f"{c}_{i}", instance=i, class_name=c, node_type="rigid") for c, i in things]
+        links = [Relation(source="floor_9", target=node.id, relation="supports", confidence=1.0) for node in named]
+        return ContactGraphFile(nodes=(*nodes, floor, *named), links=tuple(links))
+
+    true = graph(("cabinet", 1), ("chair", 2))
+    found = graph(("object", 5), ("fridge", 6), ("object", 7), ("shelf", 8))
+    overlaps = {(1, 5): 0.8, (2, 5): 0.3, (2, 6): 0.5, (1, 8): 0.1, (9, 7): 0.9}
+    assert loose_things(found) == {"object_5", "object_7"}
+    assert loose_by_truth(found, true, overlaps) == {"fridge_6", "object_7"}
 
 
 def test_arms_that_differ_by_their_map_run_where_there_is_one() -> None:
