@@ -17,7 +17,7 @@ from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
 from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.strange_places import share_told, thing_score, without_names
+from stages.fuse.strange_places import share_told, sure_things, thing_score, without_names
 from stages.fuse.surface import Surface, extract_surface
 from stages.kit.formats.map_files import mesh_name
 from stages.kit.stage import Progress
@@ -101,8 +101,10 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
         ours = parameters.merging == "ours"
         strange = ours and is_strange(source, parameters)
         things, scores = mapper.merging.things, grouping.class_scores
+        flat_topped = frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED)
         if strange:
             score_of = {e.instance: thing_score(e.segments, scores, things, mapper.sightings) for e in entities}
+            sure = sure_things(entities, score_of, things - flat_topped)
             entities, labelled = without_names(entities, labelled, score_of, things, unnamed)
         elif ours:
             entities, labelled = without_impossible_names(
@@ -115,11 +117,11 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
                 ceiling=vocabulary.by_name("ceiling").id,
                 unnamed=unnamed,
                 things=things,
-                tables=frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED),
+                tables=flat_topped,
             )
             size = {"voxel": parameters.voxel_size, "minimum_area": parameters.unnamed_area}
             if strange:
-                entities, labelled = by_geometry(surface, entities, labelled, classes, **size)
+                entities, labelled = by_geometry(surface, entities, labelled, classes, **size, sure=sure)
             else:
                 told = share_told(labelled, scores, mapper.sightings)
                 entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=told)

@@ -72,11 +72,13 @@ def by_geometry(
     *,
     voxel: float,
     minimum_area: float,
+    sure: frozenset[int] = frozenset(),
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return entities and labels in a place where masks name nothing; as they are without a floor.
 
-    Walls are what geometry says, and things (all of the class `unnamed` here) are but proposals to it. The largest
-    piece of what was proposed as one thing has its segments, others have none.
+    Walls are what geometry says but for the instances that masks are `sure` to be things, and things (all of the class
+    `unnamed` here) are but proposals to it. The largest piece of what was proposed as one thing has its segments,
+    others have none.
     """
     vertices = _over_floor(surface, labelled, classes)
     if vertices is None:
@@ -86,6 +88,7 @@ def by_geometry(
     known = (class_id == classes.floor) | ((class_id == classes.ceiling) & (vertices[:, 2] > CEILING))
     walls = of_walls(vertices, normals, ~known & (vertices[:, 2] > FLOOR), voxel)
     proposed = np.where(class_id == classes.unnamed, instance, 0)
+    walls &= ~np.isin(proposed, sorted(sure))
     piece, _ = unnamed_pieces(
         vertices,
         normals,
@@ -94,6 +97,7 @@ def by_geometry(
         voxel=voxel,
         minimum_area=minimum_area,
         proposed=proposed,
+        sure=sure,
     )
     class_id[proposed > 0], instance[proposed > 0] = 0, 0
     wall = next((e.instance for e in entities if e.class_id == classes.wall), 1 + int(labelled.instance.max(initial=0)))

@@ -17,6 +17,8 @@ from stages.fuse.extraction import ExtractedEntity, LabelledSurface
 LEAST_THING_SCORE = 0.3
 """Score of the masks of things, averaged over all frame segments that were matched to an entity (0 where no mask was),
 from which on it is kept as one thing."""
+SURE = 0.5
+"""... and over which geometry leaves it alone: most looks saw a thing."""
 
 
 def thing_score(
@@ -31,6 +33,14 @@ def thing_score(
     """
     total = sum(score for label in segments for c, score in scores.get(label, {}).items() if c in things)
     return total / max(1, sum(sightings.get(label, 0) for label in segments))
+
+
+def sure_things(
+    entities: Sequence[ExtractedEntity], score_of: Mapping[int, float], classes: frozenset[int]
+) -> frozenset[int]:
+    """Return the instances of these classes that most looks took for a thing: no wall takes a screen that hangs flat on
+    it, and a rack is not cut at its boards. `score_of` [by instance]: as in `thing_score`."""
+    return frozenset(e.instance for e in entities if e.class_id in classes and score_of[e.instance] > SURE)
 
 
 def share_told(

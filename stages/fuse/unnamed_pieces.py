@@ -61,6 +61,7 @@ def unnamed_pieces(
     voxel: float,
     minimum_area: float,
     proposed: np.ndarray | None = None,
+    sure: Collection[int] = (),
     topped: Collection[int] = (),
     tables: Collection[int] = (),
     told: np.ndarray | None = None,
@@ -69,19 +70,20 @@ def unnamed_pieces(
     and the instance (V,) of the named thing that every vertex is of, 0 for pieces.
 
     vertices (V, 3) [m], z up, the floor at 0; normals (V, 3); instance (V,), 0 where no mask named the surface; `room`
-    (V,): floor, walls and ceiling; `proposed` (V,): what doubtful masks took for one thing each, 0 for none; `voxel`
-    [m]; `topped`: instances of which what rises over a level top is a piece, whether their mask took it with them or
-    not, unless most of its views say that it is of the thing: `told` (V,), 0..1, by default 0. Left out is what has
-    less than `minimum_area` [m^2] and neither stands on a level top nor was proposed, and what lies within the outline
-    of a named thing and begins below its top: a leg, or a leaf that its mask missed, which is of the thing where it
-    touches it. Under `tables` are legs of chairs too: they stay unnamed.
+    (V,): floor, walls and ceiling; `proposed` (V,): what doubtful masks took for one thing each, 0 for none; `sure`:
+    which of these are not cut at their tops; `voxel` [m]; `topped`: instances of which what rises over a level top is a
+    piece, whether their mask took it with them or not, unless most of its views say that it is of the thing: `told`
+    (V,), 0..1, by default 0. Left out is what has less than `minimum_area` [m^2] and neither stands on a level top nor
+    was proposed, and what lies within the outline of a named thing and begins below its top: a leg, or a leaf that its
+    mask missed, which is of the thing where it touches it. Under `tables` are legs of chairs too: they stay unnamed.
     """
     piece = np.zeros(len(vertices), np.int32)
     members = np.flatnonzero((instance == 0) & ~room & (vertices[:, 2] > FLOOR))
     points = vertices[members]
     parts = _components(points, voxel, None if proposed is None else proposed[members])
     whole = set() if proposed is None else set(parts[proposed[members] > 0].tolist())
-    parts, standing = _cut_at_tops(points, normals[members], parts, voxel)
+    kept_whole = set() if proposed is None else set(parts[np.isin(proposed[members], sorted(sure))].tolist())
+    parts, standing = _cut_at_tops(points, normals[members], parts, voxel, kept_whole)
     names, part_of, freed = np.where(room, 0, instance), np.full(len(vertices), NO_PART), set()
     part_of[members] = parts
     told = np.zeros(len(vertices)) if told is None else told
@@ -168,16 +170,19 @@ def _tops(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: flo
 
 
 def _cut_at_tops(
-    points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float
+    points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float, kept_whole: Collection[int] = ()
 ) -> tuple[np.ndarray, set[int]]:
     """Cut what stands on the level tops of each part from it, and what rises beside them: a chair, a tall cabinet.
 
-    Return the parts (N,), and which of them stand on a top.
+    Return the parts (N,), and which of them stand on a top. Nothing is cut from those that are `kept_whole`.
     """
     result, standing = parts.copy(), set()
     after = int(parts.max(initial=0)) + 1
     for part, top in _tops(points, normals, parts, voxel):
         level, footprint = float(np.median(points[top, 2])), _Footprint(points[top, :2], voxel)
+        if part in kept_whole:
+            standing |= _standing_on(level, footprint, points, result) - {part}
+            continue
         own = np.flatnonzero(result == part)
         over, inside = points[own, 2] - level, footprint.holds(points[own])
         rise = _over_top(points[own], points[top], voxel)

@@ -9,7 +9,7 @@ from stages.fuse.closing import MaskSource, is_strange
 from stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.piece_entities import Classes, by_geometry
-from stages.fuse.strange_places import LEAST_THING_SCORE, share_told, thing_score, without_names
+from stages.fuse.strange_places import LEAST_THING_SCORE, SURE, share_told, sure_things, thing_score, without_names
 from stages.fuse.surface import Surface
 from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import THINGS, class_id
@@ -65,6 +65,28 @@ def test_geometry_says_what_is_wall_and_what_becomes_of_a_proposal() -> None:
     assert set(np.unique(result.instance)) <= {0, *(e.instance for e in found)}
     without = LabelledSurface(owner.astype(np.int32), np.zeros_like(class_of[number]), np.zeros_like(labelled.instance))
     assert by_geometry(surface, [], without, classes, voxel=VOXEL, minimum_area=0.2) == ([], without), "no floor"
+
+
+def test_most_looks_make_a_thing_sure_but_no_table() -> None:
+    entities = [entity(1, FRIDGE), entity(2, CHAIR), entity(3, FRIDGE), entity(4, WALL)]
+    score_of = {1: SURE + 0.01, 2: 1.0, 3: SURE, 4: 1.0}
+    assert sure_things(entities, score_of, frozenset({FRIDGE})) == {1}
+
+
+@pytest.mark.parametrize("sure", [frozenset(), frozenset({3, 4})])
+def test_no_wall_takes_and_no_top_cuts_what_masks_are_sure_of(sure: frozenset[int]) -> None:
+    vertices, faces, owner = room(COUNTER, ON_IT)
+    surface = Surface(vertices, faces, np.zeros((len(vertices), 3), np.uint8), owner)
+    screen = (owner == 1) & (np.abs(vertices - [1.5, 2.0, 1.6]) < 0.3).all(axis=1)
+    number = np.select([owner == 0, screen, owner >= 2], [1, 3, 4], 2)  # one mask took the counter with what is on it
+    class_of = np.array([0, FLOOR, WALL, OBJECT, OBJECT], np.int32)
+    labelled = LabelledSurface(owner.astype(np.int32), class_of[number], number.astype(np.int32))
+    entities = [entity(k, int(class_of[k])) for k in range(1, 5)]
+    classes = Classes(FLOOR, WALL, CEILING, OBJECT)
+    _, result = by_geometry(surface, entities, labelled, classes, voxel=VOXEL, minimum_area=0.2, sure=sure)
+    assert (result.class_id[screen] == (OBJECT if sure else WALL)).mean() > 0.9
+    counter, on_it = (int(np.bincount(result.instance[owner == part]).argmax()) for part in (2, 3))
+    assert (counter == on_it) == bool(sure)
 
 
 def test_only_a_segmenter_that_says_so_is_doubted() -> None:
