@@ -61,9 +61,9 @@ def value(found: Mapping[str, Figure | None], key: str) -> float:
 
 
 def test_with_estimated_poses_the_map_is_made_of_them_and_stands_apart() -> None:
-    inputs = {name: from_what for _, name, from_what, _ in chain(estimated=True)}
+    inputs = {name: from_what for _, name, from_what, _ in chain(7, estimated=True)}
     assert inputs["estimated/panoptic_map"]["trajectory"] == "trajectory" and "panoptic_map" not in inputs
-    made = {"ground_truth"}
+    made: set[str] = set()
     for name, from_what in inputs.items():
         assert {source.split("/log")[0] for source in from_what.values()} <= made
         made.add(name)
