@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,10 @@ from stages.poses.estimation import estimate
 from stages.poses.frame_poses import FramePose, frame_poses
 from stages.poses.parameters import PosesParameters
 from stages.poses.world import choose_world
+
+MOST_CONTRADICTED, FEWEST_LOOPS = 0.15, 10
+"""A path is not to be trusted that denies more than this share of its loops, of so many at least. Of four good paths
+none to a tenth was denied, of three that were off by a decimetre and more 16 to 52 % (docs/POSES.md)."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,8 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
     """Estimate the pose of every frame of the main camera; write trajectory.tum and poses.json.
 
     Frames that could not be placed have no line in trajectory.tum, so that `fuse` skips them, and the outcome is then
-    `tracking_lost`; `empty` when no two frames could be placed. Raises BadInput for a sequence without depth, without
+    `tracking_lost`; `contradictory` when the path denies the places that it comes back to; `empty` when no two frames
+    could be placed. Raises BadInput for a sequence without depth, without
     colour where the method needs it, or with fewer than two frames of its main camera.
     """
     require_depth(sequence)
@@ -164,11 +169,20 @@ def _finish(
 
 
 def outcome_of(info: PosesFile) -> str:
-    """Return `ok`, `tracking_lost` when a frame has no pose, `empty` when none has."""
+    """Return `ok`, `contradictory` when the path and the places that it comes back to deny each other, `tracking_lost`
+    when a frame has no pose, `empty` when none has."""
     unposed = sum(frame.status == "unposed" for frame in info.frames)
     if unposed == len(info.frames):
         return "empty"
+    if contradicted_share(info.loops) > MOST_CONTRADICTED:
+        return "contradictory"
     return "tracking_lost" if unposed else "ok"
+
+
+def contradicted_share(loops: Iterable[LoopClosure]) -> float:
+    """Return the share of the loops that the path denies: both were aligned surface on surface, one of them wrongly."""
+    denied = [loop.weight < 0.5 for loop in loops]
+    return sum(denied) / max(len(denied), FEWEST_LOOPS)
 
 
 def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, object]:
@@ -189,6 +203,13 @@ def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, obj
         summary["reason"] = (
             f"{len(unposed)} of {len(info.frames)} frames have no pose "
             f"({', '.join(f'{reason} {count}' for reason, count in sorted(reasons.items()))}): {where}"
+        )
+        context.logger.warning("%s", summary["reason"])
+    if contradicted_share(info.loops) > MOST_CONTRADICTED:
+        denied = sum(loop.weight < 0.5 for loop in info.loops)
+        summary["reason"] = (
+            f"the path denies {denied} of {len(info.loops)} places that look the same: it may be off by decimetres; "
+            "record more pictures a second, or turn more slowly"
         )
         context.logger.warning("%s", summary["reason"])
     return summary

@@ -22,7 +22,7 @@ def estimated_poses(
     lost. The whole path is laid onto the given one; no more of that is looked at. Raises StepFailed."""
     frames = DENSER * (len(times) - 1) + 1
     room = make_room(root, room_of(seed), frames, size=size, rescaled=rescaled)
-    lost = ("--accept", "tracking_lost")
+    lost = ("--accept", "tracking_lost", "--accept", "contradictory")
     path = made("poses", room.folder / "trajectory", "--sequence", room.sequence, *lost)
     return poses_at(times, *read_tum(path / "trajectory.tum"))
 

@@ -9,14 +9,14 @@ import pytest
 
 from schemas.errors import BadInput, UsageError
 from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
+from schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.geometry.transforms import inverse
 from stages.kit.measurement.pose_error import trajectory_error
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.poses.parameters import PosesParameters, check
-from stages.poses.stage import ranges, run
+from stages.poses.stage import outcome_of, ranges, run
 from tests.unit.poses.textured_room import round_walk, write_sequence
 
 FRAMES = 49
@@ -180,3 +180,13 @@ def test_structure_from_motion_has_metres(tmp_path: Path) -> None:
     info = made.info
     assert made.summary["posed"] > 30 and aligned_error(made, walk) < 0.05
     assert {frame.status for frame in info.frames} >= {"tracked", "interpolated"}
+
+
+def test_a_path_that_denies_the_places_it_comes_back_to_is_not_ok() -> None:
+    def path(kept: int, denied: int) -> PosesFile:
+        loops = [LoopClosure(first=0, second=9, found_by="place", weight=w, overlap=0.6) for w in (0.9, 0.1)]
+        frame = FrameEstimate(frame=0, time=0.0, status="tracked", fault="", confidence=1.0)
+        return PosesFile.model_construct(frames=(frame,), loops=(*[loops[0]] * kept, *[loops[1]] * denied))
+
+    assert outcome_of(path(34, 4)) == "ok" and outcome_of(path(28, 30)) == "contradictory"
+    assert outcome_of(path(1, 1)) == "ok", "of two places one may look like another"
