@@ -21,6 +21,8 @@ from stages.kit.geometry.convex_pieces import convex_pieces
 
 LARGEST_STEP = 0.04
 """What a surface may stick out of the plane that stands for it, or a thing hover over it [m]: twice the usual voxel."""
+FEWEST_CORNERS = 4
+"""Fewer span no solid: what sticks out of a plane there is a spike."""
 FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
 """What of furniture counts as its feet above the floor, and how thick they are made [m]."""
 PAD_THICKNESS = 0.02
@@ -134,7 +136,7 @@ def cut_below(
             cut += [low] if piece[:, 2].min() < height - MARGIN else []
             high = piece[piece[:, 2] > height + LARGEST_STEP]
             high = high[~_within(high, world_from_body, area)]
-            cut += [high] if len(high) and not meets(high) else []
+            cut += [high] if len(high) >= FEWEST_CORNERS and not meets(high) else []
         kept = cut
     return kept
 

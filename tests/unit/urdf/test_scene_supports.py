@@ -12,7 +12,7 @@ from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.scene_parts import Box, Relation, SurfacePlane
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.formats.scene_supports import Carried, levelled, standing_points
+from stages.kit.formats.scene_supports import Carried, cut_below, levelled, standing_points
 from stages.kit.formats.urdf_check import check_urdf
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.geometry.solids import hull
@@ -153,3 +153,11 @@ def test_negative_friction_is_found(tmp_path: Path) -> None:
 def test_every_class_is_made_of_something() -> None:
     assert {entry.name for entry in load_vocabulary().classes} <= set(SUBSTANCES) | {"void"}
     assert {substance.surface for substance in SUBSTANCES.values()} <= set(FRICTION_OF_LIKE)
+
+
+def test_a_spike_over_a_plane_is_no_piece() -> None:
+    """One corner that rises beside what stands there spans nothing."""
+    box = trimesh.creation.box(bounds=[[-0.5, -0.5, 0.0], [0.5, 0.5, 0.77]])
+    spiked = np.vstack([box.vertices, [[-0.45, 0.45, 0.9]]])
+    [piece] = cut_below([spiked], np.eye(4), [CUP])
+    assert len(piece) == len(spiked) and piece[:, 2].max() == pytest.approx(CUP.height)
