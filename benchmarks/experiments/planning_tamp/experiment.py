@@ -196,8 +196,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Room
             yield trial, RoomResult(trial.arm, trial.case, seed, False, "infeasible", "no_room", 0, {})
         return
     for trial in trials:
-        found = rooms[trial.case in OF_ESTIMATED]
-        yield trial, plan_room(*found, trial, bench.folder(trial) / "plan", **(ROBOTS | LOOKS)[trial.case])
+        scene, truth = rooms[trial.case in OF_ESTIMATED]
+        yield trial, plan_room(scene, truth, trial, bench.folder(trial) / "plan", **(ROBOTS | LOOKS)[trial.case])
 
 
 def _room(root: Path, seed: int, *, exact: bool, estimated: bool) -> tuple[InteractiveScene, GroundTruth | None]:
