@@ -89,8 +89,10 @@ def log_odds(shares: np.ndarray) -> np.ndarray:
 
 def fitted(weights: Sequence[float], least_recognised: float = -1.0, strange: float = 1.0) -> Calibration:
     """Return the calibration with weights in the order of WEIGHTS. Raises ValueError for another number of them."""
-    named = dict(zip(WEIGHTS, weights, strict=True))
-    return Calibration(**named, least_recognised=least_recognised, strange=strange)
+    bias, looks, field, extent, extent_squared, class_bias, class_name = weights
+    return Calibration(
+        bias, looks, field, extent, extent_squared, True, least_recognised, strange, class_bias, class_name
+    )
 
 
 def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibration:
