@@ -92,6 +92,7 @@ def _check_same_map(language: LanguageMap, graph: ContactGraphFile) -> None:
 
 def _answer(finder: Finder, found: Found, nodes: dict[int, str]) -> Answer:
     region = finder.info.regions[found.region]
+    x, y, z = (round(float(v), 4) for v in finder.place(found.region))
     return Answer(
         region=found.region,
         probability=round(found.probability, 6),
@@ -101,7 +102,7 @@ def _answer(finder: Finder, found: Found, nodes: dict[int, str]) -> Answer:
         instance=region.instance,
         node=nodes.get(region.instance, ""),
         other=nodes.get(found.other, ""),
-        place=tuple(round(float(v), 4) for v in finder.place(found.region)),
+        place=(x, y, z),
         box=region.box,
         gaussians=len(finder.index.members(found.region)),
     )
