@@ -24,7 +24,9 @@ BENT = "lasting/bent"
 NETWORK = "network"
 DRIFTING = "lasting/drifting"
 """The errors of the headline, poses that drift (drift.py)."""
-CASES = (*LASTING_CASES, BENT, DRIFTING, *LEVELS, NETWORK)
+ESTIMATED = "lasting/estimated"
+"""The errors of the headline, poses that `poses` estimates (estimated.py)."""
+CASES = (*LASTING_CASES, BENT, DRIFTING, ESTIMATED, *LEVELS, NETWORK)
 
 SHOWN = LASTING
 """The case that the tables by room and class show; all arms run in it."""

@@ -43,7 +43,7 @@ EXPERIMENT = Experiment(
     title="Panoptic maps of generated rooms",
     simulated="Rooms, walks, pictures, and depth with the noise of a structured-light camera; the masks are the true "
     "ones with errors put in, which last at the rates of segmenters on real frames (in older cases every frame has its "
-    "own), but for the case network; poses are true, but for the case that drifts.",
+    "own), but for the case network; poses are true, but drift in one case and are estimated in another.",
     knows="Colour, depth, poses, camera; the masks of the case, the same for every arm.",
     does_not_show="How it works on a real sensor's depth, with masks of a detector trained on photographs, or on rooms "
     "that people live in.",
@@ -67,7 +67,7 @@ EXPERIMENT = Experiment(
     quick={"frames": 40},
     jobs=min(2, os.cpu_count() or 1),
     prepare=prepare,
-    steps=("segment", "graph", *STEPS),
+    steps=("segment", "poses", "graph", *STEPS),
     pairs=(
         ("thesis_separate", "voxblox++"),
         ("thesis", "thesis_separate"),

@@ -12,9 +12,20 @@ import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Trial
-from benchmarks.experiments.mapping.arms import BENT, DRIFTING, LASTING, LASTING_CASES, LEVELS, NETWORK, Arm, all_arms
+from benchmarks.experiments.mapping.arms import (
+    BENT,
+    DRIFTING,
+    ESTIMATED,
+    LASTING,
+    LASTING_CASES,
+    LEVELS,
+    NETWORK,
+    Arm,
+    all_arms,
+)
 from benchmarks.experiments.mapping.depth_faults import DepthFaults, drawn_faults
 from benchmarks.experiments.mapping.drift import drifting_poses
+from benchmarks.experiments.mapping.estimated import estimated_poses
 from benchmarks.generated_rooms import RoomFolder, error_seed, make_room, room_of
 from benchmarks.steps import context_in, opened, unrecorded
 from schemas.contact_graph import ContactGraphFile
@@ -109,7 +120,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
         for case in dict.fromkeys(trial.case for trial in trials):
             present = {trial.arm: trial for trial in trials if trial.case == case}
             seconds = dict.fromkeys(present, 0.0)
-            mappers = build_maps(sequence, reader, shared, [arms[name] for name in present], case, drawn, seconds)
+            poses = poses_of(case, bench.out / "rooms", trials[0].seed, shared, parameters)
+            mappers = build_maps(sequence, reader, shared, poses, [arms[n] for n in present], case, drawn, seconds)
             for name, trial in present.items():
                 output = bench.folder(trial)
                 panoptic_map = finish_map(mappers.pop(name), output, SEED)
@@ -119,8 +131,12 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
 
 def room_for(root: Path, seed: str, parameters: MappingParameters) -> RoomFolder:
     """Make the room of a trial's seed unless it is up to date."""
-    size = (parameters.width, 3 * parameters.width // 4)
-    return make_room(root, room_of(seed), parameters.frames, size=size, rescaled=parameters.rescaled)
+    return make_room(root, room_of(seed), parameters.frames, size=size_of(parameters), rescaled=parameters.rescaled)
+
+
+def size_of(parameters: MappingParameters) -> tuple[int, int]:
+    """Return width and height of the pictures [pixels]."""
+    return parameters.width, 3 * parameters.width // 4
 
 
 def read_frames(reader: FrameReader, arms: Sequence[Arm]) -> list[SharedFrame]:
@@ -139,25 +155,38 @@ def read_frames(reader: FrameReader, arms: Sequence[Arm]) -> list[SharedFrame]:
     return shared
 
 
+def poses_of(
+    case: str, root: Path, seed: str, shared: Sequence[SharedFrame], parameters: MappingParameters
+) -> np.ndarray:
+    """Return the poses (N, 4, 4) of a case; NaN for frames that have none. Raises StepFailed."""
+    poses = np.array([entry.frame.world_from_camera for entry in shared])
+    if case == DRIFTING:
+        return drifting_poses(poses, np.random.default_rng([error_seed(seed), DRIFT_STREAM]))
+    if case == ESTIMATED:
+        times = np.array([entry.frame.time for entry in shared])
+        return estimated_poses(root, seed, times, size=size_of(parameters), rescaled=parameters.rescaled)
+    return poses
+
+
 def build_maps(
     sequence: SequenceArtifact,
     reader: FrameReader,
     shared: Sequence[SharedFrame],
+    poses: np.ndarray,
     arms: Sequence[Arm],
     case: str,
     seed: int,
     seconds: dict[str, float],
 ) -> dict[str, PanopticMapper]:
-    """Return the map of every arm after all frames of a case; adds the time of each to `seconds`."""
+    """Return the map of every arm after the frames of a case that have a pose; adds the time of each to `seconds`."""
     vocabulary = load_vocabulary()
     mappers = {arm.name: new_mapper(arm.fuse, vocabulary) for arm in arms}
     asked = SegmentParameters.model_validate(masks_of(case))
     backend = choose_backend(BackendRequest(asked, sequence=sequence, reader=reader, seed=seed))
     faults = drawn_faults(np.random.default_rng([seed, FAULT_STREAM])) if case == BENT else None
-    poses = np.array([entry.frame.world_from_camera for entry in shared])
-    if case == DRIFTING:
-        poses = drifting_poses(poses, np.random.default_rng([seed, DRIFT_STREAM]))
     for entry, pose in zip(shared, poses, strict=True):
+        if np.isnan(pose).any():
+            continue
         frame, camera = entry.frame, reader.cameras[entry.frame.camera_name]
         made = entry.geometric if faults is None else spoiled(frame, camera, faults, entry.geometric)
         assert frame.depth is not None

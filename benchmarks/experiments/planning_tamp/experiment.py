@@ -44,9 +44,12 @@ LOOKS: dict[str, dict[str, object]] = {
     "perceived": {"eyes": "camera"},
     "noisy_look": {"eyes": "noisy"},
     "open_loop": {"eyes": "noisy", "relocalize": False},
+    "perceived_estimated": {"eyes": "camera"},
 }
 """Case in a reconstructed room -> what the robot sees before it acts: the truth, what can be fitted to pictures, the
 truth through a robot and a segmentation that err, nothing."""
+OF_ESTIMATED = frozenset({"perceived_estimated"})
+"""Cases whose room is reconstructed with poses that are estimated from its log."""
 ROBOTS: dict[str, dict[str, object]] = {
     EXACT: {},
     "exact_ur5": {"robot": "ur5"},
@@ -56,11 +59,12 @@ ROBOTS: dict[str, dict[str, object]] = {
 CASES = (*ROBOTS, *LOOKS)
 RECIPE = "household"
 ROOMS, QUICK_ROOMS = 50, 2
-TUNING, REPORTING = (*range(0, ROOMS), *range(1200, 1212)), range(1212, 1212 + ROOMS)
-"""Rooms 1000 to 1211 have met earlier versions of `plan`: they do not report."""
+TUNING, REPORTING = (*range(0, ROOMS), *range(1200, 1215)), range(1215, 1215 + ROOMS)
+"""Rooms 1000 to 1214 have met earlier versions of `plan`: they do not report."""
 FRAMES = 120
 LIBRARY_SEED = 1
-CHAIN: tuple[tuple[str, str, dict[str, str], tuple[str, ...]], ...] = (
+Link = tuple[str, str, dict[str, str], tuple[str, ...]]
+CHAIN: tuple[Link, ...] = (
     ("ingest", "sequence", {"log": "ground_truth/log.mcap"}, ()),
     ("segment", "segments", {"sequence": "sequence"}, ("--backend", "ground-truth", "--corruption", "0.2")),
     ("fuse", "panoptic_map", {"sequence": "sequence", "segments": "segments"}, ()),
@@ -69,6 +73,7 @@ CHAIN: tuple[tuple[str, str, dict[str, str], tuple[str, ...]], ...] = (
     ("urdf", "interactive_scene", {"cad-scene": "cad_scene"}, ()),
 )
 """Command, artifact, inputs and further options of the way from a log to a scene, as in the pipeline `demo`."""
+ESTIMATING: Link = ("poses", "trajectory", {"sequence": "sequence"}, ("--accept", "tracking_lost"))
 
 
 @dataclass(frozen=True)
@@ -129,17 +134,35 @@ def _search_seconds(folder: Path) -> float:
     return time.process_time() - started
 
 
-def reconstructed_room(library: Path, seed: int, folder: Path) -> tuple[InteractiveScene, GroundTruth]:
-    """Record the room of a seed and reconstruct it, each step as its own process. Raises StepFailed."""
+def chain(*, estimated: bool) -> tuple[Link, ...]:
+    """Return the way from a log to a scene; with `estimated` poses, what follows from them stands in a folder apart."""
+    if not estimated:
+        return CHAIN
+    before, after = CHAIN[:2], CHAIN[2:]
+    apart = {name: f"estimated/{name}" for _, name, _, _ in after}
+    links = [
+        (command, apart[name], {option: apart.get(source, source) for option, source in inputs.items()}, options)
+        for command, name, inputs, options in after
+    ]
+    command, name, inputs, options = links[0]
+    return (*before, ESTIMATING, (command, name, inputs | {"trajectory": "trajectory"}, options), *links[1:])
+
+
+def reconstructed_room(
+    library: Path, seed: int, folder: Path, *, estimated: bool = False
+) -> tuple[InteractiveScene, GroundTruth]:
+    """Record the room of a seed and reconstruct it, with given poses or such as are `estimated`, each step as its own
+    process. Raises StepFailed."""
     wishes = ("--recipe", RECIPE, "--frames", str(FRAMES), "--seed", str(seed), "library")
-    for command, name, inputs, options in (("synthesize", "ground_truth", {}, wishes), *CHAIN):
+    links = chain(estimated=estimated)
+    for command, name, inputs, options in (("synthesize", "ground_truth", {}, wishes), *links):
         words: list[object] = []
         for option, source in inputs.items():
             words += [f"--{option}", folder / source]
         for option in options:
             words += ["--library", library] if option == "library" else [option]
         made(command, folder / name, *words)
-    return opened(InteractiveScene, folder / "interactive_scene"), opened(GroundTruth, folder / "ground_truth")
+    return opened(InteractiveScene, folder / links[-1][1]), opened(GroundTruth, folder / "ground_truth")
 
 
 def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
@@ -149,23 +172,25 @@ def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, RoomResult]]:
     """Yield the results of the tasks in the room of one seed; a room that cannot be made is a result too."""
-    exact, seed = trials[0].case in ROBOTS, int(trials[0].seed)
-    folder = bench.out / "rooms" / ("exact" if exact else "reconstructed") / str(seed)
+    seed, rooms = int(trials[0].seed), dict[bool, tuple[InteractiveScene, GroundTruth | None]]()
     try:
-        scene, truth = _room(exact, seed, bench.out / "cad_library", folder)
+        for estimated in sorted({trial.case in OF_ESTIMATED for trial in trials}):
+            rooms[estimated] = _room(bench.out, seed, exact=trials[0].case in ROBOTS, estimated=estimated)
     except BadInput as error:
         print(f"room {seed}: {error}")
         for trial in trials:
             yield trial, RoomResult(trial.arm, trial.case, seed, False, "infeasible", "no_room", 0, {})
         return
     for trial in trials:
-        yield trial, plan_room(scene, truth, trial, bench.folder(trial) / "plan", **(ROBOTS | LOOKS)[trial.case])
+        found = rooms[trial.case in OF_ESTIMATED]
+        yield trial, plan_room(*found, trial, bench.folder(trial) / "plan", **(ROBOTS | LOOKS)[trial.case])
 
 
-def _room(exact: bool, seed: int, library: Path, folder: Path) -> tuple[InteractiveScene, GroundTruth | None]:
+def _room(root: Path, seed: int, *, exact: bool, estimated: bool) -> tuple[InteractiveScene, GroundTruth | None]:
+    library, folder = root / "cad_library", root / "rooms" / ("exact" if exact else "reconstructed") / str(seed)
     if exact:
         return exact_room(CadLibrary(library), RECIPE, seed, folder / "room", shut=True), None
-    return reconstructed_room(library, seed, folder / "chain")
+    return reconstructed_room(library, seed, folder / "chain", estimated=estimated)
 
 
 def figures(results: Sequence[RoomResult]) -> dict[str, Figure | None]:
@@ -266,5 +291,5 @@ EXPERIMENT = Experiment(
     quick_seeds=QUICK_ROOMS,
     jobs=min(2, os.cpu_count() or 1),
     prepare=prepare,
-    steps=("library build", "synthesize", "plan", *(command for command, *_ in CHAIN)),
+    steps=("library build", "synthesize", "plan", *(command for command, *_ in chain(estimated=True))),
 )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from benchmarks.experiments.mapping.arms import DRIFTING as DRIFTING_POSES
+from benchmarks.experiments.mapping.arms import ESTIMATED as ESTIMATED_POSES
 from benchmarks.experiments.mapping.arms import LASTING
 from stages.cad.parameters import CadParameters
 from stages.graph.parameters import GraphParameters
@@ -51,16 +52,24 @@ OF_MAPS = frozenset({"thesis_chosen", "thesis_on_ours", "ours_on_thesis"})
 """Arms that differ from others by their map alone, which a perfect one has not."""
 
 PERFECT, RECONSTRUCTED, DRIFTING, REAL = "perfect", "reconstructed", "drifting", "real"
+ESTIMATED = "estimated"
 PERFECT_HELD_OUT, HELD_OUT = "perfect_held_out", "held_out"
 PERFECT_INDEPENDENT, INDEPENDENT = "perfect_independent", "independent"
-CASES = (PERFECT, PERFECT_HELD_OUT, PERFECT_INDEPENDENT, RECONSTRUCTED, DRIFTING, HELD_OUT, INDEPENDENT)
+CASES = (PERFECT, PERFECT_HELD_OUT, PERFECT_INDEPENDENT, RECONSTRUCTED, DRIFTING, ESTIMATED, HELD_OUT, INDEPENDENT)
 """Of the generated rooms. `perfect`: true surface that was seen, true labels. `reconstructed`: each arm's own map of
 noisy depth and true masks with errors that last (the headline of `make bench-mapping`); `drifting`: the same with poses
-that drift. `held_out`: the same maps as without it, and a library of other shapes that lacks the styles of the room.
+that drift, `estimated` with poses that `poses` estimates from a log. `held_out`: the same maps as without it, and a
+library of other shapes that lacks the styles of the room.
 `independent`: such a library, and rooms by recipes outside of those of tuning, whose things are larger or smaller than
 any model."""
 OF_PERFECT = frozenset({PERFECT, PERFECT_HELD_OUT, PERFECT_INDEPENDENT})
 OF_INDEPENDENT = frozenset({PERFECT_INDEPENDENT, INDEPENDENT})
 OF_HELD_OUT = frozenset({PERFECT_HELD_OUT, HELD_OUT}) | OF_INDEPENDENT
-MAPS = {RECONSTRUCTED: LASTING, HELD_OUT: LASTING, INDEPENDENT: LASTING, DRIFTING: DRIFTING_POSES}
+MAPS = {
+    RECONSTRUCTED: LASTING,
+    HELD_OUT: LASTING,
+    INDEPENDENT: LASTING,
+    DRIFTING: DRIFTING_POSES,
+    ESTIMATED: ESTIMATED_POSES,
+}
 """Case -> case of `mapping`."""

@@ -42,7 +42,7 @@ EXPERIMENT = Experiment(
     title="From a map to a scene in physics: contact graph, CAD replacement, settling",
     simulated="Rooms, walks, pictures and noisy depth; in the cases perfect the map is the true surface that was seen, "
     "in the others the masks are the true ones with errors that last, at a detector's rates on real frames; in "
-    "drifting the poses drift. The case real is of recorded logs.",
+    "drifting the poses drift, in estimated they are estimated. The case real is of recorded logs.",
     knows="The map; the library that the rooms were furnished from (in held_out and independent one that lacks their "
     "styles).",
     does_not_show="How it works with furniture that no library resembles, or with masks of a detector.",
@@ -72,7 +72,7 @@ EXPERIMENT = Experiment(
     quick={"frames": 40},
     jobs=min(2, os.cpu_count() or 1),
     prepare=prepare,
-    steps=("graph", "cad", "urdf", "truth supports", *STEPS),
+    steps=("poses", "graph", "cad", "urdf", "truth supports", *STEPS),
     pairs=(
         ("ours", "thesis"),
         ("ours", "thesis_chosen"),

@@ -13,6 +13,7 @@ from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.mapping.arms import EVERYWHERE, SHOWN, all_arms
 from benchmarks.experiments.mapping.depth_faults import BENDING, BIAS, SHIFT, DepthFaults, drawn_faults
 from benchmarks.experiments.mapping.drift import TRANSLATION_PER_METRE, drifting_poses
+from benchmarks.experiments.mapping.estimated import poses_at
 from benchmarks.experiments.mapping.experiment import EXPERIMENT
 from benchmarks.experiments.mapping.figures_of_merit import MEASURES, pooled_curve
 from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, ranked
@@ -144,3 +145,10 @@ def test_figures_are_there_for_every_arm_and_class_and_the_thesis_beside() -> No
     text = table(results, figures)
     assert f"| {SHOWN}: ours – thesis |" in text and f"| {SHOWN}, b |" in text
     assert "| Han 2024: ours | 35.4 | 80.5 | 43.1 | 58.1 | 45.3 |" in text
+
+
+def test_pictures_where_tracking_was_lost_have_no_pose() -> None:
+    path = np.repeat(np.eye(4)[None], 3, axis=0)
+    path[:, 0, 3] = (1, 2, 3)
+    poses = poses_at(np.array([0.0, 1.0, 2.0]), np.array([0.01, 0.5, 2.0]), path)
+    assert poses[[0, 2], 0, 3].tolist() == [1, 3] and np.isnan(poses[1]).all()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from benchmarks.experiments.planning_tamp.experiment import EXACT, ORACLE, RoomResult, figures
+from benchmarks.experiments.planning_tamp.experiment import EXACT, ORACLE, RoomResult, chain, figures
 from benchmarks.tabulation import Figure
 
 
@@ -58,3 +58,13 @@ def value(found: Mapping[str, Figure | None], key: str) -> float:
     figure = found[key]
     assert figure is not None
     return figure.value
+
+
+def test_with_estimated_poses_the_map_is_made_of_them_and_stands_apart() -> None:
+    inputs = {name: from_what for _, name, from_what, _ in chain(estimated=True)}
+    assert inputs["estimated/panoptic_map"]["trajectory"] == "trajectory" and "panoptic_map" not in inputs
+    made = {"ground_truth"}
+    for name, from_what in inputs.items():
+        assert {source.split("/log")[0] for source in from_what.values()} <= made
+        made.add(name)
+    assert name == "estimated/interactive_scene"
