@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Count, Model
+from schemas.base import Count, Model, Vector3
 from schemas.scene_parts import Box
 
 
@@ -15,10 +15,11 @@ class LanguageRegion(Model):
     """A piece of a splat, or an entity of a panoptic map."""
 
     instance: int = 0
-    """Instance label of an entity; 0 for a piece of a splat."""
+    """Instance label of an entity, or of the one that a piece of a splat belongs to; 0: of none."""
     class_name: str = ""
-    """Class of an entity."""
+    """Class of that entity."""
     box: Box
+    """Of a piece of a thing that a map knows, the thing's."""
     looks: Count
     """Pieces of pictures that its vector is the mean of; 0: no picture shows it, and no word finds it by them."""
 
@@ -69,6 +70,8 @@ class Answer(Model):
     """Node of the contact graph, where one was given."""
     other: str = ""
     """Node that it stands on, in or beside, where the words say so."""
+    place: Vector3 | None = None
+    """On it, where its box has nothing in the middle; None in files of before."""
     box: Box
     gaussians: Count
 

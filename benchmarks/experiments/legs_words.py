@@ -1,13 +1,15 @@
-"""Rooms that are asked: language in a splat (`ours`), the thesis's way to an answer, entities of our map.
+"""Rooms that are asked: language in a splat (`ours`), the thesis's way to an answer, entities of a perfect map.
 
 Cases: `rooms`, generated; `rearranged`, the same with other things on their furniture, elsewhere; the real
 logs of data/annotations/real, asked for what somebody boxed there.
 
-The same pictures and poses; `ours` and `thesis` ask the same field. `thesis` takes the size that fits best in the
-view in which a right thing is seen best (the user's choice there), then the Gaussian that fits best at that size, and
-always answers. `langsplat` is asked the same way, of its three levels instead of sizes; `lerf` in the same view, along
-rays. `entities` asks what pictures show of every entity of a perfect map, which generated rooms have: more than our
-map would be.
+The same pictures and poses; `ours`, `pieces` and `thesis` ask the same field. In `ours` our map names the pieces of the
+splat, in `pieces` nothing does. The map is what `segment` and `fuse` make of the room's log, all its pictures; in real
+logs there is none, as our network knows no photographs. `thesis` takes the size
+that fits best in the view in which a right thing is seen best (the user's choice there), then the Gaussian that fits
+best at that size, and always answers. `langsplat` is asked the same way, of its three levels instead of sizes; `lerf`
+in the same view, along rays. `entities` asks what pictures show of every entity of a perfect map, which generated rooms
+have: more than our map would be.
 """
 
 from __future__ import annotations
@@ -24,9 +26,11 @@ from pydantic import Field
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.experiments.real import EXPECTED
 from benchmarks.generated_rooms import STEPS
+from benchmarks.reporting_seeds import Method, newest
 from benchmarks.splats.langsplat import langsplat
 from benchmarks.splats.lerf import Lerf
-from benchmarks.words.asked import ANNOTATIONS, AskedLog, AskedPlace, AskedRoom, Query
+from benchmarks.words.asked import ANNOTATIONS, NAMED_ROOMS, AskedLog, AskedPlace, AskedRoom, Query
+from schemas.language_map import LanguageMap
 from stages.kit.geometry.boxes import box_iou
 from stages.kit.geometry.cameras import scaled
 from stages.kit.open_words.calibration import BUNDLED as CALIBRATION
@@ -42,10 +46,10 @@ from stages.splat.asked_figures import calibration_error, recall_at_rejection
 from stages.splat.language.pyramid import pyramid
 from stages.splat.ply import read_gaussians
 
-ROOMS = ("kitchen", "office", "bedroom", "room")
-REPORTING = tuple(f"{ROOMS[k % 4]}-{1520 + k}" for k in range(20))
-TUNING = ("kitchen-40", "office-41", "bedroom-42", "room-43")
-"""The probabilities were fitted on them too."""
+GROUP = "asked rooms"
+REPORTING = newest(GROUP).seeds
+TUNING = NAMED_ROOMS
+"""The probabilities were fitted on them too, and our network has not learned from them."""
 GENERATED, REARRANGED = "rooms", "rearranged"
 MADE = (GENERATED, REARRANGED)
 LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))
@@ -120,7 +124,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
 def asked(room: AskedPlace, arm: str, lerf_steps: int) -> Asked:
     """Return what an arm makes of a room's queries."""
     encoder = open_encoder(EncoderParameters.model_validate({}), None)
-    language = room.entities if arm == "entities" and isinstance(room, AskedRoom) else room.language
+    language = language_of(room, arm)
     finder = Finder(language, encoder)
     always = always_answering(room, finder, arm, lerf_steps)
     present, absent = room.queries
@@ -159,13 +163,20 @@ def asked(room: AskedPlace, arm: str, lerf_steps: int) -> Asked:
     )
 
 
+def language_of(room: AskedPlace, arm: str) -> LanguageMap:
+    """Return the language map that an arm asks."""
+    if arm == "entities" and isinstance(room, AskedRoom):
+        return room.entities
+    return room.nameless if arm == "pieces" else room.language
+
+
 def places(room: AskedPlace, finder: Finder, query: Query) -> list[Place]:
     """Return what a finder answers."""
     result = []
     for found in finder.find(query.text):
         box = finder.info.regions[found.region].box
         overlaps = any(box_iou(box, room.boxes[k]) >= BOX_OVERLAP for k in query.right)
-        result.append(Place(np.array(box.center), found.probability, overlaps))
+        result.append(Place(finder.place(found.region), found.probability, overlaps))
     return result
 
 
@@ -283,13 +294,14 @@ EXPERIMENT = Experiment(
     "whose segments LangSplat has. Words that people choose: they are of the encoder's own.",
     arms={
         "ours": "ours",
+        "pieces": "ours without a map",
         "thesis": "thesis's method",
         "entities": "entities of a perfect map",
         "langsplat": "LangSplat",
         "lerf": "LERF",
     },
     cases=(*MADE, *LOGS),
-    runs=lambda arm, case: arm != "entities" or case in MADE,
+    runs=lambda arm, case: arm not in ("entities", "pieces") or case in MADE,
     measure=measure,
     record=Asked,
     measures={
@@ -305,13 +317,15 @@ EXPERIMENT = Experiment(
     },
     tuning=TUNING,
     reporting=REPORTING,
+    seed_group=GROUP,
+    method=Method(("segment", "fuse", "splat build", "splat language", "splat query"), {"ours": {}, "pieces": {}}),
     seeds_of=seeds_of,
     together=lambda trial: (trial.case, trial.seed),
-    pairs=(("ours", "thesis"), ("ours", "entities"), ("ours", "langsplat"), ("ours", "lerf")),
+    pairs=(("ours", "pieces"), ("ours", "thesis"), ("ours", "entities"), ("ours", "langsplat"), ("ours", "lerf")),
     compared=("recall_3d", "recall_at_rejection", "recall_2d", "precision", "absent_rejected"),
     parameters=WordsParameters,
     places=frozenset({"data"}),
     inputs=inputs,
     quick={"rooms": 2, "steps": 100, "lerf_steps": 30},
-    steps=(*STEPS, "splat build", "splat language", "splat label"),
+    steps=(*STEPS, "segment", "fuse", "splat build", "splat language", "splat label"),
 )

@@ -20,13 +20,27 @@ from scipy.optimize import minimize
 
 from benchmarks.experiments.real import EXPECTED
 from benchmarks.options import Recipe, asked
-from benchmarks.words.asked import AskedLog, AskedRoom
+from benchmarks.words.asked import NAMED_ROOMS, AskedLog, AskedRoom
 from schemas.language_map import LanguageMap
-from stages.kit.open_words.calibration import BUNDLED, SHORTEST, WEIGHTS, Calibration, fitted, log_odds, recognised
+from stages.kit.open_words.calibration import (
+    BUNDLED,
+    NAMED_SPLAT,
+    SHORTEST,
+    WEIGHTS,
+    Calibration,
+    fitted,
+    log_odds,
+    recognised,
+)
 from stages.kit.open_words.embedded import EmbeddedEncoder
-from stages.kit.open_words.finding import Finder
+from stages.kit.open_words.finding import Finder, class_vectors
+from stages.kit.open_words.relevancy import TEMPERATURE
 
-ROOMS = {"splat": ("kitchen-40", "office-41"), "panoptic_map": ("kitchen-40", "office-41", "bedroom-42", "room-43")}
+ROOMS = {
+    "splat": ("kitchen-40", "office-41"),
+    "panoptic_map": ("kitchen-40", "office-41", "bedroom-42", "room-43"),
+    NAMED_SPLAT: NAMED_ROOMS,
+}
 LOGS = ("kitchen", "office")
 """Real ones that were looked at."""
 LEAST_SHARE = 0.01
@@ -50,33 +64,39 @@ def logistic(inputs: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def inputs_of(finder: Finder, text: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return (R, 5): one, log odds of looks and field, logarithm of the edge and its square; and which are seen."""
+    """Return (R, 7): one, log odds of looks and field, logarithm of the edge and its square, whether a region has a
+    class and how alike that and the text are; and which are seen."""
     found = finder.fits(text)
     e = np.log(np.maximum(finder.index.extents, SHORTEST))
     field = log_odds(found.field) if found.field is not None else np.zeros(len(e))
-    return np.stack([np.ones(len(e)), log_odds(found.looks), field, e, e**2], axis=1), found.looks > 0
+    alike = TEMPERATURE * (class_vectors(finder.info, finder.encoder) @ finder.encoder.texts((text,))[0])
+    known = (finder.info.source == "splat") & ~np.isnan(alike)
+    columns = [np.ones(len(e)), log_odds(found.looks), field, e, e**2, known, np.where(known, alike, 0.0)]
+    return np.stack(columns, axis=1), found.looks > 0
 
 
 def fit(rooms: list[AskedRoom], source: str) -> Calibration:
     """Return what the rooms' queries say of a source."""
     encoder = EmbeddedEncoder()
-    finders = [Finder(room.language if source == "splat" else room.entities, encoder) for room in rooms]
+    language = {"splat": "nameless", "panoptic_map": "entities", NAMED_SPLAT: "language"}[source]
+    finders = [Finder(getattr(room, language), encoder) for room in rooms]
     inputs, right = [], []
     for room, finder in zip(rooms, finders, strict=True):
-        centers = [np.array(region.box.center) for region in finder.info.regions]
+        places = [finder.place(k) for k in range(len(finder.info.regions))]
         for query in (*room.queries[0], *room.queries[1]):
             rows, seen = inputs_of(finder, query.text)
             inputs.append(rows[seen])
-            right.append(np.array([room.at(centers[k], query) for k in np.flatnonzero(seen)], float))
+            right.append(np.array([room.at(places[k], query) for k in np.flatnonzero(seen)], float))
     ranking = logistic(np.concatenate(inputs), np.concatenate(right))
     scores, truths = [], []
     for room, finder in zip(rooms, finders, strict=True):
         finder.calibration = fitted([float(w) for w in ranking])
+        finder.classes = class_vectors(finder.info, encoder) if source == NAMED_SPLAT else None
         for query in (*room.queries[0], *room.queries[1]):
             rows, _ = inputs_of(finder, query.text)
             for found in finder.find(query.text)[:FIRST]:
                 scores.append(rows[found.region] @ ranking)
-                truths.append(room.at(np.array(finder.info.regions[found.region].box.center), query))
+                truths.append(room.at(finder.place(found.region), query))
     shift, slope = logistic(np.stack([np.ones(len(scores)), scores], axis=1), np.array(truths, float))
     weights = slope * ranking
     weights[0] += shift
@@ -96,11 +116,11 @@ def of_places(rooms: list[AskedRoom], logs: list[AskedLog]) -> tuple[float, floa
     strange = [recognised_by(encoder, log.language) for log in logs]
     finders = [Finder(log.language, encoder) for log in logs]
     firsts = [
-        (log, query, finder.find(query.text)[0])
+        (log, query, finder.place(finder.find(query.text)[0].region))
         for log, finder in zip(logs, finders, strict=True)
         for query in (*log.queries[0], *log.queries[1])
     ]
-    right = [log.at(np.array(log.language.info.regions[each.region].box.center), query) for log, query, each in firsts]
+    right = [log.at(place, query) for log, query, place in firsts]
     least = np.sqrt(min(known) * max(strange))
     return round(float(least), 3), round(max(float(np.mean(right)), LEAST_SHARE), 3)
 
@@ -126,7 +146,7 @@ def log_of(options: Options, name: str) -> AskedLog:
 
 
 def main() -> None:
-    """Fit both sources."""
+    """Fit every source."""
     options = asked(Options)
     lines = []
     rooms = [room_of(options, name) for name in ROOMS["splat"][: 1 if options.quick else None]]

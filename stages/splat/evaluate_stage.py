@@ -33,7 +33,8 @@ class First:
     probability: float
     """0: no place at all."""
     right: bool
-    center: tuple[float, float, float] | None
+    place: np.ndarray | None
+    """(3,) [m]"""
 
 
 def run(
@@ -51,10 +52,10 @@ def run(
     firsts = []
     for number, (text, boxes) in enumerate(context.progress.track(texts, total=len(texts), description="queries")):
         found = next(iter(finder.find(text)), None)
-        center = None if found is None else info.regions[found.region].box.center
-        right = center is not None and any(points_in_box(box, np.array([center]), MARGIN)[0] for box in boxes)
+        place = None if found is None else finder.place(found.region)
+        right = place is not None and any(points_in_box(box, place[None], MARGIN)[0] for box in boxes)
         chance = 0.0 if found is None else round(found.probability, 6)
-        firsts.append(First(text, number < len(asked.there), chance, bool(right), center))
+        firsts.append(First(text, number < len(asked.there), chance, bool(right), place))
     least = parameters.least_probability
     file = MetricsFile(label=encoder.label, metrics=figures(firsts, least), notes=_notes(finder, firsts))
     file.write(context.output / "metrics.json")
@@ -104,7 +105,13 @@ def answers_table(firsts: list[First], least: float) -> Table:
         answered = first.probability >= least
         verdict = ("right" if first.right else "wrong") if answered else ("missed" if first.there else "rejected")
         rows.append(
-            (first.text, "yes" if first.there else "no", first.probability, verdict, *(first.center or [None] * 3))
+            (
+                first.text,
+                "yes" if first.there else "no",
+                first.probability,
+                verdict,
+                *([None] * 3 if first.place is None else first.place.tolist()),
+            )
         )
     columns = ("text", "there", "probability", "answer", "x [m]", "y [m]", "z [m]")
     note = f"An answer counts from probability {least:g} on; nothing that is not there has a right one."

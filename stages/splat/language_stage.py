@@ -10,8 +10,12 @@ import torch
 
 from schemas.errors import BadInput
 from schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
+from schemas.panoptic_map import PanopticMap
+from schemas.scene_parts import Box
 from schemas.sequence import Sequence
 from schemas.splat import Splat
+from schemas.vocabulary import load_vocabulary
+from stages.kit.formats.entity_meshes import load_entity_mesh
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.boxes import minimum_box
 from stages.kit.geometry.transforms import inverse
@@ -21,6 +25,7 @@ from stages.kit.open_words.vectors import Vectors, write_vectors
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Context
 from stages.splat.build_stage import rasterizer_of
+from stages.splat.language.entities import NONE, entity_of, nearest_entities
 from stages.splat.language.field import LanguageField
 from stages.splat.language.learning import learn, lesson_of
 from stages.splat.language.looks import Sight, looks
@@ -38,9 +43,16 @@ COVERED = 0.5
 
 
 def run(
-    splat: Splat, sequence: Sequence, weights: Path | None, *, parameters: LanguageParameters, context: Context
+    splat: Splat,
+    sequence: Sequence,
+    panoptic_map: PanopticMap | None,
+    weights: Path | None,
+    *,
+    parameters: LanguageParameters,
+    context: Context,
 ) -> LanguageMap:
-    """Learn a language field over a splat, and keep what pictures show of each of its pieces.
+    """Learn a language field over a splat, and keep what pictures show of each of its pieces; of a panoptic map of the
+    same place, which entity each belongs to.
 
     The outcome is `empty` for a splat without Gaussians. Raises BadInput for another sequence.
     """
@@ -75,8 +87,15 @@ def run(
     with context.progress.step("pieces"):
         numbered = _numbered(pieces(gaussians))
         order, starts = members_of(numbered, int(numbered.max(initial=-1)) + 1)
-        members = [gaussians.means[part].astype(float) for part in np.split(order, starts[1:-1])] if len(order) else []
+        parts = np.split(order, starts[1:-1]) if len(order) else []
+        members = [gaussians.means[part].astype(float) for part in parts]
         vectors, counts = looks(members, sights, encoder)
+    regions = [
+        LanguageRegion(box=minimum_box(points[no_strays(points)]), looks=int(count))
+        for points, count in zip(members, counts, strict=True)
+    ]
+    if panoptic_map is not None:
+        regions = _named(regions, parts, gaussians.means, panoptic_map)
     at_sizes = [field.vectors(gaussians.means, size) for size in SIZES]
     opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
     every = np.stack(at_sizes, axis=1) if len(gaussians) else np.zeros((0, len(SIZES), encoder.width), np.float32)
@@ -89,19 +108,39 @@ def run(
         gaussians=len(gaussians),
         steps=parameters.steps if losses else 0,
         loss=float(np.mean(losses)) if losses else 0.0,
-        regions=tuple(
-            LanguageRegion(box=minimum_box(points[no_strays(points)]), looks=int(count))
-            for points, count in zip(members, counts, strict=True)
-        ),
+        regions=tuple(regions),
     )
     info.write(context.output / "language.json")
     summary = {
         "gaussians": len(gaussians),
         "regions": len(members),
+        **({"named": sum(bool(region.instance) for region in regions)} if panoptic_map is not None else {}),
         "pictures": len(lessons),
         "loss": round(info.loss, 4),
     }
     return LanguageMap(context.output, outcome="ok" if members else "empty", summary=summary)
+
+
+def _named(
+    regions: list[LanguageRegion], parts: list[np.ndarray], means: np.ndarray, panoptic_map: PanopticMap
+) -> list[LanguageRegion]:
+    """Return regions with the entities that their Gaussians (`parts`) belong to: instance, class and, of a thing, its
+    box; walls and floors have pieces, which have boxes of their own."""
+    entities = [entity for entity in panoptic_map.info.entities if entity.vertices]
+    surfaces = [np.asarray(load_entity_mesh(panoptic_map.path(entity.mesh)).vertices) for entity in entities]
+    owners, classes, boxes = nearest_entities(means, surfaces), load_vocabulary(), dict[int, Box]()
+    named = []
+    for region, part in zip(regions, parts, strict=True):
+        number = entity_of(owners[part])
+        if number == NONE:
+            named.append(region)
+            continue
+        entity = entities[number]
+        told: dict[str, object] = {"instance": entity.instance, "class_name": entity.class_name}
+        if not classes.by_name(entity.class_name).is_layout:
+            told["box"] = boxes.setdefault(number, minimum_box(surfaces[number]))
+        named.append(region.model_copy(update=told))
+    return named
 
 
 def _field(means: np.ndarray, width: int, seed: int) -> LanguageField:

@@ -124,12 +124,12 @@ RENDER = Stage(
 )
 LANGUAGE = Stage(
     name="splat language",
-    version=2,
+    version=3,
     summary="Keep in a splat what its pictures say, so that words find places",
     parameters=LanguageParameters,
-    reads={"splat": Splat, "sequence": Sequence, "weights": WEIGHTS},
+    reads={"splat": Splat, "sequence": Sequence, "panoptic_map": Optionally(PanopticMap), "weights": WEIGHTS},
     writes=LanguageMap,
-    libraries=(*LIBRARIES, "torch"),
+    libraries=(*LIBRARIES, "trimesh", "torch"),
     module="language_stage",
     extras=EXTRAS,
     data_files=word_files,
@@ -152,7 +152,7 @@ LABEL = Stage(
 )
 QUERY = Stage(
     name="splat query",
-    version=4,
+    version=5,
     summary="Find what words ask for, with probabilities, or say that the room has none",
     parameters=QueryParameters,
     reads={"language": LanguageMap, "contact_graph": Optionally(ContactGraph), "weights": WEIGHTS},
@@ -166,7 +166,7 @@ QUERY = Stage(
 )
 EVALUATE = Stage(
     name="splat evaluate",
-    version=1,
+    version=2,
     summary="Ask a place for what somebody knows is there, and is not, and count what is found and rejected",
     parameters=EvaluateParameters,
     reads={"language": LanguageMap, "queries": QUERIES, "weights": WEIGHTS},

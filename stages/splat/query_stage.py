@@ -65,7 +65,7 @@ def run(
     summary: dict[str, object] = {"answers": len(kept)}
     if kept:
         summary["best"] = round(kept[0].probability, 3)
-        summary["center"] = [round(v, 3) for v in info.regions[kept[0].region].box.center]
+        summary["place"] = [round(float(v), 3) for v in finder.place(kept[0].region)]
     if finder.is_strange:
         context.logger.warning(
             "its pictures are near nothing that the encoder has learned (%.2f, from %.2f on they count as known): "
@@ -92,6 +92,7 @@ def _check_same_map(language: LanguageMap, graph: ContactGraphFile) -> None:
 
 def _answer(finder: Finder, found: Found, nodes: dict[int, str]) -> Answer:
     region = finder.info.regions[found.region]
+    x, y, z = (round(float(v), 4) for v in finder.place(found.region))
     return Answer(
         region=found.region,
         probability=round(found.probability, 6),
@@ -101,6 +102,7 @@ def _answer(finder: Finder, found: Found, nodes: dict[int, str]) -> Answer:
         instance=region.instance,
         node=nodes.get(region.instance, ""),
         other=nodes.get(found.other, ""),
+        place=(x, y, z),
         box=region.box,
         gaussians=len(finder.index.members(found.region)),
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from schemas.language_map import LanguageMapFile
 from stages.kit.open_words.calibration import Calibration
-from stages.kit.open_words.relevancy import margins, relevancy
+from stages.kit.open_words.relevancy import TEMPERATURE, margins, relevancy
 from stages.kit.open_words.vectors import Vectors
 
 MOST_ANSWERS = 20
@@ -86,9 +86,15 @@ def members_of(pieces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fits(
-    vectors: Vectors, info: LanguageMapFile, index: RegionIndex, rows: np.ndarray, calibration: Calibration
+    vectors: Vectors,
+    info: LanguageMapFile,
+    index: RegionIndex,
+    rows: np.ndarray,
+    calibration: Calibration,
+    classes: np.ndarray | None = None,
 ) -> Fits:
-    """Return how well the text rows[0] fits, against the canonical phrases rows[1:]."""
+    """Return how well the text rows[0] fits, against the canonical phrases rows[1:]; `classes` (R, width): vectors of
+    the names of the regions' classes, NaN where they have none."""
     seen = np.array([region.looks > 0 for region in info.regions], bool)
     of_looks = np.where(seen, relevancy(margins(vectors.regions, rows)), 0.0)
     field = sizes = at_best = None
@@ -99,7 +105,8 @@ def fits(
         weights = vectors.opacities
         field = index.sums(weights * at_best) / np.maximum(index.sums(weights), 1e-9)
         sizes = np.rint(index.sums(best.astype(float)) / np.maximum(np.diff(index.starts), 1)).astype(int)
-    probabilities = calibration.probabilities(of_looks, field, index.extents)
+    alike = None if classes is None else TEMPERATURE * (classes @ rows[0])
+    probabilities = calibration.probabilities(of_looks, field, index.extents, alike)
     if info.source == "panoptic_map":
         probabilities = explained(probabilities, index)
     return Fits(of_looks, field, sizes, probabilities, at_best)
@@ -132,7 +139,7 @@ def ranked(info: LanguageMapFile, index: RegionIndex, probabilities: np.ndarray,
 def _known_place(info: LanguageMapFile, index: RegionIndex, region: int, kept: list[int]) -> bool:
     """Whether a region shares its box or its Gaussians with one of those kept; entities of a map are things of their
     own."""
-    if not kept or info.regions[region].instance:
+    if not kept or info.source == "panoptic_map":
         return False
     edges = np.minimum(index.highs[region], index.highs[kept]) - np.maximum(index.lows[region], index.lows[kept])
     shared = np.prod(np.maximum(edges, 0), axis=1)

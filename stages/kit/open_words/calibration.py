@@ -19,6 +19,8 @@ from stages.kit.open_words.encoder import Encoder
 FILE = "words/calibration.toml"
 """Below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
+NAMED_SPLAT = "named splat"
+"""Source of fits for splats whose pieces have classes of a panoptic map."""
 CLOSEST = 1e-4
 SHORTEST = 0.01
 """Edge of a region, at least [m]."""
@@ -27,7 +29,8 @@ SHORTEST = 0.01
 @dataclass(frozen=True)
 class Calibration:
     """probability = logistic(bias + looks x log odds of the looks + field x log odds of the field + extent x e +
-    extent_squared x e^2), where e is the logarithm of the greatest edge of a region [m]."""
+    extent_squared x e^2 + class), where e is the logarithm of the greatest edge of a region [m]. Where a map names the
+    region's class, class = class_bias + class_name x (how alike text and name are); 0 elsewhere."""
 
     bias: float
     looks: float
@@ -39,13 +42,20 @@ class Calibration:
     """A place of which the encoder recognises less (`recognised`) is strange to it ..."""
     strange: float = 1.0
     """... and a probability there is this share of what was fitted elsewhere."""
+    class_bias: float = 0.0
+    class_name: float = 0.0
 
-    def probabilities(self, looks: np.ndarray, field: np.ndarray | None, extents: np.ndarray) -> np.ndarray:
-        """Return (R,) of relevancies (R,) and edges (R,); those of regions that no picture shows are 0."""
+    def probabilities(
+        self, looks: np.ndarray, field: np.ndarray | None, extents: np.ndarray, alike: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return (R,) of relevancies (R,), edges (R,) and how alike text and class are (R,), NaN where a region has no
+        class; those of regions that no picture shows are 0."""
         e = np.log(np.maximum(extents, SHORTEST))
         odds = self.bias + self.looks * log_odds(looks) + self.extent * e + self.extent_squared * e**2
         if field is not None:
             odds = odds + self.field * log_odds(field)
+        if alike is not None:
+            odds = odds + np.where(np.isnan(alike), 0.0, self.class_bias + self.class_name * np.nan_to_num(alike))
         return np.where(looks > 0, 1.0 / (1.0 + np.exp(-odds)), 0.0)
 
 
@@ -67,7 +77,7 @@ def recognised(regions: np.ndarray, extents: np.ndarray, encoder: Encoder) -> fl
 
 UNFITTED = Calibration(0.0, 1.0, 0.0, 0.0, 0.0, fitted=False)
 """Of an encoder that nothing was fitted for: the relevancy of the looks."""
-WEIGHTS = ("bias", "looks", "field", "extent", "extent_squared")
+WEIGHTS = ("bias", "looks", "field", "extent", "extent_squared", "class_bias", "class_name")
 OF_PLACES = ("least_recognised", "strange")
 
 
@@ -79,13 +89,15 @@ def log_odds(shares: np.ndarray) -> np.ndarray:
 
 def fitted(weights: Sequence[float], least_recognised: float = -1.0, strange: float = 1.0) -> Calibration:
     """Return the calibration with weights in the order of WEIGHTS. Raises ValueError for another number of them."""
-    bias, looks, field, extent, extent_squared = weights
-    return Calibration(bias, looks, field, extent, extent_squared, True, least_recognised, strange)
+    bias, looks, field, extent, extent_squared, class_bias, class_name = weights
+    return Calibration(
+        bias, looks, field, extent, extent_squared, True, least_recognised, strange, class_bias, class_name
+    )
 
 
 def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibration:
-    """Return what was fitted for a source (`splat`, `panoptic_map`) and the label of an encoder; UNFITTED where nothing
-    was. Raises BadInput for a damaged file."""
+    """Return what was fitted for a source (`splat`, NAMED_SPLAT, `panoptic_map`) and the label of an encoder; UNFITTED
+    where nothing was. Raises BadInput for a damaged file."""
     for entry in file_toml(path).get("fit", ()):
         try:
             if (entry["source"], entry["encoder"]) == (source, encoder):

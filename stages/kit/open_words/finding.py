@@ -7,13 +7,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
-from schemas.language_map import LanguageMap
+from schemas.language_map import LanguageMap, LanguageMapFile
+from schemas.vocabulary import UNNAMED
 from stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
-from stages.kit.open_words.calibration import Calibration, calibration_of, recognised
+from stages.kit.open_words.calibration import NAMED_SPLAT, Calibration, calibration_of, recognised
 from stages.kit.open_words.encoder import Encoder
 from stages.kit.open_words.relations import related
 from stages.kit.open_words.relevancy import query_rows
 from stages.kit.open_words.vectors import read_vectors
+
+
+def source_of(info: LanguageMapFile) -> str:
+    """Return which fit a language map needs: a splat whose pieces a panoptic map names has one of its own."""
+    return NAMED_SPLAT if info.source == "splat" and any(region.class_name for region in info.regions) else info.source
+
+
+def class_vectors(info: LanguageMapFile, encoder: Encoder) -> np.ndarray:
+    """Return (R, width) vectors of the names of regions' classes; NaN where a region has none, or is but an object."""
+    names = sorted({region.class_name for region in info.regions} - {"", UNNAMED})
+    result = np.full((len(info.regions), encoder.width), np.nan, np.float32)
+    if names:
+        vectors = dict(zip(names, encoder.texts([name.replace("_", " ") for name in names]), strict=True))
+        for row, region in zip(result, info.regions, strict=True):
+            row[:] = vectors.get(region.class_name, np.nan)
+    return result
 
 
 @dataclass(frozen=True)
@@ -40,7 +57,8 @@ class Finder:
         self.info, self.encoder = language.info, encoder
         self.vectors = read_vectors(language)
         self.index = region_index(self.vectors.pieces, self.info)
-        self.calibration = calibration or calibration_of(self.info.source, self.info.encoder)
+        self.calibration = calibration or calibration_of(source_of(self.info), self.info.encoder)
+        self.classes = class_vectors(self.info, encoder) if self.calibration.class_name else None
         self.recognised: float | None = None
         if self.calibration.fitted:
             self.recognised = recognised(self.vectors.regions, self.index.extents, encoder)
@@ -48,7 +66,9 @@ class Finder:
 
     def fits(self, text: str) -> Fits:
         """Return how well a text fits every region."""
-        found = fits(self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration)
+        found = fits(
+            self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration, self.classes
+        )
         believed = self.calibration.strange if self.is_strange else 1.0
         return replace(found, probabilities=believed * found.probabilities)
 
@@ -71,6 +91,14 @@ class Finder:
                     best[number[a]] = (chance, b)
         order = sorted(best, key=lambda region: (-best[region][0], region))[:MOST_ANSWERS]
         return [replace(self._found(first, k), probability=best[k][0], other=best[k][1]) for k in order]
+
+    def place(self, region: int) -> np.ndarray:
+        """Return (3,) where an answer points [m]: of the Gaussians of a piece the one nearest their median, as the
+        middle of a box about a corner of walls lies in the air; of an entity the middle of its box."""
+        points = self.vectors.means[self.index.members(region)].astype(float)
+        if not len(points):
+            return np.array(self.info.regions[region].box.center)
+        return points[int(np.linalg.norm(points - np.median(points, axis=0), axis=1).argmin())]
 
     def _found(self, found: Fits, region: int) -> Found:
         field, size = None, None

@@ -109,8 +109,8 @@ def test_probabilities_rise_with_relevancy_and_unseen_regions_have_none(tmp_path
     np.testing.assert_allclose(log_odds(np.array([0.5, 2.0])), [0, np.log(0.9999 / 1e-4)], rtol=1e-6)
     path = tmp_path / "calibration.toml"
     path.write_text(
-        'fit = [{source="splat", encoder="e", bias=1, looks=2, field=3, extent=0, extent_squared=0, '
-        "least_recognised=0.1, strange=0.2}]"
+        'fit = [{source="splat", encoder="e", bias=1, looks=2, field=3, extent=0, extent_squared=0, class_bias=0, '
+        "class_name=0, least_recognised=0.1, strange=0.2}]"
     )
     assert calibration_of("splat", "e", path).looks == 2 and calibration_of("splat", "e", path).strange == 0.2
     assert calibration_of("splat", "other", path) == UNFITTED

@@ -7,18 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import trimesh
 
+from benchmarks.perfect_maps import write_map
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.errors import BadInput, UsageError
 from schemas.evaluation import Evaluation
 from schemas.language_map import LanguageMap
+from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence
 from schemas.splat import Splat
+from schemas.vocabulary import UNNAMED
 from stages.kit.geometry.boxes import points_in_box
 from stages.kit.geometry.transforms import transform_from
-from stages.kit.open_words.calibration import UNFITTED, Calibration
-from stages.kit.open_words.finding import Finder
+from stages.kit.open_words.calibration import NAMED_SPLAT, UNFITTED, Calibration
+from stages.kit.open_words.finding import Finder, class_vectors, source_of
 from stages.kit.open_words.relevancy import margins, query_rows
 from stages.kit.open_words.vectors import read_vectors
 from stages.kit.rendering.splatting.compiled import CompiledRasterizer
@@ -26,6 +30,7 @@ from stages.kit.rendering.splatting.gaussians import Gaussians
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.splat import evaluate_stage, language_stage, query_stage
 from stages.splat.asked_figures import calibration_error, recall_at_rejection
+from stages.splat.language.entities import NONE, entity_of, nearest_entities
 from stages.splat.language.field import LanguageField
 from stages.splat.language.learning import learn, lesson_of
 from stages.splat.language.looks import Sight, looks
@@ -138,9 +143,9 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> tuple[Sequence, Splat]:
     return sequence, build(sequence, folder / "splat")
 
 
-def language_of(room: tuple[Sequence, Splat], out: Path) -> LanguageMap:
+def language_of(room: tuple[Sequence, Splat], out: Path, panoptic_map: PanopticMap | None = None) -> LanguageMap:
     parameters = LanguageParameters(steps=5, most_views=3)
-    return language_stage.run(room[1], room[0], None, parameters=parameters, context=context(out))
+    return language_stage.run(room[1], room[0], panoptic_map, None, parameters=parameters, context=context(out))
 
 
 @pytest.fixture(scope="module")
@@ -186,7 +191,7 @@ def evaluated(language: LanguageMap, folder: Path, toml: str, **options: float) 
 
 def test_what_somebody_knows_is_held_against_the_answers(language: LanguageMap, colors: None, tmp_path: Path) -> None:
     places = {name: Finder(language, ColorEncoder()).find(name)[0] for name in ("red", "blue")}
-    x, y, z = language.info.regions[places["red"].region].box.center
+    x, y, z = Finder(language, ColorEncoder()).place(places["red"].region)
     there = '[[there]]\ntext = "{}"\nboxes = [{{center = [{}, {}, {}], size = [0.1, 0.1, 0.1]}}]\n'
     told = there.format("red", x, y, z) + there.format("blue", x + 100, y, z)
     metrics = evaluated(language, tmp_path / "all", told, least_probability=0.0).info.metrics
@@ -223,6 +228,55 @@ def test_recall_is_looked_at_where_nine_of_ten_absent_texts_are_rejected() -> No
     assert recall_at_rejection(np.zeros(0), np.zeros(0, bool), absent) is None
     assert calibration_error(np.array([0.75, 0.75, 0.25, 0.25]), np.array([1, 1, 0, 0])) == pytest.approx(0.25)
     assert calibration_error(np.zeros(0), np.zeros(0)) is None
+
+
+def test_a_piece_belongs_to_the_entity_at_whose_surface_most_of_it_lies() -> None:
+    low, high = np.zeros((5, 3)), np.full((3, 3), 1.0)
+    means = np.array([[0.0, 0, 0.04], [0, 0, 0.06], [1, 1, 0.98], [1, 1, 1.02]])
+    owners = nearest_entities(means, [low, high])
+    assert owners.tolist() == [0, NONE, 1, 1]
+    assert entity_of(owners) == 1 and entity_of(owners[:2]) == 0 and entity_of(owners[:3]) == NONE
+    assert entity_of(owners[1:2]) == NONE and nearest_entities(means, []).tolist() == 4 * [NONE]
+
+
+def test_a_map_names_the_pieces_of_a_splat(
+    room: tuple[Sequence, Splat], language: LanguageMap, colors: None, tmp_path: Path
+) -> None:
+    means, info = read_vectors(language).means.astype(float), language.info
+    biggest = int(np.argmax([np.prod(region.box.size) for region in info.regions]))
+    finder = Finder(language, ColorEncoder())
+    points = means[finder.index.members(biggest)]
+    around = trimesh.Trimesh(points, np.array([[0, 1, 2]]), process=False)
+    for name, is_layout in (("cup", False), ("wall", True)):
+        named = language_of(room, tmp_path / name, write_map(tmp_path / f"map_{name}", {7: around}, {7: name}))
+        region = named.info.regions[biggest]
+        assert (region.instance, region.class_name) == (7, name)
+        assert (region.box == info.regions[biggest].box) == is_layout
+        others = [k for k, each in enumerate(named.info.regions) if not each.instance]
+        assert others and all(named.info.regions[k] == info.regions[k] for k in others)
+        assert source_of(named.info) == NAMED_SPLAT and source_of(info) == "splat"
+
+
+def test_the_class_of_a_piece_counts_where_it_was_fitted(language: LanguageMap, tmp_path: Path) -> None:
+    first = Finder(language, ColorEncoder()).find("red")[0].region
+    told = [region.model_copy(update={"class_name": "red"}) for region in language.info.regions]
+    told[first] = told[first].model_copy(update={"class_name": "blue"})
+    told.append(told[first].model_copy(update={"class_name": UNNAMED}))
+    info = language.info.model_copy(update={"regions": tuple(told)})
+    vectors = class_vectors(info, ColorEncoder())
+    np.testing.assert_allclose(vectors[first], ColorEncoder().texts(("blue",))[0])
+    assert np.isnan(vectors[-1]).all()
+    fitted = Calibration(0.0, 1.0, 0.0, 0.0, 0.0, class_bias=-1.0, class_name=0.5)
+    looks, alike = np.full(3, 0.5), np.array([0.0, 10.0, np.nan])
+    chances = fitted.probabilities(looks, None, np.ones(3), alike)
+    np.testing.assert_allclose(chances, 1 / (1 + np.exp([1.0, -4.0, 0.0])))
+
+
+def test_an_answer_points_at_the_thing_and_not_into_the_air(language: LanguageMap) -> None:
+    finder = Finder(language, ColorEncoder())
+    for number in range(len(language.info.regions)):
+        members = finder.vectors.means[finder.index.members(number)]
+        assert np.abs(members - finder.place(number)).sum(axis=1).min() < 1e-6
 
 
 def test_in_a_strange_place_hardly_anything_is_believed(language: LanguageMap) -> None:
