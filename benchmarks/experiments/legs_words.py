@@ -4,12 +4,11 @@ Cases: `rooms`, generated; `rearranged`, the same with other things on their fur
 logs of data/annotations/real, asked for what somebody boxed there.
 
 The same pictures and poses; `ours`, `pieces` and `thesis` ask the same field. In `ours` our map names the pieces of the
-splat, in `pieces` nothing does. The map is what `segment` and `fuse` make of the room's log, all its pictures; in real
-logs there is none, as our network knows no photographs. `thesis` takes the size
-that fits best in the view in which a right thing is seen best (the user's choice there), then the Gaussian that fits
-best at that size, and always answers. `langsplat` is asked the same way, of its three levels instead of sizes; `lerf`
-in the same view, along rays. `entities` asks what pictures show of every entity of a perfect map, which generated rooms
-have: more than our map would be.
+splat, in `pieces` nothing does. The map is what `segment` and `fuse` make of all pictures of the room's log; in real
+logs there is none, as our network knows no photographs. `thesis` takes the size that fits best in the view in which a
+right thing is seen best (the user's choice there), then the Gaussian that fits best at that size, and always answers.
+`langsplat` is asked the same way, of its three levels instead of sizes; `lerf` in the same view, along rays. `entities`
+asks what pictures show of every entity of a perfect map, which generated rooms have: more than our map would be.
 """
 
 from __future__ import annotations
