@@ -50,6 +50,15 @@ def with_agreed_names(
     return result, replace(labelled, class_id=class_id)
 
 
+def without_claimed(
+    scores: Mapping[int, Mapping[int, float]], entities: Sequence[ExtractedEntity]
+) -> dict[int, Mapping[int, float]]:
+    """Return the scores of the segment labels that no entity has: what masks said of the others they said of that
+    entity, and not of what geometry cut from it or of what lies apart from it."""
+    claimed = {label for entity in entities for label in entity.segments}
+    return {label: row for label, row in scores.items() if label not in claimed}
+
+
 def said_of(
     segments: np.ndarray, scores: Mapping[int, Mapping[int, float]], sightings: Mapping[int, int]
 ) -> dict[int, float]:

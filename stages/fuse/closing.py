@@ -9,7 +9,7 @@ import numpy as np
 from schemas.base import as_vector
 from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.vocabulary import UNNAMED, Vocabulary
-from stages.fuse.agreed_names import with_agreed_names
+from stages.fuse.agreed_names import with_agreed_names, without_claimed
 from stages.fuse.counts import TripleCounts
 from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
 from stages.fuse.impossible_names import without_impossible_names
@@ -124,6 +124,7 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
                 entities, labelled = by_geometry(surface, entities, labelled, classes, **size, sure=sure)
             else:
                 told = share_told(labelled, scores, mapper.sightings)
+                scores = without_claimed(scores, entities)
                 entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=told)
             least = parameters.minimum_prediction_share
             entities, labelled = with_agreed_names(

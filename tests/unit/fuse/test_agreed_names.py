@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from schemas.vocabulary import load_vocabulary
-from stages.fuse.agreed_names import said_of, with_agreed_names
+from stages.fuse.agreed_names import said_of, with_agreed_names, without_claimed
 from stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import class_id
@@ -53,3 +55,8 @@ def test_a_thing_of_another_size_has_no_name() -> None:
 
 def test_a_name_that_is_there_stays() -> None:
     assert named(piece(1, class_name=TABLE), {CHAIR: 9.0}) == TABLE
+
+
+def test_what_masks_said_of_a_thing_names_no_piece_beside_it() -> None:
+    table = replace(piece(1, class_name=TABLE), segments=(3, 5))
+    assert without_claimed({3: {TABLE: 8.0}, 4: {CHAIR: 2.0}}, [table, piece(2)]) == {4: {CHAIR: 2.0}}
