@@ -604,7 +604,8 @@ sys.meta_path.insert(0, Numpy())
     "interrupted", [IMPORT, "main._refuse_foreign_packages = lambda: os.kill(os.getpid(), signal.SIGINT)\n"]
 )
 def test_an_interruption_while_code_loads_ends_in_one_line(interrupted: str) -> None:
-    script = f"import os, signal, sys\nfrom cli import main\n{interrupted}main.main()\n"
+    heard = "signal.signal(signal.SIGINT, signal.default_int_handler)"  # a shell's background jobs begin deaf to it
+    script = f"import os, signal, sys\n{heard}\nfrom cli import main\n{interrupted}main.main()\n"
     done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
     assert done.returncode == 130
     assert done.stderr == "error: interrupted; every finished artifact is as it was\n"
