@@ -22,8 +22,8 @@ BANDS: dict[str, Band] = {
     "replacement/functional": (0.43, 0.50),
     "replacement/collisions": (0, 0),
 }
-"""Today 0.642, 0.968, 3.96 mm, 0.808, 11, 0.680, 13.1 mm, 0.633, 0.467, 0 (by `fuse` 10: PQ 0.595, support F1 0.731, CAD
-success 0.567, equivalent 0.333). The room has 30 objects: one that is named, carried or replaced otherwise moves a
+"""Today 0.642, 0.968, 3.96 mm, 0.808, 11, 0.680, 13.1 mm, 0.633, 0.467, 0 (by `fuse` 10: PQ 0.595, support F1 0.731,
+CAD success 0.567, equivalent 0.333). The room has 30 objects: one that is named, carried or replaced otherwise moves a
 share by about 0.03, PQ by 0.02."""
 
 
