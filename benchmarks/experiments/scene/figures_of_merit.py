@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from benchmarks.experiment import Measure
-from benchmarks.experiments.scene.measuring import Outcome
+from benchmarks.experiments.scene.measuring import BY_TRUTH, Outcome
 
 Figure = Callable[[Sequence[Outcome]], float | None]
 
@@ -46,10 +46,6 @@ def over_objects(name: str, weight: str = "true_objects") -> Figure:
 def _ratio(outcomes: Sequence[Outcome], part: str, whole: str) -> float | None:
     total = sum(o.cad.get(whole) or 0.0 for o in outcomes)
     return sum(o.cad.get(part) or 0.0 for o in outcomes) / total if total else None
-
-
-BY_TRUTH = "_by_truth"
-"""Ending of figures of the things that have to be free by what they truly are, not by what the map calls them."""
 
 
 def _of_loose(name: str, ending: str = "") -> Figure:

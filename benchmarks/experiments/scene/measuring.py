@@ -48,6 +48,8 @@ HELD_OUT_SEED = 501
 """Of the library whose shapes no room has."""
 RESCALED = 0.2
 """Largest share by which things of the independent rooms are larger or smaller than their models."""
+BY_TRUTH = "_by_truth"
+"""Ending of figures of the things that have to be free by what they truly are, not by what the map calls them."""
 ANNOTATIONS = Path(__file__).resolve().parents[3] / "data" / "annotations" / "real"
 
 
@@ -225,7 +227,7 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     if panoptic_map.root not in shared.overlaps:
         shared.overlaps[panoptic_map.root] = overlaps_of(room.truth, panoptic_map)
     overlaps = shared.overlaps[panoptic_map.root]
-    loose = {"": loose_things(graph), "_by_truth": loose_by_truth(graph, room.truth.graph, overlaps)}
+    loose = to_be_free(graph, room.truth.graph, overlaps)
     physics, moved = settle(scene, loose, folder / "interactive_scene")
     measured = replacements_of(
         true_shapes(room.truth_artifact, room.world_from_log),
@@ -285,6 +287,14 @@ def loose_things(graph: ContactGraphFile) -> frozenset[str]:
     return frozenset(names)
 
 
+def to_be_free(
+    graph: ContactGraphFile, true_graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float]
+) -> dict[str, frozenset[str]]:
+    """Return the things that have to be free, by what the graph calls them and by what they truly are: ending of the
+    figures' names -> nodes. `overlaps` as in `loose_by_truth`."""
+    return {"": loose_things(graph), BY_TRUTH: loose_by_truth(graph, true_graph, overlaps)}
+
+
 def loose_by_truth(
     graph: ContactGraphFile, true_graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float]
 ) -> frozenset[str]:
@@ -331,7 +341,7 @@ def run_real(folder: Path, scratch: Path, arms: Sequence[Arm]) -> Iterator[tuple
         scene = unrecorded(
             "cad", scratch / arm.name / "cad_scene", arm.cad, seed=SEED, contact_graph=graph, library=library, **given
         )
-        loose = {"": loose_things(graph.info), "_by_truth": loose_by_truth(graph.info, truth.graph, overlaps)}
+        loose = to_be_free(graph.info, truth.graph, overlaps)
         physics, moved = settle(scene, loose, scratch / arm.name / "interactive_scene")
         distance, edges = measure_graph(truth, graph.info, overlaps)
         yield arm.name, Outcome(distance, edges, physics=physics, unsettled=moved)
