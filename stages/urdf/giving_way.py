@@ -26,8 +26,8 @@ from stages.kit.simulation.shapes import link_shapes
 from stages.kit.simulation.urdf_split import owner_of_link, read_urdf, with_absolute_meshes
 
 DEPTH = 0.003
-"""Things that lie no deeper in each other are left alone [m]: the settle test lets 5 mm pass, and Bullet pads every mesh
-by one."""
+"""Things that lie no deeper in each other are left alone [m]: the settle test lets 5 mm pass, and Bullet pads every
+mesh by one."""
 TOUCHING = 0.001
 """Of those that do, pieces may lie this deep in each other [m]."""
 CLEARANCE = 0.002
