@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from schemas.interactive_scene import InteractiveSceneFile
+from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.formats.written_scene import WrittenScene
 from stages.kit.geometry.boxes import box_volume, minimum_rectangle
@@ -56,6 +57,16 @@ class Piece:
         """(4, 4) of the least upright box around it."""
         return transform_from_yaw(minimum_rectangle(self.points[:, :2])[2], np.zeros(3))
 
+    @cached_property
+    def low(self) -> np.ndarray:
+        """(3,) least coordinates [m]."""
+        return np.asarray(self.points.min(axis=0))
+
+    @cached_property
+    def high(self) -> np.ndarray:
+        """(3,) greatest coordinates [m]."""
+        return np.asarray(self.points.max(axis=0))
+
     def without(self, other: Piece) -> list[Piece]:
         """Return what of it is outside of the least upright box around another, 2 mm wider, as pieces."""
         there = inverse(other.world_from_box)
@@ -66,6 +77,8 @@ class Piece:
 
     def depth(self, other: Piece) -> float:
         """Return how deep [m] it lies in another."""
+        if (self.low >= other.high).any() or (other.low >= self.high).any():
+            return 0.0
         return penetration(self.solid, other.solid).depth
 
 
@@ -73,21 +86,17 @@ def given_way(root: Path, bodies: Sequence[BundleBody]) -> list[BundleBody]:
     """Return the bodies of the scene written to `root`, those cut that keep their mesh and lie in another: in a model,
     in the building, or in a smaller thing that keeps its own. Raises BadInput."""
     pieces = written_pieces(root)
-    keeps = {body.name for body in bodies if body.model is None and body.mesh is not None} - WrittenScene(
-        root, InteractiveSceneFile.read(root / "scene.json")
-    ).layout
-    settled = {name: own for name, own in pieces.items() if name not in keeps}
+    keeping = [body for body in bodies if body.model is None and body.mesh is not None and not _is_layout(body)]
+    final = {name: own for name, own in pieces.items() if name not in {body.name for body in keeping}}
     cut: dict[str, dict[int, list[Piece]]] = {}
-    for body in sorted(bodies, key=lambda body: (box_volume(body.box), body.name)):
-        if body.name not in keeps:
-            continue
+    for body in sorted(keeping, key=lambda body: (box_volume(body.box), body.name)):
         own = {number: [piece] for number, piece in enumerate(pieces[body.name])}
-        for others in settled.values():
+        for others in final.values():
             _cut(own, others)
-        settled[body.name] = [piece for parts in own.values() for piece in parts]
+        final[body.name] = [piece for parts in own.values() for piece in parts]
         changed = {number: parts for number, parts in own.items() if parts != [pieces[body.name][number]]}
-        if not settled[body.name]:
-            settled[body.name] = pieces[body.name]
+        if not final[body.name]:
+            final[body.name] = pieces[body.name]
         elif changed:
             cut[body.name] = own if body.movable else changed
     return [_with(body, cut[body.name]) if body.name in cut else body for body in bodies]
@@ -109,7 +118,12 @@ def written_pieces(root: Path) -> dict[str, list[Piece]]:
 
 def _cut(own: dict[int, list[Piece]], others: Sequence[Piece]) -> None:
     """Cut what of a thing's pieces, by the number of their shape, lies in those of another, if any lies deep in it."""
-    depths = [max((piece.depth(other) for parts in own.values() for piece in parts), default=0.0) for other in others]
+    pieces = [piece for parts in own.values() for piece in parts]
+    if not pieces:
+        return
+    low, high = np.min([piece.low for piece in pieces], axis=0), np.max([piece.high for piece in pieces], axis=0)
+    others = [other for other in others if (other.low < high).all() and (low < other.high).all()]
+    depths = [max(piece.depth(other) for piece in pieces) for other in others]
     if max(depths, default=0.0) <= DEPTH:
         return
     for other in (other for other, depth in zip(others, depths, strict=True) if depth > TOUCHING):
@@ -117,6 +131,10 @@ def _cut(own: dict[int, list[Piece]], others: Sequence[Piece]) -> None:
             own[number] = [
                 rest for piece in parts for rest in (piece.without(other) if piece.depth(other) > TOUCHING else [piece])
             ]
+
+
+def _is_layout(body: BundleBody) -> bool:
+    return load_vocabulary().by_name(body.class_name).is_layout
 
 
 def _with(body: BundleBody, cut: Mapping[int, Sequence[Piece]]) -> BundleBody:
