@@ -20,6 +20,12 @@ FOLDERS = {
     "shapenet": ("scan2cad_sample/shapenet-sample", ("--unknown", "object")),
 }
 """Short name -> folder of the data, options of `library add`."""
+SHAPENET_CLASSES = """[models]
+"03001627/*" = {class_name = "chair", unit = "m"}
+"04379243/*" = {class_name = "table", unit = "m"}
+"02747177/*" = {class_name = "bin", unit = "m"}
+"""
+"""ShapeNet's names are numbers of categories; the unit is that in which the models furnish."""
 AWS = "aws_robomaker_residential_"
 
 
@@ -81,6 +87,20 @@ def imported(data: Path, out: Path) -> dict[str, CadLibrary]:
         name: opened(CadLibrary, made("library add", out / name, data / place, *options))
         for name, (place, options) in FOLDERS.items()
     }
+
+
+def own_library(data: Path, out: Path, library: Path) -> Path:
+    """Add every folder of models to a library, named as a person would, in folders of `out`; return the last one.
+
+    Raises StepFailed.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    named = out / "shapenet.toml"
+    named.write_text(SHAPENET_CLASSES, encoding="utf-8")
+    for name, (place, options) in FOLDERS.items():
+        said = ("--mapping", named) if name == "shapenet" else options
+        library = made("library add", out / name, data / place, *said, "--library", library)
+    return library
 
 
 def mesh_of(libraries: Mapping[str, CadLibrary], model: Model) -> trimesh.Trimesh:
