@@ -27,6 +27,8 @@ from benchmarks.tabulation import Figure, markdown
 from stages.kit.stage import Parameters
 
 MASKS, NETWORK = "masks", "network"
+OWN = "own"
+"""Folder of the library that has the models of the house too."""
 TUNING = ("0",)
 GROUP = "house"
 REPORTING = newest(GROUP).seeds
@@ -52,7 +54,8 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
 def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
     """Import the models and make the library that all rooms share."""
     imported(bench.parameters.data, bench.out / "models")
-    made("library build", bench.out / "cad_library", "--seed", LIBRARY_SEED)
+    library = made("library build", bench.out / "cad_library", "--seed", LIBRARY_SEED)
+    own_library(bench.parameters.data, bench.out / OWN, library)
 
 
 def inputs(bench: Bench, trial: Trial) -> list[Path]:
@@ -63,7 +66,6 @@ def inputs(bench: Bench, trial: Trial) -> list[Path]:
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judged]]:
     """Furnish a room, record it, run the chain, judge what came out."""
     libraries = imported(bench.parameters.data, bench.out / "models")
-    own = own_library(bench.parameters.data, bench.out / "own", bench.out / "cad_library")
     meshes = {name: mesh_of(libraries, model) for name, model in MODELS.items()}
     for trial in trials:
         random = np.random.default_rng([int(trial.seed), sorted(RECIPES).index(trial.case)])
@@ -82,7 +84,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judg
         made("cad", out / "cad_scene", *parts, "--library", bench.out / "cad_library")
         made("urdf", out / "interactive_scene", "--cad-scene", out / "cad_scene")
         if trial.arm == MASKS:
-            made("cad", out / "own_scene", *parts, "--library", own)
+            made("cad", out / "own_scene", *parts, "--library", bench.out / OWN / "library")
         yield trial, judge(house, recording, run / "sequence", out, libraries)
 
 

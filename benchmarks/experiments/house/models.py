@@ -90,16 +90,18 @@ def imported(data: Path, out: Path) -> dict[str, CadLibrary]:
 
 
 def own_library(data: Path, out: Path, library: Path) -> Path:
-    """Add every folder of models to a library, named as a person would, in folders of `out`; return the last one.
+    """Return `out`/library: a library with every folder of models added, named as a person would.
 
     Raises StepFailed.
     """
     out.mkdir(parents=True, exist_ok=True)
     named = out / "shapenet.toml"
     named.write_text(SHAPENET_CLASSES, encoding="utf-8")
+    *_, last = FOLDERS
     for name, (place, options) in FOLDERS.items():
         said = ("--mapping", named) if name == "shapenet" else options
-        library = made("library add", out / name, data / place, *said, "--library", library)
+        target = out / ("library" if name == last else name)
+        library = made("library add", target, data / place, *said, "--library", library)
     return library
 
 

@@ -21,6 +21,9 @@ from stages.evaluate.replacement_measures import retrieval_rank
 from stages.evaluate.shape_loading import model_shape, placed_candidate
 from stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
 
+SAME_SIZE, SAME_AREA = 0.001, 0.001
+"""Edges of boxes [m] and surfaces [share] of one model in two files differ by less."""
+
 
 @dataclass(frozen=True)
 class Stand:
@@ -32,7 +35,7 @@ class Stand:
     chosen: str = ""
     """Model of the library, stretched or not."""
     own: bool = False
-    """Whether that is the thing's own."""
+    """Whether that is the thing's own, or the same in another file of the set."""
     rank: int | None = None
     """Place of its own model among the candidates."""
     translation: float | None = None
@@ -48,6 +51,13 @@ class Stand:
 @cache
 def _shape(folder: Path) -> ModelShape:
     return model_shape(folder)
+
+
+def _same(first: ModelShape, second: ModelShape) -> bool:
+    """Whether two models have the same box and as much surface: kettles come alone and in kitchens."""
+    sizes = [np.ptp(shape.closed_bounds, axis=0) for shape in (first, second)]
+    areas = [sum(part.area for part in shape.parts.values()) for shape in (first, second)]
+    return bool(np.allclose(*sizes, atol=SAME_SIZE) and np.isclose(*areas, rtol=SAME_AREA))
 
 
 def true_places(
@@ -94,7 +104,7 @@ def stands(scene: CadScene, name_of: Mapping[int, str], places: Mapping[str, Pla
             found[name] = Stand(name, entry.decision, rank=rank)
             continue
         error, chosen = alignment_error(true, placed), entry.chosen.library_model
-        own = chosen == true.shape.model_id
+        own = chosen == true.shape.model_id or (not entry.chosen.stretched_from and _same(placed.shape, true.shape))
         right = own and error.succeeds(every_axis=True)
         figures = (error.translation, float(np.degrees(error.rotation)), error.worst_scale)
         found[name] = Stand(name, "cad", chosen, own, rank, *figures, right=right)
