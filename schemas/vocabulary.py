@@ -57,11 +57,11 @@ class Vocabulary(Model):
         raise BadInput(f"class id {class_id} is not in the vocabulary", hint=f"see {VOCABULARY_FILE.name}")
 
     def by_alias(self, alias: str, source: str) -> SemanticClass | None:
-        """Return the class of that name, else the one that another vocabulary (`coco`, `nyu40`, `scannet`, `ade20k`)
-        calls `alias`, or None."""
-        named = (entry for entry in self.classes if entry.name == alias)
-        called = (entry for entry in self.classes if alias in getattr(entry, source))
-        return next(named, next(called, None))
+        """Return the class that another vocabulary (`coco`, `nyu40`, `scannet`, `ade20k`) calls `alias`, or None."""
+        for entry in self.classes:
+            if entry.name == alias or alias in getattr(entry, source):
+                return entry
+        return None
 
 
 @cache

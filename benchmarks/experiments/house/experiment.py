@@ -16,7 +16,7 @@ from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
 from benchmarks.experiments.house.furnishing import RECIPES, furnish
-from benchmarks.experiments.house.models import FOLDERS, MODELS, absent, imported, mesh_of, own_library
+from benchmarks.experiments.house.models import FOLDERS, MODELS, absent, import_all, imported, mesh_of, own_library
 from benchmarks.experiments.house.placing import Stand
 from benchmarks.experiments.house.recording import record
 from benchmarks.experiments.house.scoring import Judged, judge
@@ -53,7 +53,7 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
 
 def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
     """Import the models and make the library that all rooms share."""
-    imported(bench.parameters.data, bench.out / "models")
+    import_all(bench.parameters.data, bench.out / "models")
     library = made("library build", bench.out / "cad_library", "--seed", LIBRARY_SEED)
     own_library(bench.parameters.data, bench.out / OWN, library)
 
@@ -65,7 +65,7 @@ def inputs(bench: Bench, trial: Trial) -> list[Path]:
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judged]]:
     """Furnish a room, record it, run the chain, judge what came out."""
-    libraries = imported(bench.parameters.data, bench.out / "models")
+    libraries = imported(bench.out / "models")
     meshes = {name: mesh_of(libraries, model) for name, model in MODELS.items()}
     for trial in trials:
         random = np.random.default_rng([int(trial.seed), sorted(RECIPES).index(trial.case)])

@@ -81,12 +81,15 @@ def absent(data: Path) -> list[str]:
     return [place for place, _ in FOLDERS.values() if not (data / place).is_dir()]
 
 
-def imported(data: Path, out: Path) -> dict[str, CadLibrary]:
-    """Import every folder of models unless that is up to date. Raises StepFailed."""
-    return {
-        name: opened(CadLibrary, made("library add", out / name, data / place, *options))
-        for name, (place, options) in FOLDERS.items()
-    }
+def import_all(data: Path, out: Path) -> None:
+    """Import every folder of models into `out` unless that is up to date. Raises StepFailed."""
+    for name, (place, options) in FOLDERS.items():
+        made("library add", out / name, data / place, *options)
+
+
+def imported(out: Path) -> dict[str, CadLibrary]:
+    """Return what `import_all` made."""
+    return {name: opened(CadLibrary, out / name) for name in FOLDERS}
 
 
 def own_library(data: Path, out: Path, library: Path) -> Path:

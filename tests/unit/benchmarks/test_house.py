@@ -10,6 +10,9 @@ from benchmarks.experiments.house.furnishing import House, Recipe, Thing, Wish, 
 from benchmarks.experiments.house.recording import DISPARITY, disturbed, walk
 from benchmarks.experiments.house.tiny_renderer import TinyRenderer
 from benchmarks.experiments.surface.scenes import camera_of
+from benchmarks.nested_furniture import nested
+from schemas.interactive_scene import SceneBody
+from schemas.scene_parts import Box
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import look_at
 
@@ -96,3 +99,19 @@ def test_the_walk_keeps_off_things_at_head_height(house: House) -> None:
             low, high = thing.bounds
             inside = (eye[:2] > low[:2] - 0.2).all() and (eye[:2] < high[:2] + 0.2).all()
             assert not inside or thing.parent != "floor"
+
+
+Size = tuple[float, float, float]
+
+
+def body(name: str, center: Size, size: Size, *, movable: bool = False) -> SceneBody:
+    pose = tuple(tuple(row) for row in np.eye(4).tolist())
+    box = Box(center=center, size=size)
+    return SceneBody(name=name, class_name=name, movable=movable, world_from_body=pose, box=box, mass=1.0)  # type: ignore[arg-type]
+
+
+def test_furniture_of_which_more_than_half_lies_in_another_is_named() -> None:
+    bed, desk = body("bed", (0, 0, 0.3), (2, 1.6, 0.6)), body("desk", (1.4, 0, 0.3), (1, 0.6, 0.6))
+    bystanders = [body("cup", (0, 0, 0.3), (0.5, 0.5, 0.1), movable=True), body("wall", (0, 0, 0), (3, 3, 3))]
+    assert nested([bed, desk, *bystanders]) == ()
+    assert nested([bed, desk, body("sofa", (0.3, 0, 0.3), (1, 0.9, 0.6)), *bystanders]) == ("sofa in bed",)
