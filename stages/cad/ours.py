@@ -242,8 +242,15 @@ class Ours:
         return score_of(match, placement, error, surface, target.around, self.parameters)
 
     def _measured(self, target: Target, match: Match, placement: Placement) -> Placement:
-        """Return the placement with the alignment error over all vertices and the score that the choice minimises."""
+        """Return the placement with the alignment error over all vertices and the score that the choice minimises.
+
+        A bowl stands in for a plate where the library has no plate like it: what fits hardly worse, and has the name,
+        comes first.
+        """
         surface = target.surfaces[placement.shape.model.id]
         error = alignment_error(surface, placement, target.points)
         oriented = robust_error(surface, placement, target.points, target.normals, TRUNCATION)
-        return replace(placement, alignment_error=error, score=self._score(target, match, placement, oriented))
+        name, named = target.node.class_name, placement.shape.model.class_name
+        stands_in = name != named and any(model.class_name == name for model in target.models)
+        score = self._score(target, match, placement, oriented) + self.parameters.choice_margin * stands_in
+        return replace(placement, alignment_error=error, score=score)
