@@ -22,8 +22,9 @@ from benchmarks.experiments.house.recording import record
 from benchmarks.experiments.house.scoring import Judged, judge
 from benchmarks.experiments.surface.scenes import camera_of
 from benchmarks.reporting_seeds import Method, newest
-from benchmarks.steps import made
+from benchmarks.steps import made, opened
 from benchmarks.tabulation import Figure, markdown
+from schemas.cad_library import CadLibrary
 from stages.kit.stage import Parameters
 
 MASKS, NETWORK = "masks", "network"
@@ -66,6 +67,7 @@ def inputs(bench: Bench, trial: Trial) -> list[Path]:
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judged]]:
     """Furnish a room, record it, run the chain, judge what came out."""
     libraries = imported(bench.out / "models")
+    own = opened(CadLibrary, bench.out / OWN / "library")
     meshes = {name: mesh_of(libraries, model) for name, model in MODELS.items()}
     for trial in trials:
         random = np.random.default_rng([int(trial.seed), sorted(RECIPES).index(trial.case)])
@@ -84,8 +86,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judg
         made("cad", out / "cad_scene", *parts, "--library", bench.out / "cad_library")
         made("urdf", out / "interactive_scene", "--cad-scene", out / "cad_scene")
         if trial.arm == MASKS:
-            made("cad", out / "own_scene", *parts, "--library", bench.out / OWN / "library")
-        yield trial, judge(house, recording, run / "sequence", out, libraries)
+            made("cad", out / "own_scene", *parts, "--library", own.root)
+        yield trial, judge(house, recording, run / "sequence", out, own)
 
 
 def pooled(figure: Callable[[Sequence[Judged]], float], unit: str = "") -> Measure:

@@ -60,14 +60,13 @@ def _same(first: ModelShape, second: ModelShape) -> bool:
     return bool(np.allclose(*sizes, atol=SAME_SIZE) and np.isclose(*areas, rtol=SAME_AREA))
 
 
-def true_places(
-    house: House, libraries: Mapping[str, CadLibrary], world_from_log: np.ndarray
-) -> dict[str, PlacedShape]:
-    """Return thing -> its model as it stands; `libraries`: the imported models, by folder; `world_from_log` (4, 4)."""
+def true_places(house: House, library: CadLibrary, world_from_log: np.ndarray) -> dict[str, PlacedShape]:
+    """Return thing -> its model as it stands; `library`: one that has the models of the house; `world_from_log`
+    (4, 4)."""
     places = {}
     for thing in house.things:
         model = MODELS[thing.model]
-        folder = model_folder(libraries[model.folder], model.id)
+        folder = model_folder(library, model.id)
         at_rest = posed_mesh(folder, read_model(folder), {}, model.scale)
         pose, _, _ = trimesh.registration.procrustes(
             at_rest.vertices, thing.mesh.vertices, reflection=False, scale=False
@@ -96,7 +95,7 @@ def stands(scene: CadScene, name_of: Mapping[int, str], places: Mapping[str, Pla
     """Return what stands for every thing of `places` in a scene made with a library that has their models."""
     found = {}
     for name, entry, placed in replaced(scene, name_of):
-        if name not in places:
+        if name is None or name not in places:
             continue
         true = places[name]
         rank = retrieval_rank(entry, true.shape.model_id)
@@ -123,7 +122,7 @@ def joints_given(
         if placed is None or not placed.joints:
             continue
         given += len(placed.joints)
-        true = placed_joints(places[name]) if name in places else []
+        true = placed_joints(places[name]) if name is not None and name in places else []
         partners = sum(error.partner is not None for error in joint_errors(true, placed_joints(placed)))
         if len(placed.joints) > partners:
             false.append(f"{len(placed.joints) - partners} joints of {entry.node} ({name})")

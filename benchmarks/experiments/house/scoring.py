@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,10 +80,10 @@ class Judged:
 WHOLE = 0.98
 
 
-def judge(house: House, recording: Recording, sequence: Path, run: Path, libraries: Mapping[str, CadLibrary]) -> Judged:
+def judge(house: House, recording: Recording, sequence: Path, run: Path, library: CadLibrary) -> Judged:
     """Compare what a run made of a sequence with the truth: `panoptic_map`, `contact_graph`, `cad_scene`,
     `interactive_scene`, and `own_scene`, the CAD scene by a library that has the models of the house, where there is
-    one. `libraries`: these models."""
+    one. `library` is that one."""
     world_from_log = np.array(opened(Sequence, sequence).info.gravity.world_from_log)
     predicted = load_map(opened(PanopticMap, run / "panoptic_map"))
     points = apply(world_from_log, recording.points.astype(float))
@@ -112,7 +111,7 @@ def judge(house: House, recording: Recording, sequence: Path, run: Path, librari
     scene = opened(InteractiveScene, run / "interactive_scene")
     summary = scene.summary
     movable = sum(body.movable for body in scene.info.bodies)
-    places = true_places(house, libraries, world_from_log)
+    places = true_places(house, library, world_from_log)
     joints, false_joints = joints_given(opened(CadScene, run / "cad_scene"), name_of, places)
     owned = {name: place for name, place in places.items() if name in {true_names[k] for k in things}}
     own = run / "own_scene"
