@@ -55,9 +55,10 @@ def _shape(folder: Path) -> ModelShape:
 
 def _same(first: ModelShape, second: ModelShape) -> bool:
     """Whether two models have the same box and as much surface: one kettle comes alone, painted, and in kitchens."""
-    sizes = [np.ptp(shape.closed_bounds, axis=0) for shape in (first, second)]
-    areas = [sum(part.area for part in shape.parts.values()) for shape in (first, second)]
-    return bool(np.allclose(*sizes, atol=SAME_SIZE) and np.isclose(*areas, rtol=SAME_AREA))
+    (low, high), (other_low, other_high) = first.closed_bounds, second.closed_bounds
+    area, other = (sum(part.area for part in shape.parts.values()) for shape in (first, second))
+    boxes_agree = np.allclose(high - low, other_high - other_low, rtol=0, atol=SAME_SIZE)
+    return boxes_agree and abs(area - other) <= SAME_AREA * other
 
 
 def true_places(house: House, library: CadLibrary, world_from_log: np.ndarray) -> dict[str, PlacedShape]:
