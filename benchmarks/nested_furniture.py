@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import permutations
 
+from schemas.cad_scene import SURROUNDINGS
 from schemas.interactive_scene import SceneBody
 from schemas.vocabulary import load_vocabulary
 from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume
@@ -24,7 +25,10 @@ def nested(bodies: Iterable[SceneBody]) -> tuple[str, ...]:
     furniture = [
         body
         for body in bodies
-        if not body.carriable and body.class_name not in layout | {"surroundings"} and sorted(body.box.size)[1] >= LEAST
+        if not body.carriable
+        and body.class_name not in layout
+        and body.name != SURROUNDINGS
+        and sorted(body.box.size)[1] >= LEAST
     ]
     return tuple(
         f"{a.name} in {b.name}"

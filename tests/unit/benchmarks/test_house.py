@@ -118,7 +118,8 @@ def body(name: str, center: Size, size: Size, *, movable: bool = False) -> Scene
 
 def test_furniture_of_which_more_than_half_lies_in_another_is_named() -> None:
     bed, desk = body("bed", (0, 0, 0.3), (2, 1.6, 0.6)), body("desk", (1.4, 0, 0.3), (1, 0.6, 0.6))
-    bystanders = [body("cup", (0, 0, 0.3), (0.5, 0.5, 0.1), movable=True), body("wall", (0, 0, 0), (3, 3, 3))]
+    bystanders = [body("cup", (0, 0, 0.3), (0.5, 0.5, 0.1), movable=True)]
+    bystanders += [body(name, (0, 0, 0), (3, 3, 3)) for name in ("wall", "surroundings")]
     assert nested([bed, desk, *bystanders]) == ()
     assert nested([bed, desk, body("sofa", (0.3, 0, 0.3), (1, 0.9, 0.6)), *bystanders]) == ("sofa in bed",)
 
