@@ -11,11 +11,12 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Relation, SurfacePlane
-from stages.cad.conflicts import Solid, placed_solid
+from stages.cad.conflicts import placed_solid
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.placing import placed_box, placed_planes
 from stages.cad.settling import Stand, stand_on, tree_order
 from stages.cad.shapes import Placement
+from stages.kit.geometry.convex_solids import Solid
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from schemas.contact_graph import ContactGraphFile
 from stages.cad.built_ins import built_in, is_built_in
 from stages.cad.candidates import Shortlist
 from stages.cad.choosing import may_touch
-from stages.cad.conflicts import Solid, penetration, placed_solid
+from stages.cad.conflicts import placed_solid
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.parameters import CadParameters
 from stages.cad.placing import placed_box
@@ -23,6 +23,7 @@ from stages.cad.shapes import Placement
 from stages.cad.target import Surroundings, Target, stands_in_wall, unsupported_children
 from stages.kit.formats.entity_meshes import EntityMesh
 from stages.kit.geometry.boxes import bottom
+from stages.kit.geometry.convex_solids import Solid, penetration
 
 
 def built_in_instead(

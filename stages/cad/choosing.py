@@ -7,10 +7,11 @@ import numpy as np
 from schemas.contact_graph import ContactGraphFile
 from stages.cad.arranging import Arrangement, arrange
 from stages.cad.candidates import Shortlist
-from stages.cad.conflicts import Selection, Solid, min_conflicts, penetration, placed_solid
+from stages.cad.conflicts import Selection, min_conflicts, placed_solid
 from stages.cad.method import CadMethod
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.shapes import Placement
+from stages.kit.geometry.convex_solids import Solid, penetration
 
 
 def may_touch(graph: ContactGraphFile) -> set[frozenset[str]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.cad.conflicts import Solid, penetration
+from stages.kit.geometry.convex_solids import Solid, penetration
 
 DIRECTIONS = 16
 """Compass directions that are tried, beside those in which the contacts push."""

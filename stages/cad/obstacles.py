@@ -50,12 +50,12 @@ def _in_physics(
     graph: ContactGraphFile, node: GraphNode, mesh: trimesh.Trimesh, carriable: Collection[str]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return the pieces that the exported scene gives a thing with its mesh, by what is free there (and `urdf` does not
-    hold): boxes where it stays, convex pieces as furniture, a hull where an arm carries it."""
+    hold): boxes where it stays, convex pieces as furniture or laden, a hull where an arm carries it."""
     nodes = {entry.id: entry for entry in graph.nodes}
     points, carried = np.asarray(mesh.vertices, dtype=float), carried_by(graph, nodes, node.id)
     mobile = mobility(graph, node, carriable, ())
     rests_at = resting_height(graph, nodes, node.id) if mobile.movable else None
-    if mobile.furniture:
+    if mobile.furniture or (mobile.movable and carried):
         pieces = furniture_pieces(points, np.asarray(mesh.faces), rests_at)
         return [_hull(piece) for piece in cut_below(pieces, np.eye(4), carried)]
     if mobile.movable:

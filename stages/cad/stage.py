@@ -22,7 +22,7 @@ from stages.cad.built_ins import is_built_in, may_be_built_in
 from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
 from stages.cad.choosing import adjust, select
 from stages.cad.coloring import part_colors
-from stages.cad.conflicts import convex_solid, placed_pieces
+from stages.cad.conflicts import placed_pieces
 from stages.cad.joint_evidence import Looked, joint_evidence
 from stages.cad.method import CadMethod
 from stages.cad.model_surfaces import ModelSurface, load_surface
@@ -39,6 +39,7 @@ from stages.cad.target import Surroundings, Target
 from stages.cad.thesis import Thesis
 from stages.kit.formats.cad_models import model_folder
 from stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
+from stages.kit.geometry.convex_solids import convex_solid
 from stages.kit.geometry.point_clouds import sample_large_triangles, vertex_normals
 from stages.kit.stage import Context
 

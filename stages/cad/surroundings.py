@@ -14,9 +14,9 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
-from stages.cad.conflicts import Solid, convex_solid, penetration
 from stages.kit.formats.entity_meshes import EntityMesh
 from stages.kit.geometry.box_cover import cover_with_boxes
+from stages.kit.geometry.convex_solids import Solid, convex_solid, penetration
 
 Piece = tuple[np.ndarray, np.ndarray]
 """Vertices (V, 3) and faces (F, 3) of a convex polyhedron, world frame."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from stages.fuse.surface import Surface
-from stages.fuse.unnamed_pieces import CEILING, FLOOR, unnamed_pieces
+from stages.fuse.unnamed_pieces import CEILING, FLOOR, topped_parts, unnamed_pieces
 from stages.fuse.walls import of_walls
 from stages.kit.formats.map_files import cut_mesh, face_labels
 from stages.kit.geometry.point_clouds import vertex_normals
@@ -40,19 +40,21 @@ def with_unnamed_pieces(
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities and labels with the pieces of unnamed surface among them; as they are without a floor.
 
-    `voxel` [m], `minimum_area` [m^2] of a piece, `told` (V,) as in `unnamed_pieces`. Nobody voted for one: it has no
+    `voxel` [m], `minimum_area` [m^2] of a piece, `told` (V,) as in `unnamed_pieces`. What masks took for a wall and is
+    none is unnamed. Nobody voted for one: it has no
     segments, and no confidence.
     """
     vertices = _over_floor(surface, labelled, classes)
     if vertices is None:
         return list(entities), labelled
     normals = vertex_normals(vertices, surface.faces)
-    room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling))
+    no_wall = _no_wall(vertices, normals, labelled.class_id == classes.wall, voxel)
+    room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling)) & ~no_wall
     walls = of_walls(vertices, normals, (room | (labelled.instance == 0)) & (vertices[:, 2] > FLOOR), voxel)
     piece, instance = unnamed_pieces(
         vertices,
         normals,
-        labelled.instance,
+        np.where(no_wall, 0, labelled.instance),
         room | walls,
         voxel=voxel,
         minimum_area=minimum_area,
@@ -126,6 +128,15 @@ def _over_floor(surface: Surface, labelled: LabelledSurface, classes: Classes) -
     """Return the vertices (V, 3) [m] with the floor at 0, None where there is none."""
     level = surface.vertices[labelled.class_id == classes.floor, 2]
     return surface.vertices - [0.0, 0.0, float(np.median(level))] if len(level) else None
+
+
+def _no_wall(vertices: np.ndarray, normals: np.ndarray, named: np.ndarray, voxel: float) -> np.ndarray:
+    """Return which of the surface (V,) that masks `named` a wall is none: what stands off every wall and has a level
+    top, a desk that a mask mistook."""
+    away = np.flatnonzero(named & (vertices[:, 2] > FLOOR) & ~of_walls(vertices, normals, named, voxel))
+    result = np.zeros(len(vertices), bool)
+    result[away[topped_parts(vertices[away], normals[away], voxel)]] = True
+    return result
 
 
 def _cut_anew(

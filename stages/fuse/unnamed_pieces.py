@@ -169,6 +169,12 @@ def _tops(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: flo
     return sorted(found, key=lambda top: (-len(top[1]), top[1][0]))
 
 
+def topped_parts(points: np.ndarray, normals: np.ndarray, voxel: float) -> np.ndarray:
+    """Return which of points (N, 3), the floor at 0, are of a connected part with a level top on which things stand."""
+    parts = _components(points, voxel)
+    return np.isin(parts, [part for part, _ in _tops(points, normals, parts, voxel)])
+
+
 def _cut_at_tops(
     points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float, kept_whole: Collection[int] = ()
 ) -> tuple[np.ndarray, set[int]]:

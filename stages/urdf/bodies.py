@@ -18,7 +18,9 @@ from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.mobility import NAMELESS, STANDS, Mobility, mobility
 from stages.kit.formats.scene_bundle import BundleBody
+from stages.kit.formats.scene_supports import resting_height
 from stages.kit.geometry.boxes import box_from_bounds
+from stages.urdf.steadiness import stands_steadily
 
 
 def scene_bodies(
@@ -47,6 +49,7 @@ def _body(
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
     parent = None if link is None or link.source == SCENE_NODE else link.source
+    guessed = mobile.furniture and node.class_name == NAMELESS and node.mark is None
     if node.model_id is not None:
         if node.world_from_model is None or node.scale is None:
             raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale")
@@ -54,6 +57,7 @@ def _body(
         if not folder.is_dir():
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
         model = as_it_moved(read_model(folder), {} if replacement is None else replacement.motions)
+        mobile = Mobility(False) if guessed and "built_in" in model.recipe else mobile
         return BundleBody(
             name=node.id,
             class_name=node.class_name,
@@ -72,6 +76,8 @@ def _body(
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
+    if guessed and mesh is not None and not _steady(graph, node, mesh):
+        mobile = Mobility(False)
     origin = np.eye(4) if node.node_type == "layout" else _bottom(bounds)
     if mesh is not None:
         mesh.apply_translation(-origin[:3, 3])
@@ -86,6 +92,11 @@ def _body(
         box=bounds,
         mesh=mesh,
     )
+
+
+def _steady(graph: ContactGraphFile, node: GraphNode, mesh: trimesh.Trimesh) -> bool:
+    height = resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id)
+    return height is not None and stands_steadily(np.asarray(mesh.vertices, dtype=float), mesh.faces, height)
 
 
 def as_it_moved(model: CadModel, motions: Mapping[str, SeenMotion]) -> CadModel:

@@ -27,12 +27,12 @@ class UrdfParameters(Parameters):
 
 STAGE = Stage(
     name="urdf",
-    version=10,
+    version=11,
     summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots; MJCF, SRDF, GLB, MCAP",
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},
     writes=InteractiveScene,
-    libraries=("numpy", "scipy", "trimesh", "shapely", "pybullet", "mcap", "mcap-protobuf-support"),
+    libraries=("numpy", "scipy", "trimesh", "shapely", "python-fcl", "pybullet", "mcap", "mcap-protobuf-support"),
     example="scenewright urdf --cad-scene outputs/demo/cad_scene --out outputs/demo/interactive_scene",
     estimate=grows_with("cad_scene", 0.0, 2.1, 130, 23.0),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from stages.kit.stage import Context
 from stages.urdf.bodies import scene_bodies
 from stages.urdf.exports import write_exports
+from stages.urdf.giving_way import given_way
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.resting import rested_bodies
 from stages.urdf.settle_report import SettleReport, settle_file, settle_report
@@ -32,6 +33,11 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         bodies = scene_bodies(cad_scene, graph, movable, parameters.fixed_classes)
     with context.progress.step("write and check the kinematic tree"):
         scene = write_scene_bundle(context.output, bodies, graph)
+    with context.progress.step("cut meshes that lie in other things"):
+        bodies = given_way(context.output, bodies)
+    cut = sum(bool(body.cut) for body in bodies)
+    if cut:
+        scene = write_scene_bundle(context.output, _written(bodies), graph)
     held = _wedged(context)
     if held:
         bodies = _held(context.output, bodies, held)
@@ -42,8 +48,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
             laid = rested_bodies(context.output, bodies)
             rested = sum(body.reconstructed is not None for body in laid)
             if rested:
-                written = [replace(body, mesh_is_written=body.mesh is not None) for body in laid]
-                scene = write_scene_bundle(context.output, written, graph)
+                scene = write_scene_bundle(context.output, _written(laid), graph)
     with context.progress.step("write what stands beside it"):
         write_exports(context.output, scene)
     summary: dict[str, float | str] = {
@@ -53,6 +58,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         "cad_models": sum(body.model is not None for body in bodies),
         "rested": rested,
         "held": len(held),
+        "cut": cut,
     }
     outcome = "ok" if scene.bodies else "empty"
     if parameters.settle_seconds:
@@ -78,10 +84,16 @@ def _held(root: Path, bodies: list[BundleBody], held: Collection[str]) -> list[B
     """Return the bodies for another writing into `root`, some of them held; removes what only free ones have there."""
     for name in held:
         (root / "bodies" / f"{name}.urdf").unlink()
-        for file in (root / "meshes" / name).glob("collision_*.obj"):
-            file.unlink()
-    again = [replace(body, mesh_is_written=body.mesh is not None) for body in bodies]
-    return [replace(body, movable=False, furniture=False) if body.name in held else body for body in again]
+        for pattern in ("collision_*.obj", "cut_*.obj"):
+            for file in (root / "meshes" / name).glob(pattern):
+                file.unlink()
+    again = _written(bodies)
+    return [replace(body, movable=False, furniture=False, cut={}) if body.name in held else body for body in again]
+
+
+def _written(bodies: Sequence[BundleBody]) -> list[BundleBody]:
+    """Return the bodies for another writing into the same folder."""
+    return [replace(body, mesh_is_written=body.mesh is not None) for body in bodies]
 
 
 def _settle(context: Context, parameters: UrdfParameters) -> SettleReport:

@@ -41,8 +41,6 @@ BUILT_IN = frozenset(
 )
 """Part of the building, fastened to it, or too heavy to be pushed."""
 NAMELESS = "object"
-LARGEST_NAMELESS = 0.5
-"""Longest edge of a thing without a name [m]: more may be a piece of the building or a heap of things."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +67,6 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
     if link is None or link.source == SCENE_NODE:
         return Mobility(False)
     if node.class_name in BUILT_IN or node.class_name in fixed:
-        return Mobility(False)
-    if node.class_name == NAMELESS and (node.box is None or max(node.box.size) > LARGEST_NAMELESS):
         return Mobility(False)
     if resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
         return Mobility(False)

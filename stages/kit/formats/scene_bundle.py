@@ -20,6 +20,7 @@ from stages.kit.formats.mjcf_file import write_mjcf
 from stages.kit.formats.scene_links import (
     BodyLinks,
     box_links,
+    cut_links,
     furniture_links,
     layout_links,
     mesh_links,
@@ -72,6 +73,8 @@ class BundleBody:
     """[kg]; from the model or the volume when None."""
     furniture: bool = False
     """Movable, but nothing that an arm carries."""
+    cut: Mapping[int, tuple[np.ndarray, ...]] = field(default_factory=dict)
+    """Number of a collision shape of its mesh -> corners (N, 3), body frame, of the convex pieces in its place."""
 
 
 def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraphFile) -> InteractiveSceneFile:
@@ -176,6 +179,7 @@ def _links(
         return links.with_friction(substance.friction)
     elif body.mesh is not None and visual is not None:
         links = _mesh_links(root, body, body.mesh, visual, substance.hull_density, graph)
+        links = cut_links(root, links, body.cut) if body.cut else links
     else:
         links = box_links(body.name, body.world_from_body, body.box, substance.hull_density)
     links = links.with_friction(substance.friction)
@@ -191,8 +195,8 @@ def _mesh_links(
         height = resting_height(graph, nodes, body.name)
         before = pose if body.reconstructed is None else body.reconstructed
         rests_at = None if height is None else height - float(before[2, 3])
-        if body.furniture:
-            carried = carried_by(graph, nodes, body.name)
+        carried = carried_by(graph, nodes, body.name)
+        if body.furniture or carried:
             return furniture_links(root, body.name, mesh, visual, density, before, rests_at=rests_at, carried=carried)
         return mesh_links(root, body.name, mesh, visual, density, rests_at=rests_at)
     yaw = float(box_yaw(body.box) - np.arctan2(pose[1, 0], pose[0, 0]))

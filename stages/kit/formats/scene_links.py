@@ -252,6 +252,23 @@ def still_mesh_links(
     return BodyLinks((Link(name, properties, (visual,), tuple(collisions)),))
 
 
+def cut_links(root: Path, links: BodyLinks, cut: Mapping[int, Sequence[np.ndarray]]) -> BodyLinks:
+    """Return the one link of a thing with its mesh with convex pieces, corners (N, 3) in its frame, in the place of
+    some of its collision shapes, by their number. Where that is all of them, its mass lies where they are."""
+    link, mass = links.links[0], links.mass
+    collisions, solids = [], []
+    for number, shape in enumerate(link.collisions):
+        for part, corners in enumerate(cut.get(number, ())):
+            solids.append(_hull(corners, LAYOUT_DENSITY)[0])
+            file = f"meshes/{link.name}/cut_{number}_{part}.obj"
+            write_obj(root / file, solids[-1].vertices, solids[-1].faces)
+            collisions.append(Shape(file))
+        collisions += [] if number in cut else [shape]
+    whole = len(cut) == len(link.collisions)
+    inertial = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if whole else link.inertial
+    return replace(links, links=(replace(link, inertial=inertial, collisions=tuple(collisions)),)).with_mass(mass)
+
+
 def _pads_of(world_from_body: np.ndarray, carried: Sequence[Carried]) -> list[Shape]:
     """Return a flat box below each carried thing, body frame."""
     body_from_world, shapes = inverse(world_from_body), []

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.cad.conflicts import convex_solid, min_conflicts, penetration
+from stages.cad.conflicts import min_conflicts
+from stages.kit.geometry.convex_solids import convex_solid, penetration
 from tests.panoptic_maps import box_mesh
 
 

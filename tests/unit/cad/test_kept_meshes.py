@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.cad.conflicts import penetration
 from stages.cad.obstacles import obstacles_of
 from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.geometry.convex_solids import penetration
 from tests.panoptic_maps import box_mesh, floor_mesh
 from tests.unit.cad.test_standing import solid
 
@@ -16,7 +16,7 @@ LARGE, SMALL, ON_SMALL = (
     ((0.57, 0.1, 0), (0.9, 0.4, 0.3)),
     ((0.7, 0.2, 0.3), (0.8, 0.3, 0.4)),
 )
-CLASSES = {1: "floor", 2: "object", 3: "object", 4: "object"}
+CLASSES = {1: "floor", 2: "hob", 3: "object", 4: "object"}
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def bounds(scene, name):
 
 def test_the_smaller_gives_way_and_what_it_carries_goes_along(crowded):
     scene = crowded()
-    raised = bounds(scene, "object_2") - np.array(LARGE)
+    raised = bounds(scene, "hob_2") - np.array(LARGE)
     assert raised == pytest.approx(np.array([[0, 0, 0.02]] * 2), abs=0.006), "its cover reaches a little lower"
     low, high = bounds(scene, "object_3")
     assert 0.6 - 0.003 < low[0] < 0.62 and low[2] == pytest.approx(0.0, abs=1e-6)
@@ -52,7 +52,7 @@ def test_the_smaller_gives_way_and_what_it_carries_goes_along(crowded):
 @pytest.mark.parametrize("options", [{"method": "thesis"}, {"maximum_shift": 0.0}])
 def test_nothing_goes_where_nothing_may(crowded, options):
     scene = crowded(**options)
-    for name, expected in (("object_2", LARGE), ("object_3", SMALL), ("object_4", ON_SMALL)):
+    for name, expected in (("hob_2", LARGE), ("object_3", SMALL), ("object_4", ON_SMALL)):
         assert bounds(scene, name) == pytest.approx(np.array(expected), abs=1e-6)
 
 

@@ -5,11 +5,17 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
+from stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from stages.fuse.piece_entities import Classes, with_unnamed_pieces
+from stages.fuse.surface import Surface
 from stages.fuse.unnamed_pieces import FLOOR, TOLD, unnamed_pieces
 from stages.fuse.walls import of_walls
+from stages.kit.formats.ply_files import ColoredMesh
 from stages.kit.geometry.point_clouds import vertex_normals
+from tests.unit.fuse.scenes import class_id
 
 VOXEL = 0.02
+MESH = ColoredMesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.int32), np.zeros((3, 3), np.uint8))
 
 
 Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -190,3 +196,19 @@ def test_small_and_empty() -> None:
     )
     assert nothing.shape == (0,)
     assert pieces(scene, named=(0, 1, 2)).max() == 0, "all is named"
+
+
+def test_a_desk_that_a_mask_took_for_the_wall_is_a_piece() -> None:
+    """What stands off every wall and has a level top; a board there has none, and stays wall."""
+    desk, lectern = ((-1.0, -0.5, 0.0), (0.4, 0.2, 0.72)), ((1.0, -1.0, 0.0), (1.3, -0.9, 1.0))
+    vertices, faces, owner = room(desk, lectern)
+    surface = Surface(vertices, faces, np.zeros((len(vertices), 3), np.uint8), owner)
+    number = np.where(owner == 0, 1, 2).astype(np.int32)
+    class_of = np.array([0, *(class_id(name) for name in ("floor", "wall", "ceiling", "object"))], np.int32)
+    labelled = LabelledSurface(owner.astype(np.int32), class_of[number], number)
+    entities = [ExtractedEntity(k, int(class_of[k]), (k,), MESH, 0.9, 5) for k in (1, 2)]
+    classes = Classes(*(int(c) for c in class_of[1:]))
+    found, result = with_unnamed_pieces(surface, entities, labelled, classes, voxel=VOXEL, minimum_area=0.05)
+    assert [e.class_id for e in found] == [*class_of[1:3], class_of[4]]
+    assert (result.instance[owner == 2] == found[2].instance).mean() > 0.9, "all but its feet"
+    assert (result.class_id[(owner == 1) | (owner == 3)] == class_of[2]).all()

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from schemas.base import as_transform
+from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene, CadSceneFile
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from schemas.interactive_scene import InteractiveSceneFile
 from schemas.scene_parts import Box, Relation, SurfacePlane
+from stages.kit.formats.cad_models import model_folder
 from stages.kit.formats.mobility import Mobility, mobility
-from stages.kit.formats.scene_bundle import BundleBody
+from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.geometry.convex_pieces import convex_pieces
-from stages.urdf.bodies import held_under_fixed
+from stages.kit.geometry.transforms import transform_from_yaw
+from stages.urdf.bodies import held_under_fixed, scene_bodies
+from stages.urdf.giving_way import DEPTH, given_way, written_pieces
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.stage import run
 from tests.unit.urdf.small_room import context
@@ -64,7 +72,7 @@ def graph_with(
         (graph_with("cabinet"), Mobility(False)),
         (graph_with("sink"), Mobility(False)),
         (graph_with("cup", gap=0.3), Mobility(True)),
-        (graph_with("object", size=0.3), Mobility(False)),  # 0.8 m high
+        (graph_with("object"), FREE),
         (graph_with("sofa", size=1.8), FREE),
     ],
 )
@@ -137,14 +145,50 @@ def test_a_laden_chair_is_free_and_keeps_its_load(tmp_path: Path) -> None:
     assert {body.name for body in made.info.bodies if body.carriable} == {"cup_3"}
 
 
-def test_a_chair_in_the_wall_is_held(tmp_path: Path) -> None:
+def test_a_heap_without_a_name_gives_way_to_a_chair(tmp_path: Path) -> None:
     scene = scene_of(tmp_path / "cad_scene", graph_with("chair"), (2.0, 0.0, 0.05))
     block = trimesh.creation.box((1.0, 0.3, 1.0)).apply_translation([0, 0.35, 0.5])
     block.subdivide().export(scene.root / "meshes" / "surroundings.ply")
     made = run(scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
-    assert made.summary["held"] == 1 and made.summary["movable"] == 1
+    assert made.summary["cut"] == 1 and made.summary["held"] == 0 and made.summary["movable"] == 2
+    assert made.outcome == "ok" and made.summary["collisions"] == 0
+    pieces = written_pieces(made.root)
+    left, before = np.concatenate([piece.points for piece in pieces["surroundings"]]), np.asarray(block.vertices)
+    assert left.min(axis=0) == pytest.approx(before.min(axis=0), abs=0.02), "it is cut, not moved"
+    assert left.max(axis=0) == pytest.approx(before.max(axis=0), abs=0.02)
+    depths = [a.depth(b) for a in pieces["surroundings"] for b in pieces["thing_2"]]
+    assert max(depths) <= DEPTH
+
+
+def test_of_two_meshes_the_larger_is_cut_and_keeps_its_mass(tmp_path: Path) -> None:
+    """The cup stands in the seat, 4 cm deep."""
+    scene = scene_of(tmp_path / "cad_scene", graph_with("chair"), (0.0, 0.0, 0.46))
+    body = {b.name: b for b in scene_bodies(scene, scene.graph, CARRIABLE)}
+    root = tmp_path / "out"
+    write_scene_bundle(root, list(body.values()), scene.graph)
+    before = {b.name: b.mass for b in InteractiveSceneFile.read(root / "scene.json").bodies}
+    cut = {b.name: b for b in given_way(root, list(body.values()))}
+    assert [name for name, entry in cut.items() if entry.cut] == ["thing_2"]
+    again = write_scene_bundle(root, [replace(b, mesh_is_written=True) for b in cut.values()], scene.graph)
+    assert {b.name: b.mass for b in again.bodies} == pytest.approx(before)
+    assert given_way(root, list(body.values())) == list(body.values()), "nothing is left to cut"
+
+
+def test_two_models_in_each_other_are_held(tmp_path: Path, library: CadLibrary) -> None:
+    """What is known is not cut."""
+    scene = scene_of(tmp_path / "cad_scene", graph_with("table"), (2.0, 0.0, 0.05))
+    model = next(entry for entry in library.info.models if entry.class_name == "table")
+    shutil.copytree(model_folder(library, model.id), scene.root / "models" / model.id)
+    known = {"model_id": model.id, "scale": 1.0, "world_from_model": as_transform(np.eye(4))}
+    nodes = [node.model_copy(update=known) if node.id == "thing_2" else node for node in scene.graph.nodes]
+    moved = known | {"world_from_model": as_transform(transform_from_yaw(0.0, np.array([0.3, 0.1, 0.0])))}
+    nodes.append(nodes[2].model_copy(update=moved | {"id": "thing_4", "instance": 4}))
+    second = scene.graph.parent_link("thing_2").model_copy(update={"target": "thing_4"})
+    graph = ContactGraphFile(nodes=tuple(nodes), links=(*scene.graph.links, second))
+    graph.write(scene.root / "graph.json")
+    made = run(CadScene(scene.root), parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    assert made.summary["held"] == 2 and made.summary["cut"] == 0 and made.summary["movable"] == 1
     assert not (made.root / "bodies" / "thing_2.urdf").exists()
-    assert not list((made.root / "meshes" / "thing_2").glob("collision_*"))
 
 
 def test_pieces_hold_all_of_a_mesh_and_a_convex_one_is_one() -> None:
