@@ -19,11 +19,11 @@ from schemas.interactive_scene import InteractiveSceneFile
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.formats.written_scene import WrittenScene
 from stages.kit.geometry.boxes import box_volume, minimum_rectangle
-from stages.kit.geometry.convex_cutting import outside_box
 from stages.kit.geometry.convex_solids import Solid, convex_solid, penetration
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from stages.kit.simulation.shapes import link_shapes
 from stages.kit.simulation.urdf_split import owner_of_link, read_urdf, with_absolute_meshes
+from stages.urdf.convex_cutting import outside_box
 
 DEPTH = 0.003
 """Things that lie no deeper in each other are left alone [m]: the settle test lets 5 mm pass, and Bullet pads every

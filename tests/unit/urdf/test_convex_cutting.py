@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from stages.kit.geometry.convex_cutting import THINNEST, half, outside_box
+from stages.urdf.convex_cutting import THINNEST, half, outside_box
 
 UNIT = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
 
