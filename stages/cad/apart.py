@@ -67,6 +67,12 @@ class Apart:
             moved = replace(moved, translation=moved.translation + [*aside, 0.0])
             box = shifted_box(box, np.array([*aside, 0.0]))
         solid = placed_solid(moved, surface)
+        if stand is not None and stand.on_top:
+            # In physics it ends where its shape does: that of other people's models reaches below what is drawn, and
+            # in the floor it is nowhere free.
+            lift = np.array([0.0, 0.0, max(0.0, bottom(box) - float(solid.low[:, 2].min()))])
+            moved, box = replace(moved, translation=moved.translation + lift), shifted_box(box, lift)
+            solid = solid.shifted(lift)
         spot = free_spot(
             solid, list(others), partial(stays_on, box, outline), tolerance=self.tolerance, maximum_shift=reach
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +24,7 @@ from stages.cad.placing import placement_of, size_misfit
 from stages.cad.scoring import score_of, would_tip
 from stages.cad.shapes import Observed, Placement, Shape, shape_of_state, turned_frames
 from stages.cad.target import Target, scale_fits, stands_in_wall
+from stages.cad.variety import varied
 
 TURNS = 3
 """Standing movable things are tried at so many yaws within a quarter turn."""
@@ -38,6 +40,10 @@ FULL_FITS = 4
 """Candidates that are refined thoroughly."""
 
 Aligned = tuple[Match, Placement]
+
+
+def _model(match: Match) -> str:
+    return match.shape.model.id
 
 
 @dataclass(frozen=True)
@@ -129,15 +135,17 @@ class Ours:
         parameters = self.parameters
 
         def rank(frames: list[Observed], upright: bool) -> tuple[list[Match], dict[str, int]]:
-            return rank_matches(
+            matches, counts = rank_matches(
                 frames,
                 shapes,
                 weights=matching_weights(parameters),
                 unmatched=parameters.unmatched_plane,
                 scale_range=(0.0, math.inf),
-                keep=parameters.matched,
+                keep=sys.maxsize,
                 upright_only=upright,
             )
+            kept = varied(matches, parameters.matched, _model)
+            return kept, {**counts, "matching rank": len(matches) - len(kept)}
 
         frames = target.frames(all_frames=True)
         if not target.movable:
@@ -155,7 +163,8 @@ class Ours:
         side gives as many as noise likes, and lying models with as many planes outrank the upright one.
         """
         order = np.argsort(self._screening_scores(target, matches), kind="stable")
-        return [matches[k] for k in order[: self.parameters.candidates * self.parameters.screening]]
+        ranked = [matches[k] for k in order]
+        return varied(ranked, self.parameters.candidates * self.parameters.screening, _model)
 
     def _screening_scores(self, target: Target, matches: list[Match]) -> list[float]:
         parameters = self.parameters
@@ -174,21 +183,29 @@ class Ours:
 
     def _aligned(self, target: Target, matches: list[Match], rejected: Counter[str]) -> list[Aligned]:
         """Return the matches aligned by planes, the best by their error on vertices: planes alone rank badly where few
-        were seen; vertices are the better judge of what deserves refinement."""
+        were seen; vertices are the better judge of what deserves refinement, and of whether planes did any good: a
+        model with one plane to the observed two is shrunk until it has them."""
         parameters = self.parameters
         weights = alignment_weights(parameters)
         points, normals = target.points[::SCREENING_STEP], target.normals[::SCREENING_STEP]
         aligned: list[Aligned] = []
         for match in matches:
-            placement = placement_of(match, align(match, weights, parameters.evaluations, self._scale_range))
-            if not scale_fits(placement, parameters):
+            surface = target.surfaces[match.shape.model.id]
+            starts = (
+                align(match, weights, parameters.evaluations, self._scale_range),
+                unaligned(match, self._scale_range),
+            )
+            placements = [
+                placement for start in starts if scale_fits(placement := placement_of(match, start), parameters)
+            ]
+            if not placements:
                 rejected["aligned scale out of range"] += 1
                 continue
-            error = alignment_error(target.surfaces[match.shape.model.id], placement, points, normals)
-            aligned.append((match, replace(placement, alignment_error=error)))
+            measured = [replace(p, alignment_error=alignment_error(surface, p, points, normals)) for p in placements]
+            aligned.append((match, min(measured, key=lambda placement: placement.alignment_error)))
         aligned.sort(key=lambda entry: entry[1].alignment_error + parameters.tilt_weight * entry[0].tilt)
         rejected["alignment rank"] = max(0, len(aligned) - parameters.candidates)
-        return aligned[: parameters.candidates]
+        return varied(aligned, parameters.candidates, lambda entry: _model(entry[0]))
 
     def _refined(self, target: Target, aligned: list[Aligned]) -> list[Aligned]:
         """Refine all candidates quickly on the vertices, then the best `FULL_FITS` thoroughly, with joints."""
@@ -225,8 +242,15 @@ class Ours:
         return score_of(match, placement, error, surface, target.around, self.parameters)
 
     def _measured(self, target: Target, match: Match, placement: Placement) -> Placement:
-        """Return the placement with the alignment error over all vertices and the score that the choice minimises."""
+        """Return the placement with the alignment error over all vertices and the score that the choice minimises.
+
+        A bowl stands in for a plate where the library has no plate like it: what fits hardly worse, and has the name,
+        comes first.
+        """
         surface = target.surfaces[placement.shape.model.id]
         error = alignment_error(surface, placement, target.points)
         oriented = robust_error(surface, placement, target.points, target.normals, TRUNCATION)
-        return replace(placement, alignment_error=error, score=self._score(target, match, placement, oriented))
+        name, named = target.node.class_name, placement.shape.model.class_name
+        stands_in = name != named and any(model.class_name == name for model in target.models)
+        score = self._score(target, match, placement, oriented) + self.parameters.choice_margin * stands_in
+        return replace(placement, alignment_error=error, score=score)

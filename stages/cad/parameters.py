@@ -142,7 +142,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=12,
+    version=13,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={

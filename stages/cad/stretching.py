@@ -43,7 +43,7 @@ def source_of(model: CadModel) -> str | None:
 
 
 def with_stretched(entry: Shortlist, target: Target, method: CadMethod, library: CadLibrary) -> Shortlist:
-    """Return the shortlist with the best stretched model where it is better than all others.
+    """Return the shortlist with the best stretched model where all others are more than hardly worse.
 
     Models of the thing's own class are stretched, where the library has any, else those that stand in for it. The
     surface of a model that is taken is added to the target's.
@@ -68,7 +68,7 @@ def with_stretched(entry: Shortlist, target: Target, method: CadMethod, library:
         if is_upright(p) and not any(p.shape.joints.values())
     ]
     best = min(placed, key=lambda placement: placement.score, default=None)
-    if best is None or (entry.placements and entry.placements[0].score <= best.score):
+    if best is None or (entry.placements and entry.placements[0].score <= best.score + method.parameters.choice_margin):
         return entry
     target.surfaces[best.shape.model.id] = made[best.shape.model.id]
     by = " x ".join(f"{factor:.2f}" for factor in factors_of(best.shape.model))

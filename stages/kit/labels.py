@@ -71,10 +71,12 @@ class LabelSet:
         return next((label for label in self.labels if label.id == number), None)
 
     def _by_name(self) -> dict[str, Label]:
+        """Spelling -> label; a label's own name comes before what others are also called."""
         labels: dict[str, Label] = {}
-        for label in self.labels:
-            for spelling in (label.name, *label.also):
-                labels.setdefault(plain(spelling), label)
+        for spelled in ([(label.name,) for label in self.labels], [label.also for label in self.labels]):
+            for label, spellings in zip(self.labels, spelled, strict=True):
+                for spelling in spellings:
+                    labels.setdefault(plain(spelling), label)
         return labels
 
 

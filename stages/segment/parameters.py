@@ -122,7 +122,7 @@ def _estimate(parameters: SegmentParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="segment",
-    version=6,
+    version=7,
     summary="Segment every frame: panoptic masks of a backend fused with geometric segments of the depth",
     parameters=SegmentParameters,
     reads={

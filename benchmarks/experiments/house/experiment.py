@@ -16,16 +16,20 @@ from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
 from benchmarks.experiments.house.furnishing import RECIPES, furnish
-from benchmarks.experiments.house.models import FOLDERS, MODELS, absent, imported, mesh_of
+from benchmarks.experiments.house.models import FOLDERS, MODELS, absent, import_all, imported, mesh_of, own_library
+from benchmarks.experiments.house.placing import Stand
 from benchmarks.experiments.house.recording import record
 from benchmarks.experiments.house.scoring import Judged, judge
 from benchmarks.experiments.surface.scenes import camera_of
 from benchmarks.reporting_seeds import Method, newest
-from benchmarks.steps import made
+from benchmarks.steps import made, opened
 from benchmarks.tabulation import Figure, markdown
+from schemas.cad_library import CadLibrary
 from stages.kit.stage import Parameters
 
 MASKS, NETWORK = "masks", "network"
+OWN = "own"
+"""Folder of the library that has the models of the house too."""
 TUNING = ("0",)
 GROUP = "house"
 REPORTING = newest(GROUP).seeds
@@ -50,8 +54,9 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
 
 def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
     """Import the models and make the library that all rooms share."""
-    imported(bench.parameters.data, bench.out / "models")
-    made("library build", bench.out / "cad_library", "--seed", LIBRARY_SEED)
+    import_all(bench.parameters.data, bench.out / "models")
+    library = made("library build", bench.out / "cad_library", "--seed", LIBRARY_SEED)
+    own_library(bench.parameters.data, bench.out / OWN, library)
 
 
 def inputs(bench: Bench, trial: Trial) -> list[Path]:
@@ -61,7 +66,8 @@ def inputs(bench: Bench, trial: Trial) -> list[Path]:
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judged]]:
     """Furnish a room, record it, run the chain, judge what came out."""
-    libraries = imported(bench.parameters.data, bench.out / "models")
+    libraries = imported(bench.out / "models")
+    own = opened(CadLibrary, bench.out / OWN / "library")
     meshes = {name: mesh_of(libraries, model) for name, model in MODELS.items()}
     for trial in trials:
         random = np.random.default_rng([int(trial.seed), sorted(RECIPES).index(trial.case)])
@@ -79,12 +85,24 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judg
         parts = ("--panoptic-map", out / "panoptic_map", "--contact-graph", out / "contact_graph")
         made("cad", out / "cad_scene", *parts, "--library", bench.out / "cad_library")
         made("urdf", out / "interactive_scene", "--cad-scene", out / "cad_scene")
-        yield trial, judge(house, recording, run / "sequence", out)
+        if trial.arm == MASKS:
+            made("cad", out / "own_scene", *parts, "--library", own.root)
+        yield trial, judge(house, recording, run / "sequence", out, own)
 
 
 def pooled(figure: Callable[[Sequence[Judged]], float], unit: str = "") -> Measure:
     """A figure over all rooms of a case."""
     return Measure(figure, unit)
+
+
+def _own(right: Callable[[Stand], bool]) -> Measure:
+    """Share of the things whose model the library has for which `right` holds [%]; None where no such scene is."""
+
+    def share(rooms: Sequence[Judged]) -> float | None:
+        held = [right(stand) for room in rooms for stand in room.own]
+        return 100 * float(np.mean(held)) if held else None
+
+    return Measure(share, "%")
 
 
 def _total(records: Sequence[Judged], name: str) -> int:
@@ -95,7 +113,16 @@ def notes(results: Results) -> str:
     """What was missed in which room."""
     rows = []
     for trial, room in results.records.items():
-        wrong = (*room.missed, *room.wrong_supports, *room.holes, *room.restless)
+        own = [f"{stand.thing}: {stand.decision} {stand.chosen}" for stand in room.own if not stand.right]
+        wrong = (
+            *room.missed,
+            *room.wrong_supports,
+            *room.holes,
+            *room.restless,
+            *room.false_joints,
+            *room.nested,
+            *own,
+        )
         rows.append([trial.arm, trial.case, trial.seed, f"{100 * room.pq:.1f}", str(room.movable), "; ".join(wrong)])
     return markdown("Rooms", ("masks", "room", "seed", "PQ", "movable", "wrong"), rows)
 
@@ -148,6 +175,12 @@ EXPERIMENT = Experiment(
         "least_movable": Measure(lambda rooms: float(min(room.movable for room in rooms)), interval=False),
         "at_rest": pooled(lambda rooms: 100 * _total(rooms, "at_rest") / max(_total(rooms, "movable"), 1), "%"),
         "settled": Measure(lambda rooms: 100 * float(np.mean([room.settled for room in rooms])), "%", interval=False),
+        "own_right": _own(lambda stand: stand.right),
+        "own_chosen": _own(lambda stand: stand.own),
+        "own_found": _own(lambda stand: stand.decision != "missed"),
+        "joints": Measure(lambda rooms: float(_total(rooms, "joints")), interval=False),
+        "false_joints": Measure(lambda rooms: float(sum(len(room.false_joints) for room in rooms)), interval=False),
+        "nested": Measure(lambda rooms: float(sum(len(room.nested) for room in rooms)), interval=False),
         "deepest": Measure(lambda rooms: max(room.penetration_mm for room in rooms), "mm", interval=False),
     },
     parameters=HouseParameters,

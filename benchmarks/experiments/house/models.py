@@ -20,6 +20,12 @@ FOLDERS = {
     "shapenet": ("scan2cad_sample/shapenet-sample", ("--unknown", "object")),
 }
 """Short name -> folder of the data, options of `library add`."""
+SHAPENET_CLASSES = """[models]
+"03001627/*" = {class_name = "chair", unit = "m"}
+"04379243/*" = {class_name = "table", unit = "m"}
+"02747177/*" = {class_name = "bin", unit = "m"}
+"""
+"""ShapeNet's names are numbers of categories; the unit is that in which the models furnish."""
 AWS = "aws_robomaker_residential_"
 
 
@@ -75,12 +81,31 @@ def absent(data: Path) -> list[str]:
     return [place for place, _ in FOLDERS.values() if not (data / place).is_dir()]
 
 
-def imported(data: Path, out: Path) -> dict[str, CadLibrary]:
-    """Import every folder of models unless that is up to date. Raises StepFailed."""
-    return {
-        name: opened(CadLibrary, made("library add", out / name, data / place, *options))
-        for name, (place, options) in FOLDERS.items()
-    }
+def import_all(data: Path, out: Path) -> None:
+    """Import every folder of models into `out` unless that is up to date. Raises StepFailed."""
+    for name, (place, options) in FOLDERS.items():
+        made("library add", out / name, data / place, *options)
+
+
+def imported(out: Path) -> dict[str, CadLibrary]:
+    """Return what `import_all` made."""
+    return {name: opened(CadLibrary, out / name) for name in FOLDERS}
+
+
+def own_library(data: Path, out: Path, library: Path) -> Path:
+    """Return `out`/library: a library with every folder of models added, named as a person would.
+
+    Raises StepFailed.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    named = out / "shapenet.toml"
+    named.write_text(SHAPENET_CLASSES, encoding="utf-8")
+    *_, last = FOLDERS
+    for name, (place, options) in FOLDERS.items():
+        said = ("--mapping", named) if name == "shapenet" else options
+        target = out / ("library" if name == last else name)
+        library = made("library add", target, data / place, *said, "--library", library)
+    return library
 
 
 def mesh_of(libraries: Mapping[str, CadLibrary], model: Model) -> trimesh.Trimesh:

@@ -120,7 +120,7 @@ def round_trip(places: np.ndarray, stops: list[int]) -> np.ndarray:
 
 def record(house: House, folder: Path, camera: Camera, frames: int, random: np.random.Generator) -> Recording:
     """Write log and masks of a walk into `folder` and return what was seen."""
-    log, masks = folder / "log", folder / "masks"
+    log, masks = folder / "log", folder / "true_masks"
     for place in (log / "color", log / "depth", masks):
         place.mkdir(parents=True, exist_ok=True)
     meshes = {**house.layout, **{thing.name: thing.mesh for thing in house.things}}

@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.experiments.house.furnishing import House
+from benchmarks.experiments.house.placing import Stand, joints_given, stands, true_places
 from benchmarks.experiments.house.recording import Recording, class_of
 from benchmarks.experiments.surface.measuring import distances
+from benchmarks.nested_furniture import nested
 from benchmarks.steps import opened
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
 from schemas.contact_graph import SCENE_NODE, ContactGraph
 from schemas.interactive_scene import InteractiveScene
 from schemas.panoptic_map import PanopticMap
@@ -59,6 +63,14 @@ class Judged:
     penetration_mm: float
     collisions: int
     settled: bool
+    joints: int
+    """Joints that move in the scene."""
+    false_joints: tuple[str, ...] = ()
+    """Things with joints that are none of theirs."""
+    nested: tuple[str, ...] = ()
+    """Furniture of which more than half the box lies in another's."""
+    own: tuple[Stand, ...] = ()
+    """What stands for the things that were seen, by a library that has their models."""
     missed: tuple[str, ...] = ()
     wrong_supports: tuple[str, ...] = ()
     holes: tuple[str, ...] = ()
@@ -68,8 +80,10 @@ class Judged:
 WHOLE = 0.98
 
 
-def judge(house: House, recording: Recording, sequence: Path, run: Path) -> Judged:
-    """Compare what a run made of a sequence (`panoptic_map`, `contact_graph`, `interactive_scene`) with the truth."""
+def judge(house: House, recording: Recording, sequence: Path, run: Path, library: CadLibrary) -> Judged:
+    """Compare what a run made of a sequence with the truth: `panoptic_map`, `contact_graph`, `cad_scene`,
+    `interactive_scene`, and `own_scene`, the CAD scene by a library that has the models of the house, where there is
+    one. `library` is that one."""
     world_from_log = np.array(opened(Sequence, sequence).info.gravity.world_from_log)
     predicted = load_map(opened(PanopticMap, run / "panoptic_map"))
     points = apply(world_from_log, recording.points.astype(float))
@@ -97,6 +111,10 @@ def judge(house: House, recording: Recording, sequence: Path, run: Path) -> Judg
     scene = opened(InteractiveScene, run / "interactive_scene")
     summary = scene.summary
     movable = sum(body.movable for body in scene.info.bodies)
+    places = true_places(house, library, world_from_log)
+    joints, false_joints = joints_given(opened(CadScene, run / "cad_scene"), name_of, places)
+    owned = {name: place for name, place in places.items() if name in {true_names[k] for k in things}}
+    own = run / "own_scene"
     return Judged(
         things=len(things),
         matched=whole.true_positives,
@@ -114,6 +132,10 @@ def judge(house: House, recording: Recording, sequence: Path, run: Path) -> Judg
         penetration_mm=float(summary["max_penetration_mm"]),
         collisions=int(float(summary["collisions"])),
         settled=bool(float(summary["settled"])),
+        joints=joints,
+        false_joints=false_joints,
+        nested=nested(scene.info.bodies),
+        own=stands(opened(CadScene, own), name_of, owned) if own.is_dir() else (),
         missed=missed,
         wrong_supports=wrong,
         holes=holes,

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 
-from benchmarks.experiments.house.furnishing import House, Recipe, Thing, Wish, furnish, scene_of
+from benchmarks.experiments.house.furnishing import House, Recipe, Thing, Wish, furnish, placed_at, scene_of
+from benchmarks.experiments.house.models import MODELS, Model, mesh_of
+from benchmarks.experiments.house.placing import true_places
 from benchmarks.experiments.house.recording import DISPARITY, disturbed, walk
 from benchmarks.experiments.house.tiny_renderer import TinyRenderer
 from benchmarks.experiments.surface.scenes import camera_of
+from benchmarks.nested_furniture import nested
+from schemas.interactive_scene import SceneBody
+from schemas.scene_parts import Box
+from stages.cad.alignment import turn_about_z
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import look_at
+from tests.unit.cad.models import chair, write_library
 
 
 def standing(size: tuple[float, float, float]) -> trimesh.Trimesh:
@@ -96,3 +105,33 @@ def test_the_walk_keeps_off_things_at_head_height(house: House) -> None:
             low, high = thing.bounds
             inside = (eye[:2] > low[:2] - 0.2).all() and (eye[:2] < high[:2] + 0.2).all()
             assert not inside or thing.parent != "floor"
+
+
+Size = tuple[float, float, float]
+
+
+def body(name: str, center: Size, size: Size, *, movable: bool = False) -> SceneBody:
+    pose = tuple(tuple(row) for row in np.eye(4).tolist())
+    box = Box(center=center, size=size)
+    return SceneBody(name=name, class_name=name, movable=movable, world_from_body=pose, box=box, mass=1.0)  # type: ignore[arg-type]
+
+
+def test_furniture_of_which_more_than_half_lies_in_another_is_named() -> None:
+    bed, desk = body("bed", (0, 0, 0.3), (2, 1.6, 0.6)), body("desk", (1.4, 0, 0.3), (1, 0.6, 0.6))
+    bystanders = [body("cup", (0, 0, 0.3), (0.5, 0.5, 0.1), movable=True)]
+    bystanders += [body(name, (0, 0, 0), (3, 3, 3)) for name in ("wall", "surroundings")]
+    assert nested([bed, desk, *bystanders]) == ()
+    assert nested([bed, desk, body("sofa", (0.3, 0, 0.3), (1, 0.9, 0.6)), *bystanders]) == ("sofa in bed",)
+
+
+def test_the_true_place_of_a_thing_is_where_its_mesh_was_put(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whichever way the model was turned and scaled to furnish with."""
+    model = Model("aws", "chair_a", "chair", turn=90.0, scale=1.5)
+    monkeypatch.setitem(MODELS, "chair_a", model)
+    library = write_library(tmp_path, {"chair_a": chair(0.4, 0.45, 0.9)})
+    mesh = placed_at(mesh_of({"aws": library}, model), 0.3, (1.0, 2.0, 0.0))
+    house = House(np.array([4.0, 4.0, 2.6]), [Thing("chair_a_1", "chair_a", mesh, "floor")])
+    place = true_places(house, library, np.eye(4))["chair_a_1"]
+    assert place.rotation == pytest.approx(turn_about_z(np.radians(90) + 0.3), abs=1e-6)
+    assert place.center[2] == pytest.approx(np.mean(mesh.bounds[:, 2]), abs=1e-6)
+    assert place.extents[2] == pytest.approx(np.ptp(mesh.bounds[:, 2]), abs=1e-6)

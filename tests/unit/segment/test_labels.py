@@ -80,6 +80,12 @@ def test_labels_are_matched_by_name_not_by_position() -> None:
         match_labels({0: "LABEL_0", 1: "LABEL_1"}, where="net")
 
 
+def test_a_name_comes_before_what_others_are_also_called() -> None:
+    """ADE20K calls plates what the vocabulary had bowls for, before it had plates."""
+    label = load_label_set("scenewright").find("plate")
+    assert label is not None and label.class_name == "plate"
+
+
 def test_words() -> None:
     labels = parse_words(["mug", " night stand ", "abacus", "blue thing = box  # a comment", "", "# nothing"], "words")
     assert [(label.name, label.class_name) for label in labels] == [
