@@ -49,7 +49,6 @@ def _body(
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
     parent = None if link is None or link.source == SCENE_NODE else link.source
-    guessed = mobile.furniture and node.class_name == NAMELESS and node.mark is None
     if node.model_id is not None:
         if node.world_from_model is None or node.scale is None:
             raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale")
@@ -57,7 +56,8 @@ def _body(
         if not folder.is_dir():
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
         model = as_it_moved(read_model(folder), {} if replacement is None else replacement.motions)
-        mobile = Mobility(False) if guessed and "built_in" in model.recipe else mobile
+        if mobile.furniture and node.mark is None and "built_in" in model.recipe:
+            mobile = Mobility(False)
         return BundleBody(
             name=node.id,
             class_name=node.class_name,
@@ -76,7 +76,7 @@ def _body(
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
-    if guessed and mesh is not None and not _steady(graph, node, mesh):
+    if mobile.furniture and node.mark is None and mesh is not None and not _steady(graph, node, mesh):
         mobile = Mobility(False)
     origin = np.eye(4) if node.node_type == "layout" else _bottom(bounds)
     if mesh is not None:

@@ -160,6 +160,16 @@ def test_a_heap_without_a_name_gives_way_to_a_chair(tmp_path: Path) -> None:
     assert max(depths) <= DEPTH
 
 
+@pytest.mark.parametrize("mark", [None, "movable"])
+def test_a_table_without_legs_is_not_let_go_unless_somebody_says_so(tmp_path: Path, mark: str | None) -> None:
+    graph = graph_with("table") if mark is None else marked(graph_with("table"), mark)
+    scene = scene_of(tmp_path / "cad_scene", graph, (2.0, 0.0, 0.05))
+    top = trimesh.creation.box((0.5, 0.5, 0.06)).apply_translation([0, 0, 0.7])
+    top.export(scene.root / "meshes" / "thing_2.ply")
+    body = next(b for b in scene_bodies(scene, scene.graph, CARRIABLE) if b.name == "thing_2")
+    assert body.movable is (mark is not None)
+
+
 def test_of_two_meshes_the_larger_is_cut_and_keeps_its_mass(tmp_path: Path) -> None:
     """The cup stands in the seat, 4 cm deep."""
     scene = scene_of(tmp_path / "cad_scene", graph_with("chair"), (0.0, 0.0, 0.46))
