@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.spatial import QhullError
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.vocabulary import load_vocabulary
@@ -24,6 +25,7 @@ from stages.kit.formats.scene_supports import (
 from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.boxes import box_yaw
 from stages.kit.geometry.layout_slabs import level_of_layout
+from stages.kit.geometry.solids import hull_or_box
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.measurement.layout_pieces import layout_pieces
 
@@ -86,5 +88,8 @@ def _cover(node: GraphNode, mesh: trimesh.Trimesh, carried: Sequence[Carried]) -
 
 
 def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    hull = trimesh.convex.convex_hull(points, qhull_options="QbB Pp Qt QJ")
+    try:
+        hull = trimesh.convex.convex_hull(points, qhull_options="QbB Pp Qt QJ")
+    except QhullError:
+        hull = hull_or_box(points)
     return np.asarray(hull.vertices, dtype=float), np.asarray(hull.faces)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial import QhullError
 from shapely.geometry import MultiPoint, Point, Polygon
 
 from stages.kit.formats.scene_supports import FOOT_THICKNESS, furniture_pieces
-from stages.kit.geometry.solids import hull, mass_properties
+from stages.kit.geometry.solids import hull_or_box, mass_properties
 
 LEAST_TILT = math.radians(5.0)
 """A floor may slope by this much [rad] before it tips over. Of the fronts seen in the recorded living room, and of what
@@ -24,11 +23,8 @@ def stands_steadily(points: np.ndarray, faces: np.ndarray, rests_at: float) -> b
     outline = MultiPoint(foot[foot[:, 2] <= rests_at + FOOT_THICKNESS, :2]).convex_hull
     if not isinstance(outline, Polygon):
         return False
-    try:
-        solids = [hull(piece) for piece in pieces]
-        center = mass_properties(solids, [1.0] * len(solids)).center
-    except (QhullError, ValueError):
-        return True  # flat: it lies
+    solids = [hull_or_box(piece) for piece in pieces]
+    center = mass_properties(solids, [1.0] * len(solids)).center
     above = Point(center[:2])
     margin = outline.exterior.distance(above) if outline.contains(above) else 0.0
     return bool(margin >= math.tan(LEAST_TILT) * (center[2] - rests_at))

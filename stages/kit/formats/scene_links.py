@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from scipy.spatial import QhullError
 from scipy.spatial.transform import Rotation
 
 from schemas.cad_library import CadModel
@@ -22,7 +21,7 @@ from stages.kit.formats.scene_supports import Carried, cut_below, furniture_piec
 from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
 from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.layout_slabs import Slab
-from stages.kit.geometry.solids import MassProperties, Solid, box, hull, mass_properties
+from stages.kit.geometry.solids import MassProperties, Solid, box, hull_or_box, mass_properties
 from stages.kit.geometry.transforms import inverse, transform_from, transform_from_quaternion, transform_from_yaw
 
 LAYOUT_DENSITY = 1000.0
@@ -280,18 +279,8 @@ def _pads_of(world_from_body: np.ndarray, carried: Sequence[Carried]) -> list[Sh
 
 def _hull(points: np.ndarray, density: float) -> tuple[Solid, MassProperties]:
     """Return the convex hull of points (N, 3), or the box around them when they are flatter than 2 mm, and its mass."""
-    try:
-        solid = hull(np.unique(points, axis=0))
-        properties = mass_properties([solid], [density])
-        if np.ptp(solid.vertices, axis=0).min() < 2e-3:
-            raise ValueError("flat")
-    except (QhullError, ValueError):
-        low, high = points.min(axis=0), points.max(axis=0)
-        middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 2.5e-3)
-        low, high = middle - half, middle + half
-        solid = box((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
-        properties = mass_properties([solid], [density])
-    return solid, properties
+    solid = hull_or_box(points)
+    return solid, mass_properties([solid], [density])
 
 
 def _triple(values: np.ndarray) -> tuple[float, float, float]:

@@ -22,7 +22,7 @@ from stages.kit.geometry.convex_pieces import convex_pieces
 LARGEST_STEP = 0.04
 """What a surface may stick out of the plane that stands for it, or a thing hover over it [m]: twice the usual voxel."""
 FEWEST_CORNERS = 4
-"""Fewer span no solid: what sticks out of a plane there is a spike."""
+"""Fewer span no solid: what sticks out of a plane there is a spike. A foot has at least one less on the ground."""
 FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
 """What of furniture counts as its feet above the floor, and how thick they are made [m]."""
 PAD_THICKNESS = 0.02
@@ -116,7 +116,8 @@ def cut_below(
     """Return the corner points (N, 3) of convex pieces (body frame), none in what is carried over them.
 
     A piece over whose plane something stands ends at that plane; what of it reaches more than 4 cm above stays as a
-    piece of its own, unless that would reach over the thing. `world_from_body` turns about z alone.
+    piece of its own, unless that would reach over the thing. Where nothing would be left nothing is cut.
+    `world_from_body` turns about z alone.
     """
     kept = list(pieces)
     for thing in carried:
@@ -138,7 +139,7 @@ def cut_below(
             high = high[~_within(high, world_from_body, area)]
             cut += [high] if len(high) >= FEWEST_CORNERS and not meets(high) else []
         kept = cut
-    return kept
+    return kept or list(pieces)
 
 
 def _within(points: np.ndarray, world_from_body: np.ndarray, area: Polygon) -> np.ndarray:
@@ -180,7 +181,7 @@ def furniture_pieces(points: np.ndarray, faces: np.ndarray, rests_at: float | No
     for piece in pieces:
         piece[:, 2] = np.maximum(piece[:, 2], rests_at)
     low = points[points[:, 2] < rests_at + FOOT_REACH]
-    if len(low):
+    if len(np.unique(low[:, :2], axis=0)) >= FEWEST_CORNERS - 1:
         foot = np.concatenate([low, low])
         foot[:, 2] = np.repeat([rests_at, rests_at + FOOT_THICKNESS], len(low))
         pieces.append(foot)

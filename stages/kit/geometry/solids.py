@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from stages.kit.geometry.transforms import apply
 
@@ -87,6 +87,21 @@ def box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) 
         (1, 7, 3),
     ]
     return Solid(lower + corners * (upper - lower), np.array(faces), np.zeros(12, dtype=bool))
+
+
+def hull_or_box(points: np.ndarray) -> Solid:
+    """Return the convex hull of points (N, 3) [m], or, where they are flatter than 2 mm, the box around them, at least
+    5 mm thick."""
+    try:
+        solid = hull(np.unique(points, axis=0))
+        if np.ptp(solid.vertices, axis=0).min() >= 2e-3 and volume(solid) > 0.0:
+            return solid
+    except (QhullError, ValueError):
+        pass
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, extent = 0.5 * (low + high), np.maximum(0.5 * (high - low), 2.5e-3)
+    low, high = middle - extent, middle + extent
+    return box((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
 
 
 def prism(

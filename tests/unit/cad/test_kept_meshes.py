@@ -65,6 +65,15 @@ def test_an_obstacle_has_the_shape_that_physics_gives_it(crowded):
     assert low == pytest.approx(0.0, abs=1e-3)
 
 
+def test_what_ends_in_a_point_has_no_foot_and_is_an_obstacle(replace_objects):
+    """A map in which one vertex alone of a thing comes near the floor."""
+    mesh = box_mesh((0, 0, 0.3), (0.6, 0.6, 0.9))
+    mesh.vertices[0] = [0.3, 0.3, 0.0]
+    scene = replace_objects({1: floor_mesh((-2, -2), (2, 2)), 2: mesh}, CLASSES | {2: "chair"}, built_ins=False)
+    shapes = obstacles_of(scene.graph, scene.path("layout"), scene.path("meshes"))
+    assert min(vertices[:, 2].min() for vertices, _ in shapes["chair_2"]) == pytest.approx(0.0, abs=0.01)
+
+
 def test_shifts_add_up():
     one = solid(((0, 0, 0), (1, 1, 1)))
     twice = one.shifted(np.array([1.5, 0, 0])).shifted(np.array([0, 0, 0.5]))

@@ -161,3 +161,9 @@ def test_a_spike_over_a_plane_is_no_piece() -> None:
     spiked = np.vstack([box.vertices, [[-0.45, 0.45, 0.9]]])
     [piece] = cut_below([spiked], np.eye(4), [CUP])
     assert len(piece) == len(spiked) and piece[:, 2].max() == pytest.approx(CUP.height)
+
+
+def test_a_thing_keeps_its_shape_where_all_of_it_lies_in_what_it_carries() -> None:
+    low, high = [-0.01, -0.01, CUP.height + 0.001], [0.01, 0.01, CUP.height + 0.01]
+    piece = np.array(trimesh.creation.box(bounds=[low, high]).vertices)
+    assert [kept.tolist() for kept in cut_below([piece], np.eye(4), [CUP])] == [piece.tolist()]
