@@ -41,8 +41,7 @@ def with_unnamed_pieces(
     """Return the entities and labels with the pieces of unnamed surface among them; as they are without a floor.
 
     `voxel` [m], `minimum_area` [m^2] of a piece, `told` (V,) as in `unnamed_pieces`. What masks took for a wall and is
-    none is unnamed. Nobody voted for one: it has no
-    segments, and no confidence.
+    none is unnamed too. Nobody voted for a piece: it has no segments, and no confidence.
     """
     vertices = _over_floor(surface, labelled, classes)
     if vertices is None:
