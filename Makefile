@@ -57,6 +57,7 @@ fuzz: extras ## Fuzz the commands (MINUTES=10 of processor time, SEED=0), then e
 lint: setup ## Format and lint check, types, who may import whom
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m ruff check .
+	$(PYTHON) -m tests.wheel_layout .mypy_cache/packages
 	$(PYTHON) -m mypy
 	$(PYTHON) -m pytest -p no:cacheprovider tests/contract/test_floors.py
 
@@ -65,8 +66,8 @@ format: setup ## Format the code
 	$(PYTHON) -m ruff check --fix .
 
 rules: setup ## Generate data/pipelines/*.mk and schemas/json from their declarations
-	for name in $(PIPELINES); do $(PYTHON) -m cli makefile $$name > data/pipelines/$$name.mk.new; mv data/pipelines/$$name.mk.new data/pipelines/$$name.mk; done
-	$(PYTHON) -m cli schemas --out schemas/json
+	for name in $(PIPELINES); do $(PYTHON) -m scenewright makefile $$name > data/pipelines/$$name.mk.new; mv data/pipelines/$$name.mk.new data/pipelines/$$name.mk; done
+	$(PYTHON) -m scenewright schemas --out schemas/json
 
 # ---- pipelines ----------------------------------------------------------------------------------------------------
 
@@ -75,11 +76,11 @@ rules: setup ## Generate data/pipelines/*.mk and schemas/json from their declara
 $(PIPELINES): setup
 	@$(MAKE) --no-print-directory -j$(or $(JOBS),2) -f data/pipelines/$@.mk PYTHON=$(PYTHON) OUTPUTS=$(OUTPUTS) $(if $(RUN),RUN=$(RUN))
 	@echo "report: $(OUTPUTS)/$(or $(RUN),$@)/report/report.html"
-	@folder=$(OUTPUTS)/$(or $(RUN),$@)/plan; if [ -d $$folder ]; then cat $$folder/plan.txt; $(PYTHON) -m cli inspect $$folder --expect ok > /dev/null; fi
+	@folder=$(OUTPUTS)/$(or $(RUN),$@)/plan; if [ -d $$folder ]; then cat $$folder/plan.txt; $(PYTHON) -m scenewright inspect $$folder --expect ok > /dev/null; fi
 
 .PHONY: batch
 batch: setup ## Run a pipeline over a data set: make batch SPEC=batch.toml RUN=folder JOBS=2
-	$(PYTHON) -m cli batch $(SPEC) --out $(OUTPUTS)/$(or $(RUN),batch) $(if $(JOBS),--jobs $(JOBS))
+	$(PYTHON) -m scenewright batch $(SPEC) --out $(OUTPUTS)/$(or $(RUN),batch) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: clean
 clean: ## Remove everything that runs made (outputs/*)

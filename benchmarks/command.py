@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from scenewright.schemas.errors import ScenewrightError, UsageError
 
 from benchmarks.discovery import experiment_files, load_experiment, summary_of
 from benchmarks.experiment import Bench, Experiment, Results, Trial, shown
@@ -19,7 +20,6 @@ from benchmarks.keeping import measure_missing, read_record, wanted_trials
 from benchmarks.options import add_option
 from benchmarks.reporting_seeds import FILE, UNRECORDED, newest, note_use
 from benchmarks.results import write_results
-from schemas.errors import ScenewrightError, UsageError
 
 PUBLISHED = Path(__file__).resolve().parents[1] / "docs" / "results"
 UNMET = 4

@@ -19,17 +19,17 @@ from typing import Any
 import cv2
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.geometry.cameras import back_project, project
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.segment.geometric import segment_depth
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.settings import geometric_settings
 
 from benchmarks.options import Recipe, asked
 from benchmarks.steps import opened
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.geometry.cameras import back_project, project
-from stages.kit.geometry.transforms import apply, inverse
-from stages.segment.geometric import segment_depth
-from stages.segment.parameters import SegmentParameters
-from stages.segment.settings import geometric_settings
 
 STRIDE = 4
 FAR_APART, SAME_SURFACE = 0.5, 0.1

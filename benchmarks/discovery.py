@@ -6,8 +6,9 @@ import ast
 import importlib
 from pathlib import Path
 
+from scenewright.schemas.errors import UsageError
+
 from benchmarks.experiment import Experiment
-from schemas.errors import UsageError
 
 FOLDER = Path(__file__).resolve().parent / "experiments"
 

@@ -14,18 +14,18 @@ from typing import Any
 from urllib.parse import quote
 
 import numpy as np
-
-from benchmarks.reporting_seeds import Method
-from benchmarks.tabulation import Figure
-from stages.kit.measurement.bootstrap import (
+from scenewright.stages.kit.measurement.bootstrap import (
     Interval,
     bootstrap_interval,
     figure_interval,
     paired_interval,
     pooled_interval,
 )
-from stages.kit.measurement.proportions import wilson_interval
-from stages.kit.stage import Parameters
+from scenewright.stages.kit.measurement.proportions import wilson_interval
+from scenewright.stages.kit.stage import Parameters
+
+from benchmarks.reporting_seeds import Method
+from benchmarks.tabulation import Figure
 
 RESAMPLES = 2000
 SEED_OF_INTERVALS = 0

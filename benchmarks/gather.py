@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 
 def gather(folder: Path) -> str:

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.stages.evaluate.graph_measures import GraphComparison, compare_graphs, optional_nodes
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.kit.measurement.edge_agreement import BESIDE_THE_TREE, DIRECTED, EdgeAgreement, edge_agreement
 
 from benchmarks.steps import opened
-from schemas.contact_graph import ContactGraphFile
-from schemas.ground_truth import GroundTruth
-from stages.evaluate.graph_measures import GraphComparison, compare_graphs, optional_nodes
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.truth import TrueRoom, load_truth
-from stages.kit.measurement.edge_agreement import BESIDE_THE_TREE, DIRECTED, EdgeAgreement, edge_agreement
 
 OPTIONS = EvaluateParameters.model_validate({})
 RELATIONS = (*DIRECTED, *BESIDE_THE_TREE)

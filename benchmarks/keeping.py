@@ -21,15 +21,15 @@ from typing import Any
 from urllib.parse import unquote
 
 from pydantic import TypeAdapter
+from scenewright.schemas.base import canonical_json
+from scenewright.schemas.errors import BadInput, ScenewrightError, UsageError
+from scenewright.stages.engine.discovery import stage_by_name
+from scenewright.stages.engine.reading import read_manifest
+from scenewright.stages.kit.digests import external_digest, sha256_of_text
 
 from benchmarks.code_digest import code_digest
 from benchmarks.discovery import load_experiment
 from benchmarks.experiment import Bench, Experiment, Trial
-from schemas.base import canonical_json
-from schemas.errors import BadInput, ScenewrightError, UsageError
-from stages.engine.discovery import stage_by_name
-from stages.engine.reading import read_manifest
-from stages.kit.digests import external_digest, sha256_of_text
 
 RECORD = "record.json"
 
@@ -61,7 +61,7 @@ def _digest_of(path: Path) -> str:
 
 
 def _code_of(experiment: Experiment, arm: str) -> str:
-    folders = tuple(f"stages.{stage_by_name(step).folder}" for step in experiment.steps)
+    folders = tuple(f"scenewright.stages.{stage_by_name(step).folder}" for step in experiment.steps)
     return _code(experiment.measure, tuple(experiment.code.get(arm, ())), folders)
 
 

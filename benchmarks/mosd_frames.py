@@ -8,9 +8,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
 
 FOLDER = "mosd_tabletop"
 """Below the folder of the real data."""

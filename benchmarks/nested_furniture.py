@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import permutations
 
-from schemas.cad_scene import SURROUNDINGS
-from schemas.interactive_scene import SceneBody
-from schemas.vocabulary import load_vocabulary
-from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume
+from scenewright.schemas.cad_scene import SURROUNDINGS
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.geometry.boxes import box_volume, boxes_overlap_volume
 
 INSIDE = 0.5
 """Share of a box that lies in another from which on it is in it."""

@@ -9,8 +9,7 @@ from typing import Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import Field, ValidationError
 from pydantic.fields import FieldInfo
-
-from stages.kit.stage import Parameters
+from scenewright.stages.kit.stage import Parameters
 
 Asked = TypeVar("Asked", bound=Parameters)
 

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 import trimesh
-
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
-from schemas.vocabulary import load_vocabulary
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
+from scenewright.schemas.vocabulary import load_vocabulary
 
 TILE = 0.009
 """Edge of the squares that stand for points a centimetre apart [m]."""

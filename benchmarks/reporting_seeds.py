@@ -14,8 +14,8 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from schemas.base import canonical_json
-from stages.engine.discovery import stage_by_name
+from scenewright.schemas.base import canonical_json
+from scenewright.stages.engine.discovery import stage_by_name
 
 FILE = Path(__file__).with_name("reporting_seeds.toml")
 UNRECORDED = "unrecorded"

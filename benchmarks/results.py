@@ -13,9 +13,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from scenewright.stages.kit.measurement.bootstrap import Interval
+
 from benchmarks.experiment import RESAMPLES, Results, Trial
 from benchmarks.tabulation import Figure, grid
-from stages.kit.measurement.bootstrap import Interval
 
 MOST_COLUMNS, MOST_SEEDS = 8, 200
 RUNNING = "trials"

@@ -22,22 +22,22 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.rendering.segmenter_errors import view_region
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.geometric import segment_depth
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.settings import geometric_settings
+from scenewright.stages.truth.annotated_points import instances_of
+from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 from benchmarks.experiments.real_things import ANNOTATIONS
 from benchmarks.options import Recipe, asked
 from benchmarks.steps import opened
-from schemas.sequence import Sequence as SequenceArtifact
-from schemas.vocabulary import UNNAMED, load_vocabulary
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
-from stages.kit.rendering.segmenter_errors import view_region
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.geometric import segment_depth
-from stages.segment.parameters import SegmentParameters
-from stages.segment.settings import geometric_settings
-from stages.truth.annotated_points import instances_of
-from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 STRIDE = 4
 LEAST_PIXELS = 50

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import typer
-
-from cli import housekeeping
-from cli.step_command import make_command
-from stages.engine.discovery import all_stages
+from scenewright.cli import housekeeping
+from scenewright.cli.step_command import make_command
+from scenewright.stages.engine.discovery import all_stages
 
 HELP = """Turn robot logs into scenes a robot can act in, and act in them.
 

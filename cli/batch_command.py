@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-
-from cli import output
-from cli.output import say as _say
-from schemas.errors import UsageError
+from scenewright.cli import output
+from scenewright.cli.output import say as _say
+from scenewright.schemas.errors import UsageError
 
 if TYPE_CHECKING:
-    from stages.engine.batch.session import BatchEnd
+    from scenewright.stages.engine.batch.session import BatchEnd
 
 
 def batch(
@@ -39,10 +38,10 @@ def batch(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Run a pipeline over a data set; exits with the gravest code of its scenes (docs/BATCH.md)."""
-    from stages.engine.batch import session
-    from stages.engine.batch.expansion import read_batch
-    from stages.engine.batch.resuming import RETRY
-    from stages.engine.batch.slurm_executor import parse_task
+    from scenewright.stages.engine.batch import session
+    from scenewright.stages.engine.batch.expansion import read_batch
+    from scenewright.stages.engine.batch.resuming import RETRY
+    from scenewright.stages.engine.batch.slurm_executor import parse_task
 
     if retry not in RETRY:
         raise UsageError(f"--retry {retry!r}: not one of {', '.join(RETRY)}", hint="see --help")

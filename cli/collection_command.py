@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-
-from cli.output import out
+from scenewright.cli.output import out
 
 
 def gc(
@@ -31,7 +30,7 @@ def gc(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Say what can go and how much that frees: leftovers of killed runs, superseded and intermediate artifacts."""
-    from stages.engine.collection import collect, survey
+    from scenewright.stages.engine.collection import collect, survey
 
     items = survey(runs or [Path("outputs")], superseded=superseded, intermediate=intermediate, keep=keep or ())
     gone, stayed = collect(items) if delete else ([], [])

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-
-from cli.output import out
+from scenewright.cli.output import out
 
 LISTED_FILES = 6
 MEGABYTE = 1e6
@@ -23,7 +22,7 @@ def diff(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Say what two runs differ in: parameters, versions, inputs, outcomes, measures, files, sizes, times."""
-    from stages.engine.comparison import compare
+    from scenewright.stages.engine.comparison import compare
 
     found = compare(first, second)
     if json_output:

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-
-from cli.output import out, say
-from schemas.errors import UsageError
-from schemas.plain_text import cleaned
+from scenewright.cli.output import out, say
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.plain_text import cleaned
 
 if TYPE_CHECKING:
-    from schemas.edits import AnyEdit
-    from stages.edit.map_state import MapState
+    from scenewright.schemas.edits import AnyEdit
+    from scenewright.stages.edit.map_state import MapState
 
 File = Annotated[Path, typer.Argument(help="edits.toml; it is made where there is none.")]
 ThingName = Annotated[str, typer.Argument(help="A thing of the map: its instance number, or its node's name (cup_7).")]
@@ -132,10 +131,10 @@ COMMANDS = (rename, delete, merge, split, add, gravity, floor)
 
 
 def _anchors(path: Path, names: list[str]) -> list[Any]:
-    from schemas.panoptic_map import PanopticMap
-    from stages.edit.anchoring import anchor_of
-    from stages.edit.map_state import read_state
-    from stages.engine.reading import open_artifact
+    from scenewright.schemas.panoptic_map import PanopticMap
+    from scenewright.stages.edit.anchoring import anchor_of
+    from scenewright.stages.edit.map_state import read_state
+    from scenewright.stages.engine.reading import open_artifact
 
     opened = open_artifact(path, PanopticMap)
     assert isinstance(opened, PanopticMap)
@@ -155,7 +154,7 @@ def _instance(state: MapState, name: str, path: Path) -> int:
 
 def append(file: Path, by: str, note: str, **values: Any) -> int:
     """Add the edit that somebody asks for now to the file, and say what to do next."""
-    from stages.edit.edits_file import append_edits
+    from scenewright.stages.edit.edits_file import append_edits
 
     edits = append_edits(file, [asked_edit(by, note, values)])
     where = APPLIED_BY.get(values["what"], "map --panoptic-map")
@@ -167,8 +166,7 @@ def append(file: Path, by: str, note: str, **values: Any) -> int:
 def asked_edit(by: str, note: str, values: Mapping[str, Any]) -> AnyEdit:
     """Return the edit that somebody asks for now; `values` are its fields. Raises UsageError for what is none."""
     from pydantic import TypeAdapter, ValidationError
-
-    from schemas.edits import AnyEdit
+    from scenewright.schemas.edits import AnyEdit
 
     said = {"by": cleaned(by or _account()), "when": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", "note": cleaned(note)}
     try:

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-
-from cli.edit_command import By, Center, Debug, File, Note, Size, Yaw, append
-from schemas.errors import UsageError
+from scenewright.cli.edit_command import By, Center, Debug, File, Note, Size, Yaw, append
+from scenewright.schemas.errors import UsageError
 
 if TYPE_CHECKING:
-    from stages.edit.map_state import Thing
-    from stages.edit.scene_state import SceneState
+    from scenewright.stages.edit.map_state import Thing
+    from scenewright.stages.edit.scene_state import SceneState
 
 NodeName = Annotated[str, typer.Argument(help="A thing of the graph: its node's name (cup_7), or its instance number.")]
 Graph = Annotated[Path, typer.Option("--contact-graph", help="The graph as it was built, edited or not.")]
@@ -87,7 +86,7 @@ def move(
     debug: Debug = False,
 ) -> int:
     """Say where a thing of a scene stands and how it is turned."""
-    from stages.edit.scene_edits import asked_move
+    from scenewright.stages.edit.scene_edits import asked_move
 
     if to is not None and by_metres is not None:
         raise UsageError("edit move: give --to or --shift, not both", hint="see --help")
@@ -154,9 +153,9 @@ COMMANDS = (support, mark, model, move, joint, no_joint, new_joint)
 
 
 def _opened(path: Path) -> SceneState:
-    from schemas.cad_scene import CadScene
-    from stages.edit.scene_state import SceneState
-    from stages.engine.reading import open_artifact
+    from scenewright.schemas.cad_scene import CadScene
+    from scenewright.stages.edit.scene_state import SceneState
+    from scenewright.stages.engine.reading import open_artifact
 
     opened = open_artifact(path, CadScene)
     assert isinstance(opened, CadScene)
@@ -165,8 +164,8 @@ def _opened(path: Path) -> SceneState:
 
 def _joint(path: Path, thing: str, name: str) -> dict[str, Any]:
     """Return the anchors of a thing and of a joint of its model. Raises UsageError when it has no such joint."""
-    from stages.edit.anchoring import Conflict
-    from stages.edit.scene_edits import joint_anchors
+    from scenewright.stages.edit.anchoring import Conflict
+    from scenewright.stages.edit.scene_edits import joint_anchors
 
     state = _opened(path)
     things = state.things()
@@ -183,9 +182,9 @@ def _joint(path: Path, thing: str, name: str) -> dict[str, Any]:
 
 
 def _things(path: Path) -> list[Thing]:
-    from schemas.contact_graph import ContactGraph
-    from stages.edit.graph_edits import GraphState
-    from stages.engine.reading import open_artifact
+    from scenewright.schemas.contact_graph import ContactGraph
+    from scenewright.stages.edit.graph_edits import GraphState
+    from scenewright.stages.engine.reading import open_artifact
 
     opened = open_artifact(path, ContactGraph)
     assert isinstance(opened, ContactGraph)
@@ -194,7 +193,7 @@ def _things(path: Path) -> list[Thing]:
 
 def _anchor(things: list[Thing], name: str, path: Path) -> dict[str, Any]:
     """Return the anchor of the node that is called so. Raises UsageError when there is none with a box."""
-    from stages.edit.anchoring import anchor_of_node
+    from scenewright.stages.edit.anchoring import anchor_of_node
 
     return anchor_of_node(_named(things, name, path)).model_dump(by_alias=True)
 

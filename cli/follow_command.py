@@ -39,8 +39,8 @@ def follow(
 
     Lines go to standard output as soon as they are known. What cannot be read is a line that says so.
     """
-    from stages.suture.following import Follower, growing_pairs, name_of, named_pairs, read_rig
-    from stages.suture.masks import masks_in, network_masks
+    from scenewright.stages.suture.following import Follower, growing_pairs, name_of, named_pairs, read_rig
+    from scenewright.stages.suture.masks import masks_in, network_masks
 
     stereo, radius = read_rig(rig)
     make = masks_in(masks, (stereo.height, stereo.width), name_of) if masks is not None else network_masks(segmenter)

@@ -9,27 +9,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-
-from cli import edit_command, edit_node_command
-from cli.batch_command import batch
-from cli.collection_command import gc
-from cli.comparison_command import diff
-from cli.follow_command import follow
-from cli.inspect_command import inspect
-from cli.output import out as _out
-from cli.output import say as _say
-from cli.record_command import record
-from cli.serve_command import serve
-from cli.show_command import show
-from cli.timeline_command import timeline
-from cli.urdf_check_command import urdf_check
-from cli.urdf_settle_command import urdf_settle
-from cli.view_command import view
-from cli.weights_command import convert_weights
-from schemas.errors import BadInput, UsageError
+from scenewright.cli import edit_command, edit_node_command
+from scenewright.cli.batch_command import batch
+from scenewright.cli.collection_command import gc
+from scenewright.cli.comparison_command import diff
+from scenewright.cli.follow_command import follow
+from scenewright.cli.inspect_command import inspect
+from scenewright.cli.output import out as _out
+from scenewright.cli.output import say as _say
+from scenewright.cli.record_command import record
+from scenewright.cli.serve_command import serve
+from scenewright.cli.show_command import show
+from scenewright.cli.timeline_command import timeline
+from scenewright.cli.urdf_check_command import urdf_check
+from scenewright.cli.urdf_settle_command import urdf_settle
+from scenewright.cli.view_command import view
+from scenewright.cli.weights_command import convert_weights
+from scenewright.schemas.errors import BadInput, UsageError
 
 if TYPE_CHECKING:
-    from stages.engine.chain import StepReport
+    from scenewright.stages.engine.chain import StepReport
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
@@ -50,7 +49,7 @@ def _settings(pairs: list[str] | None) -> dict[str, str]:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from stages.kit.library_versions import library_version
+        from scenewright.stages.kit.library_versions import library_version
 
         _out(library_version("scenewright"))
         raise typer.Exit
@@ -82,12 +81,12 @@ def run(
     debug: Debug = False,
 ) -> int:
     """Run a pipeline: the same commands that the Makefile chains. Exits with the gravest code of its steps."""
-    from stages.engine.batch.outcomes import worst_exit_code
-    from stages.engine.chain import forked_steps, run_pipeline
-    from stages.engine.estimation import estimate_pipeline, warn_or_refuse
-    from stages.engine.given_inputs import check_given_inputs
-    from stages.engine.memory_limit import parse_limit
-    from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
+    from scenewright.stages.engine.batch.outcomes import worst_exit_code
+    from scenewright.stages.engine.chain import forked_steps, run_pipeline
+    from scenewright.stages.engine.estimation import estimate_pipeline, warn_or_refuse
+    from scenewright.stages.engine.given_inputs import check_given_inputs
+    from scenewright.stages.engine.memory_limit import parse_limit
+    from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
 
     flags = {"--force": force, "--dry-run": dry_run, "--quiet": quiet, "--debug": debug}
     extra = tuple(flag for flag, given in flags.items() if given)
@@ -127,7 +126,7 @@ def run(
 
 
 def _say_what_to_trust(reports: list[StepReport]) -> None:
-    from stages.report.outlook import Facts, outlook
+    from scenewright.stages.report.outlook import Facts, outlook
 
     facts = {
         report.name: Facts(str(report.facts.get("outcome", "")), report.facts["summary"])
@@ -153,8 +152,8 @@ def _say_what_was_not_ok(reports: list[StepReport], accepted: tuple[str, ...], v
 
 def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int:
     """Re-hash artifacts and follow their inputs back to the log."""
-    from stages.engine.verification import Finding
-    from stages.engine.verification import verify as verify_artifact
+    from scenewright.stages.engine.verification import Finding
+    from scenewright.stages.engine.verification import verify as verify_artifact
 
     seen: dict[Path, Finding] = {}
     for path in paths:
@@ -181,7 +180,7 @@ def migrate(
     debug: Debug = False,
 ) -> int:
     """Bring an artifact to the current schema version, into a new folder."""
-    from stages.engine.migration import migrate as migrate_artifact
+    from scenewright.stages.engine.migration import migrate as migrate_artifact
 
     migrate_artifact(path, out)
     _out(str(out))
@@ -198,8 +197,8 @@ def models(
     """List the networks that steps can use (source, licence, checksum) and the weight files in the cache; serve one."""
     if context.invoked_subcommand is not None:
         return 0
-    from stages.engine.known_models import identify, known_models
-    from stages.engine.model_cache import add_model, cache_folder, cached_models
+    from scenewright.stages.engine.known_models import identify, known_models
+    from scenewright.stages.engine.model_cache import add_model, cache_folder, cached_models
 
     if check is not None:
         _out(identify(check).name)
@@ -227,7 +226,7 @@ def models(
 
 def doctor(json_output: Json = False, debug: Debug = False) -> int:
     """Say what is there, what is missing and how to get it."""
-    from stages.engine.diagnosis import diagnose
+    from scenewright.stages.engine.diagnosis import diagnose
 
     checks = diagnose()
     if json_output:
@@ -244,7 +243,7 @@ def schemas(
     out: Annotated[Path, typer.Option("--out", help="Folder; `make rules` gives schemas/json.")], debug: Debug = False
 ) -> int:
     """Export the JSON Schemas of the manifest and every payload file."""
-    from stages.engine.json_schemas import json_schemas
+    from scenewright.stages.engine.json_schemas import json_schemas
 
     out.mkdir(parents=True, exist_ok=True)
     for name, text in json_schemas().items():
@@ -258,8 +257,8 @@ def makefile(
     debug: Debug = False,
 ) -> int:
     """Print the makefile of a pipeline."""
-    from stages.engine.make_rules import makefile_for
-    from stages.engine.pipelines import pipeline_path, read_pipeline
+    from scenewright.stages.engine.make_rules import makefile_for
+    from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline
 
     _out(makefile_for(read_pipeline(pipeline_path(pipeline))).removesuffix("\n"))
     return 0

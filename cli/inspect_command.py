@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-
-from cli.output import out
-from schemas.artifact import Artifact
-from schemas.errors import BadInput, UsageError
-from schemas.manifest import MANIFEST_NAME
+from scenewright.cli.output import out
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.manifest import MANIFEST_NAME
 
 
 def inspect(
@@ -45,11 +44,11 @@ def inspect(
 
     Exits with 3 when it would be.
     """
-    from schemas.sequence import Sequence as FrameSequence
-    from stages.engine.reading import open_artifact
-    from stages.ingest.preflight.inspection import inspect_log, inspect_sequence
-    from stages.ingest.preflight.settings import ingest_parameters
-    from stages.kit.progress import progress_for
+    from scenewright.schemas.sequence import Sequence as FrameSequence
+    from scenewright.stages.engine.reading import open_artifact
+    from scenewright.stages.ingest.preflight.inspection import inspect_log, inspect_sequence
+    from scenewright.stages.ingest.preflight.settings import ingest_parameters
+    from scenewright.stages.kit.progress import progress_for
 
     try:
         os.stat(path)
@@ -88,7 +87,7 @@ def _command(report: Any, settings: Sequence[str]) -> str:
 
     Options that the pipeline has no variable for are left out.
     """
-    from stages.engine.pipelines import pipeline_path, read_pipeline
+    from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline
 
     streams = {stream for camera in report.cameras for stream in camera.streams}
     if report.verdict == "wasted" or "depth" not in streams or not streams & {"pose", "color"}:
@@ -107,14 +106,14 @@ def _program() -> list[str]:
     if shutil.which("scenewright"):
         return ["scenewright"]
     script = Path(sys.executable).with_name("scenewright")
-    return [os.path.relpath(script)] if script.is_file() else [os.path.relpath(sys.executable), "-m", "cli"]
+    return [os.path.relpath(script)] if script.is_file() else [os.path.relpath(sys.executable), "-m", "scenewright"]
 
 
 def _show(found: Any, html: Path | None, json_output: bool, manifest: dict[str, Any]) -> None:
-    from stages.ingest.preflight.text import as_text
+    from scenewright.stages.ingest.preflight.text import as_text
 
     if html is not None:
-        from stages.ingest.preflight.page import write_page
+        from scenewright.stages.ingest.preflight.page import write_page
 
         write_page(found, html)
     report = found.report.model_dump(mode="json")

@@ -6,33 +6,15 @@ import logging
 import os
 import signal
 import sys
-from pathlib import Path
 
-REPOSITORY = Path(__file__).resolve().parent.parent
 INTERRUPTED_TEXT = "interrupted; every finished artifact is as it was"
-
-
-def _refuse_foreign_packages() -> None:
-    """`stages` and `schemas` are common names: refuse to run when they come from somewhere else."""
-    import schemas
-    import stages
-
-    for package in (schemas, stages):
-        found = Path(package.__file__ or "").resolve().parent.parent
-        if found != REPOSITORY:
-            if sys.stderr is not None:
-                sys.stderr.write(
-                    f"error: package {package.__name__!r} comes from {found}, not from {REPOSITORY} "
-                    "(run from another folder, or clear PYTHONPATH)\n"
-                )
-            raise SystemExit(5)
 
 
 class _Lines(logging.Formatter):
     """Messages on one line each, cleaned of what they name; the columns of a table's line stay where they are."""
 
     def format(self, record: logging.LogRecord) -> str:
-        from schemas.plain_text import LONGEST_LINE, cleaned, one_line
+        from scenewright.schemas.plain_text import LONGEST_LINE, cleaned, one_line
 
         text = super().format(record)
         if record.exc_info is not None:
@@ -51,22 +33,21 @@ def _set_up_logging(level: int) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code."""
-    from stages.engine import interruption
+    from scenewright.stages.engine import interruption
 
     with interruption.waiting():  # numpy, for one, makes an import error of an interruption
         import typer
+        from scenewright.cli.output import say_error
+        from scenewright.cli.streams import INTERRUPTED, ReaderLeft
+        from scenewright.schemas.errors import MachineFailure, ScenewrightError
+        from scenewright.stages.engine.machine_faults import is_machines
+        from scenewright.stages.engine.runner import NO_CODE_CACHE, NO_CODE_CACHE_HINT, NO_CODE_CACHE_TEXT
         from typer.exceptions import TyperException
-
-        from cli.output import say_error
-        from cli.streams import INTERRUPTED, ReaderLeft
-        from schemas.errors import MachineFailure, ScenewrightError
-        from stages.engine.machine_faults import is_machines
-        from stages.engine.runner import NO_CODE_CACHE, NO_CODE_CACHE_HINT, NO_CODE_CACHE_TEXT
 
     debug = "--debug" in arguments
     _set_up_logging(logging.WARNING if "--quiet" in arguments else logging.DEBUG if debug else logging.INFO)
     try:
-        from cli.application import build_application
+        from scenewright.cli.application import build_application
 
         with interruption.heard():
             result = build_application()(args=arguments, prog_name="scenewright", standalone_mode=False)
@@ -112,7 +93,7 @@ def run(arguments: list[str]) -> int:
 
 
 def _say_bug(error: Exception) -> int:
-    from cli.output import say_error
+    from scenewright.cli.output import say_error
 
     say_error(f"internal error: {type(error).__name__}: {error} (a bug of ours; --debug shows where)")
     return 1
@@ -120,7 +101,7 @@ def _say_bug(error: Exception) -> int:
 
 def _check_surroundings() -> None:
     """Raise MachineFailure where no command can work: in a folder that is gone."""
-    from schemas.errors import MachineFailure
+    from scenewright.schemas.errors import MachineFailure
 
     try:
         os.getcwd()
@@ -140,11 +121,10 @@ def main() -> None:
 
 
 def _run_and_exit() -> None:
-    _refuse_foreign_packages()
-    from cli import streams
-    from cli.output import say_error
-    from schemas.errors import ScenewrightError
-    from stages.engine import interruption
+    from scenewright.cli import streams
+    from scenewright.cli.output import say_error
+    from scenewright.schemas.errors import ScenewrightError
+    from scenewright.stages.engine import interruption
 
     streams.set_up()
     try:

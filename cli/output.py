@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from schemas.plain_text import LONGEST_LINE, cleaned, one_line
+from scenewright.schemas.plain_text import LONGEST_LINE, cleaned, one_line
 
 
 def out(text: str) -> None:

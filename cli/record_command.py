@@ -21,9 +21,9 @@ def record(
 
     Prints the page's address. The file is written after every cut.
     """
-    from schemas.errors import BadInput
-    from stages.cutting.recording.server import RecordingServer
-    from stages.cutting.recording.session import Session
+    from scenewright.schemas.errors import BadInput
+    from scenewright.stages.cutting.recording.server import RecordingServer
+    from scenewright.stages.cutting.recording.session import Session
 
     if not file.parent.is_dir():
         raise BadInput(f"{file.parent}: no folder", hint="make it, or choose another place for the recording")

@@ -7,23 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import UsageError
-from schemas.scene_parts import Camera
-from stages.engine.keys import data_file_digests, library_versions, parameters_as_json
-from stages.engine.model_cache import resolve_weights
-from stages.engine.runner import choose_device
-from stages.kit.configuration import parameters_for, read_config
-from stages.kit.digests import external_digest
-from stages.kit.formats.frames import Frame
-from stages.kit.library_versions import library_version
-from stages.kit.services.segmentation_protocol import SegmentRequest
-from stages.kit.stage import External, Optionally
-from stages.segment.backends.service.server import SegmentationServer, revision_of, segment_request
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.registry import backend_for
-from stages.segment.settings import geometric_settings
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.engine.keys import data_file_digests, library_versions, parameters_as_json
+from scenewright.stages.engine.model_cache import resolve_weights
+from scenewright.stages.engine.runner import choose_device
+from scenewright.stages.kit.configuration import parameters_for, read_config
+from scenewright.stages.kit.digests import external_digest
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.library_versions import library_version
+from scenewright.stages.kit.services.segmentation_protocol import SegmentRequest
+from scenewright.stages.kit.stage import External, Optionally
+from scenewright.stages.segment.backends.service.server import SegmentationServer, revision_of, segment_request
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.parameters import STAGE, SegmentParameters
+from scenewright.stages.segment.registry import backend_for
+from scenewright.stages.segment.settings import geometric_settings
 
 _BLANK = SegmentRequest(
     Frame(0, 0.0, np.zeros((480, 640, 3), np.uint8), np.full((480, 640), 2, np.float32), None, np.eye(4)),

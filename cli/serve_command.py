@@ -41,7 +41,7 @@ def serve(
 
     Prints the address to give to `segment --backend` once it answers. There is no encryption and no password.
     """
-    from cli.segmentation_server import open_server
+    from scenewright.cli.segmentation_server import open_server
 
     given = {"backend": backend, "words": words, "score_threshold": score_threshold}
     files = {"weights": weights, "mask_weights": mask_weights, "labels": labels, "sidecar": sidecar}

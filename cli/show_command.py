@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from cli.output import out
+from scenewright.cli.output import out
 
 
 def show(
@@ -17,12 +16,12 @@ def show(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Say what each predicate means and was learned of, the operators, goals, and what is no longer believed."""
-    from schemas.learned_domain import LearnedDomain
-    from schemas.outside import LARGEST_SETTINGS, file_text
-    from stages.engine.reading import open_artifact
-    from stages.kit.tasks.pddl import parse_domain
-    from stages.predicates.language.showing import domain_lines, example_lines
-    from stages.predicates.learning.records import memory_of
+    from scenewright.schemas.learned_domain import LearnedDomain
+    from scenewright.schemas.outside import LARGEST_SETTINGS, file_text
+    from scenewright.stages.engine.reading import open_artifact
+    from scenewright.stages.kit.tasks.pddl import parse_domain
+    from scenewright.stages.predicates.language.showing import domain_lines, example_lines
+    from scenewright.stages.predicates.learning.records import memory_of
 
     learned = open_artifact(folder, LearnedDomain)
     assert isinstance(learned, LearnedDomain)

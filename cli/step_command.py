@@ -14,16 +14,15 @@ from typing import Any, Literal, Optional, Union, get_args, get_origin
 import typer
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
-
-from cli.output import out, say, say_error
-from schemas.base import LARGEST_SEED
-from schemas.errors import UsageError
-from stages.engine.chain import OUTCOME_EXIT_CODE
-from stages.engine.memory_limit import parse_limit
-from stages.engine.runner import RunResult, run_stage
-from stages.kit.configuration import parameters_for, read_config
-from stages.kit.progress import progress_for
-from stages.kit.stage import External, Optionally, Stage
+from scenewright.cli.output import out, say, say_error
+from scenewright.schemas.base import LARGEST_SEED
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.engine.chain import OUTCOME_EXIT_CODE
+from scenewright.stages.engine.memory_limit import parse_limit
+from scenewright.stages.engine.runner import RunResult, run_stage
+from scenewright.stages.kit.configuration import parameters_for, read_config
+from scenewright.stages.kit.progress import progress_for
+from scenewright.stages.kit.stage import External, Optionally, Stage
 
 _BOUNDS = (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below"))
 

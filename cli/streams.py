@@ -11,8 +11,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from schemas.errors import MachineFailure, ScenewrightError
-from schemas.plain_text import cleaned
+from scenewright.schemas.errors import MachineFailure, ScenewrightError
+from scenewright.schemas.plain_text import cleaned
 
 INTERRUPTED = 130
 
@@ -88,7 +88,7 @@ def set_up() -> None:
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             stream.flush()
-    terminal = os.isatty(2)  # there, progress bars write controls of their own; `cli.output` cleans the rest
+    terminal = os.isatty(2)  # there, progress bars write controls of their own; cli/output.py cleans the rest
     sys.stdout = Stream(os.dup(1), "standard output", clean=True, line_buffering=os.isatty(1))
     sys.stderr = Stream(os.dup(2), "standard error", clean=not terminal, line_buffering=True)
     os.dup2(2, 1)

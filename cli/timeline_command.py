@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from cli.output import out
+from scenewright.cli.output import out
 
 
 def timeline(
@@ -16,9 +15,9 @@ def timeline(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Say what appeared, went, was renamed and was attached elsewhere while mapping went on, a line for each change."""
-    from schemas.contact_graph import ContactGraph, GraphSnapshot
-    from schemas.errors import BadInput
-    from stages.engine.reading import open_artifact
+    from scenewright.schemas.contact_graph import ContactGraph, GraphSnapshot
+    from scenewright.schemas.errors import BadInput
+    from scenewright.stages.engine.reading import open_artifact
 
     artifact = open_artifact(folder, ContactGraph)
     grown = artifact.timeline if isinstance(artifact, ContactGraph) else None

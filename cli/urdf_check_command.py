@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from cli.output import out
+from scenewright.cli.output import out
 
 BAD_INPUT = 3
 
@@ -28,12 +27,12 @@ def urdf_check(
     links, NaN, axes, limits, masses, inertias, and links that lie in each other at rest. Exits with 3 when anything is.
     What is sound and seldom meant is said as advice.
     """
-    from stages.kit.formats.urdf_check import Problem, advice, check_urdf
+    from scenewright.stages.kit.formats.urdf_check import Problem, advice, check_urdf
 
     problems = check_urdf(file, root)
     advised = [] if problems else advice(file)
     if not problems:
-        from stages.urdf.rest_penetration import resting_penetrations
+        from scenewright.stages.urdf.rest_penetration import resting_penetrations
 
         problems = [
             Problem("penetration", f"link {p.first!r}", f"lies {1000 * p.depth:.1f} mm in link {p.second!r} at rest")

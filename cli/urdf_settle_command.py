@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-
-from cli.output import out
+from scenewright.cli.output import out
 
 Engine = Literal["bullet", "mujoco"]
 
@@ -30,13 +29,13 @@ def urdf_settle(
     through the floor, for each joint that meets something in the first tenth of its range, and for each pair of bodies
     more than 5 mm in each other. Exits with 4 when there is any, or when nothing can move: the outcome of `urdf`.
     """
-    from stages.engine.chain import OUTCOME_EXIT_CODE
-    from stages.urdf.settle_report import SettleReport, settle_report
+    from scenewright.stages.engine.chain import OUTCOME_EXIT_CODE
+    from scenewright.stages.urdf.settle_report import SettleReport, settle_report
 
     limits = {"moved_limit": moved, "turned_limit": math.radians(turned)}
     report: SettleReport = settle_report(scene, seconds if engine == "bullet" else 0.0, **limits)
     if engine == "mujoco":
-        from stages.urdf.mujoco_settle import mujoco_motions
+        from scenewright.stages.urdf.mujoco_settle import mujoco_motions
 
         report = replace(report, seconds=seconds, bodies=mujoco_motions(scene, seconds, **limits))
     lines = [f"{body.name}: falls through the floor" for body in report.unsettled if body.fell_through]

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from cli.output import out
-from schemas.errors import UsageError
+from scenewright.cli.output import out
+from scenewright.schemas.errors import UsageError
 
 
 def view(
@@ -35,7 +34,7 @@ def view(
     if not serves and (edit is not None or read_only or port):
         raise UsageError("--edit, --read-only and --port are for a page that is served", hint="without --save, --rerun")
     if not serves:
-        from cli.viewing.view import view_artifact
+        from scenewright.cli.viewing.view import view_artifact
 
         view_artifact(path, save)
         if save is not None:
@@ -45,8 +44,8 @@ def view(
         raise UsageError("--read-only needs --edit", hint="without --edit nothing is written anyway")
     if edit is not None and not edit.parent.is_dir():
         raise UsageError(f"{edit.parent}: no folder", hint="make it, or choose another place for the edits")
-    from cli.viewing.desk.desk import Desk
-    from cli.viewing.desk.server import DeskServer
+    from scenewright.cli.viewing.desk.desk import Desk
+    from scenewright.cli.viewing.desk.server import DeskServer
 
     with DeskServer(Desk(path, edit, read_only=read_only), port) as server:
         what = f"; what you put right is kept in {edit}" if edit is not None and not read_only else ""

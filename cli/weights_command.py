@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from cli import output
+from scenewright.cli import output
 
 
 def convert_weights(
@@ -17,8 +16,8 @@ def convert_weights(
 ) -> int:
     """Read a checkpoint for `disparity --method raft-stereo` without executing anything in it, check every tensor's
     name and shape, and write it as safetensors."""
-    from schemas.errors import MissingDependency, UsageError
-    from stages.disparity.raft.checkpoint import convert
+    from scenewright.schemas.errors import MissingDependency, UsageError
+    from scenewright.stages.disparity.raft.checkpoint import convert
 
     if out.suffix != ".safetensors":
         raise UsageError(f"{out}: the file to write must end in .safetensors")

@@ -14,11 +14,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from schemas.cad_library import Affordances, CadLibrary, CadModel
-from schemas.scene_parts import Camera
-from stages.kit.formats.cad_models import model_folder, posed_mesh
-from stages.kit.geometry.transforms import look_at
-from stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.schemas.cad_library import Affordances, CadLibrary, CadModel
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 TILE, CAPTION, COLUMNS = 168, 18, 9
 """Tile edge and height of the line of text [px]; tiles side by side."""

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from schemas.kinds import KINDS  # noqa: E402
-from stages.engine.discovery import all_stages  # noqa: E402
-from stages.engine.pipelines import pipeline_path, read_pipeline  # noqa: E402
-from stages.engine.tables import documents_of  # noqa: E402
-from stages.kit.stage import External, Optionally, Stage  # noqa: E402
+from scenewright.schemas.kinds import KINDS  # noqa: E402
+from scenewright.stages.engine.discovery import all_stages  # noqa: E402
+from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline  # noqa: E402
+from scenewright.stages.engine.tables import documents_of  # noqa: E402
+from scenewright.stages.kit.stage import External, Optionally, Stage  # noqa: E402
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -65,7 +65,7 @@ def commands_page() -> str:
 
 def other_commands() -> dict[str, str]:
     """Return name -> first sentence of the help of every command that is no step."""
-    from cli.application import build_application
+    from scenewright.cli.application import build_application
 
     table = inspect.getclosurevars(build_application()).nonlocals["table"]
     steps = {stage.folder for stage in all_stages().values()}

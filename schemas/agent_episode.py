@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.apartment import Apartment
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Seed
-from schemas.language import LanguageRecord
-from schemas.plan import Failure
+from scenewright.schemas.apartment import Apartment
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Seed
+from scenewright.schemas.language import LanguageRecord
+from scenewright.schemas.plan import Failure
 
 
 class EpisodeCall(Model):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import Field, model_validator
-
-from schemas.base import Model, Name
+from scenewright.schemas.base import Model, Name
 
 Coordinate = Annotated[float, Field(ge=-50.0, le=50.0)]
 Point = tuple[Coordinate, Coordinate]

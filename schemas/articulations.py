@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Vector3
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Vector3
 
 
 class Articulation(Model):

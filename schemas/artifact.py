@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
-from schemas.base import Model
-from schemas.errors import BadInput
-from schemas.manifest import Manifest
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import Manifest
 
 KINDS: dict[str, type[Artifact]] = {}
 Content = TypeVar("Content", bound=Model)

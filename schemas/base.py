@@ -11,9 +11,8 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema
-
-from schemas.errors import BadInput, first_problem
-from schemas.outside import LARGEST_DOCUMENT, LARGEST_INTEGER, check_integers, file_content
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import LARGEST_DOCUMENT, LARGEST_INTEGER, check_integers, file_content
 
 
 def canonical_json(value: Any) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, Name, Seed, Vector3
-from schemas.scene_parts import Joint, SurfacePlane
+from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
+from scenewright.schemas.base import Model, Name, Seed, Vector3
+from scenewright.schemas.scene_parts import Joint, SurfacePlane
 
 
 class ModelState(Model):

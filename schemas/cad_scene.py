@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, Name, Transform, Vector3
-from schemas.contact_graph import ContactGraphFile
-from schemas.edits import AppliedEditsFile
+from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
+from scenewright.schemas.base import Model, Name, Transform, Vector3
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.edits import AppliedEditsFile
 
 
 class CadCandidate(Model):

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, Name, RelativePath, Transform
-from schemas.edits import AppliedEditsFile
-from schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
+from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
+from scenewright.schemas.base import Model, Name, RelativePath, Transform
+from scenewright.schemas.edits import AppliedEditsFile
+from scenewright.schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
 
 SCENE_NODE = "scene"
 

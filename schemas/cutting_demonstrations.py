@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name, Seed, Vector3
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Name, Seed, Vector3
 
 CategoryName = Literal["chunks", "slices", "strips", "cubes"]
 PieceNumber = Annotated[int, Field(ge=0, lt=4096)]

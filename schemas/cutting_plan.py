@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import ClassVar
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Vector3
-from schemas.cutting_demonstrations import CuttingPlane, PieceNumber
-from schemas.plan import Failure
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Vector3
+from scenewright.schemas.cutting_demonstrations import CuttingPlane, PieceNumber
+from scenewright.schemas.plan import Failure
 
 
 class WantedFragment(Model):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Document
-from schemas.base import Model
-from schemas.sequence import Sequence
+from scenewright.schemas.artifact import Document
+from scenewright.schemas.base import Model
+from scenewright.schemas.sequence import Sequence
 
 
 class RowReport(Model):

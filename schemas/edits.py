@@ -11,10 +11,9 @@ from enum import StrEnum
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
-
-from schemas.base import Model, Name
-from schemas.hand_written import Point, UprightBox
-from schemas.vocabulary import load_vocabulary
+from scenewright.schemas.base import Model, Name
+from scenewright.schemas.hand_written import Point, UprightBox
+from scenewright.schemas.vocabulary import load_vocabulary
 
 FORMAT = "scenewright-edits"
 MOST_EDITS = 10_000

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pydantic import ValidationError
-
-from schemas.plain_text import cleaned
+from scenewright.schemas.plain_text import cleaned
 
 LONGEST_PART = 200
 """Characters of a place and of a message that are said."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Count, Model, Name, Seed, Transform, Vector3
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import Box, Camera
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Count, Model, Name, Seed, Transform, Vector3
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import Box, Camera
 
 
 class TrueObject(Model):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import Field
-
-from schemas.base import Model
+from scenewright.schemas.base import Model
 
 LARGEST_LENGTH = 1e4
 """Metres: nothing stands farther from the origin, or is larger."""

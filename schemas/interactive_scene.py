@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import ClassVar
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, Name, RelativePath, Transform
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import Box, Joint
+from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
+from scenewright.schemas.base import Model, Name, RelativePath, Transform
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import Box, Joint
 
 
 class SceneBody(Model):

@@ -3,11 +3,11 @@
 import importlib
 import pkgutil
 
-import schemas
-from schemas.artifact import KINDS
+import scenewright.schemas
+from scenewright.schemas.artifact import KINDS
 
-for _module in pkgutil.iter_modules(schemas.__path__):
+for _module in pkgutil.iter_modules(scenewright.schemas.__path__):
     if _module.name != "kinds":
-        importlib.import_module(f"schemas.{_module.name}")
+        importlib.import_module(f"scenewright.schemas.{_module.name}")
 
 __all__ = ["KINDS"]

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model
-from schemas.learned_domain import AtomWords, Name, Text
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model
+from scenewright.schemas.learned_domain import AtomWords, Name, Text
 
 
 class KitchenStep(Model):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.base import Model
-from schemas.plan import Failure
+from scenewright.schemas.base import Model
+from scenewright.schemas.plan import Failure
 
 
 class LanguageRecord(Model):

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Count, Model, Vector3
-from schemas.scene_parts import Box
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Count, Model, Vector3
+from scenewright.schemas.scene_parts import Box
 
 
 class LanguageRegion(Model):

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Vector3
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Vector3
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Text = Annotated[str, Field(max_length=4000)]

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
-
-from schemas.base import Count, Model
-from schemas.errors import BadInput
-from schemas.outside import check_bounds
+from scenewright.schemas.base import Count, Model
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import check_bounds
 
 MANIFEST_NAME = "manifest.json"
 FORMAT_VERSION = 1

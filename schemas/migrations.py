@@ -11,8 +11,8 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.outside import LARGEST_DOCUMENT, file_json
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import LARGEST_DOCUMENT, file_json
 
 Migration = Callable[[Path, Path], None]
 

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from schemas.errors import BadInput, MachineFailure, ScenewrightError
+from scenewright.schemas.errors import BadInput, MachineFailure, ScenewrightError
 
 LARGEST_DOCUMENT = 256 * 2**20
 """Bytes of a JSON document of an artifact, where nothing else is said."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name
-from schemas.plan import Failure
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Name
+from scenewright.schemas.plan import Failure
 
 Side = Annotated[float, Field(ge=0.01, le=0.4)]
 Height = Annotated[float, Field(ge=0.02, le=0.4)]

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, RelativePath, Transform, Vector3
-from schemas.edits import AppliedEditsFile
+from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
+from scenewright.schemas.base import Model, RelativePath, Transform, Vector3
+from scenewright.schemas.edits import AppliedEditsFile
 
 SNAPSHOTS = "snapshots"
 """Folder of the partial maps; each is named by the number of frames in it."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Transform
-from schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Transform
+from scenewright.schemas.contact_graph import ContactGraphFile
 
 
 class Failure(Model):

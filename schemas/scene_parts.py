@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.base import Model, QuaternionXYZW, Vector3
+from scenewright.schemas.base import Model, QuaternionXYZW, Vector3
 
 
 class Camera(Model):

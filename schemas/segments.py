@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from schemas.artifact import Artifact, Document
-from schemas.base import Model
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model
 
 
 class FrameSegment(Model):

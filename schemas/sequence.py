@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Transform
-from schemas.scene_parts import Camera
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Transform
+from scenewright.schemas.scene_parts import Camera
 
 
 class Gravity(Model):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact, Document
-from schemas.base import Count, Model
-from schemas.scene_parts import Camera
-from schemas.trajectory import Trajectory
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Count, Model
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.trajectory import Trajectory
 
 
 class SplatView(Model):

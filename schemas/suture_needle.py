@@ -8,10 +8,9 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Transform
-from schemas.suture_scene import MOST_VIEWS, Share, StereoRigRecord
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Transform
+from scenewright.schemas.suture_scene import MOST_VIEWS, Share, StereoRigRecord
 
 
 def _check_square(value: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:

@@ -10,11 +10,10 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Document
-from schemas.base import Model, Seed, Transform, Vector3
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence
+from scenewright.schemas.artifact import Document
+from scenewright.schemas.base import Model, Seed, Transform, Vector3
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence
 
 MOST_VIEWS = 2000
 Holder = Literal["air", "left", "right", "both", "tissue"]

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Seed
-from schemas.evaluation import MetricsFile
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Seed
+from scenewright.schemas.evaluation import MetricsFile
 
 
 class SutureRun(Model):

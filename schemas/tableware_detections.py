@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Transform, Vector3
-from schemas.scene_parts import Camera
-from schemas.tableware_dishes import TablewareDishes
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Transform, Vector3
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.tableware_dishes import TablewareDishes
 
 DetectedKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import Field, model_validator
-
-from schemas.base import Model
+from scenewright.schemas.base import Model
 
 
 def _between(low: float, high: float, what: str) -> object:

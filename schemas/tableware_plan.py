@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name, Vector3
-from schemas.tableware_dishes import TablewareDishes
-from schemas.tableware_scene import MOST_ITEMS, TablewareItem, check_carriers
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Name, Vector3
+from scenewright.schemas.tableware_dishes import TablewareDishes
+from scenewright.schemas.tableware_scene import MOST_ITEMS, TablewareItem, check_carriers
 
 Chance = Annotated[float, Field(ge=0.0, le=1.0)]
 Seconds = Annotated[float, Field(ge=0.0)]

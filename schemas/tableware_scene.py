@@ -6,11 +6,10 @@ from collections.abc import Iterable
 from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name, Seed, Transform, Vector3
-from schemas.scene_parts import Camera
-from schemas.tableware_dishes import TablewareDishes
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Name, Seed, Transform, Vector3
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.tableware_dishes import TablewareDishes
 
 TablewareKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
 MOST_ITEMS = 60

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from pydantic import Field
-
-from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name, Seed
-from schemas.tableware_plan import TablewareAction, TimesOfActions
-from schemas.tableware_scene import TablewareItem
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model, Name, Seed
+from scenewright.schemas.tableware_plan import TablewareAction, TimesOfActions
+from scenewright.schemas.tableware_scene import TablewareItem
 
 
 class TrialStep(Model):

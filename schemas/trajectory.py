@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact, OptionalDocument
-from schemas.base import Model
-from schemas.sequence import Gravity
+from scenewright.schemas.artifact import Artifact, OptionalDocument
+from scenewright.schemas.base import Model
+from scenewright.schemas.sequence import Gravity
 
 
 class FrameEstimate(Model):

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-from schemas.base import Model
-from schemas.errors import BadInput
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput
 
 VOCABULARY_FILE = Path(__file__).resolve().parent.parent / "data" / "vocabulary.toml"
 VOID = 0

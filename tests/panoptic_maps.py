@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import open3d as o3d
 import trimesh
+from scenewright.stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
 
 from benchmarks.perfect_maps import perfect_map, tiles, write_map
-from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
 
 __all__ = [
     "box_mesh",

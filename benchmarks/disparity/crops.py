@@ -6,10 +6,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.stages.suture.world.tubes import NEEDLE
 
 from benchmarks.disparity.rendered_pairs import KeptPair, kept
 from benchmarks.disparity.shapes import shapes_pair
-from stages.suture.world.tubes import NEEDLE
 
 HEIGHT, WIDTH = 128, 256
 LEAST, LARGEST = 1.0, 96.0

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.suture.rig import TWO_CAMERAS, StereoRig
+from scenewright.stages.suture.world.render import render
+from scenewright.stages.suture.world.sampling import seen_scene
 
 from benchmarks.steps import made
-from schemas.errors import BadInput
-from stages.kit.formats.frames import FrameReader
-from stages.suture.rig import TWO_CAMERAS, StereoRig
-from stages.suture.world.render import render
-from stages.suture.world.sampling import seen_scene
 
 FRACTION = 64.0
 """Disparities are kept in so many parts of a pixel, as 16-bit numbers; 0 is unknown."""

@@ -16,6 +16,11 @@ from pathlib import Path
 import numpy as np
 import torch
 from pydantic import Field
+from scenewright.stages.disparity.raft.architecture import SMALL
+from scenewright.stages.disparity.raft.checkpoint import save_network
+from scenewright.stages.disparity.raft.matching import SMALL_UPDATES
+from scenewright.stages.disparity.raft.network import RaftStereo
+from scenewright.stages.suture.rig import ENDOSCOPE
 from torch.nn import functional
 
 from benchmarks.disparity.crops import TEXTURES, Kept, Sample, kept_sample, shapes_sample
@@ -24,11 +29,6 @@ from benchmarks.disparity.shapes import texture_bank
 from benchmarks.options import Recipe, asked
 from benchmarks.steps import made
 from benchmarks.training.run import TrainingRun, rate_at, train
-from stages.disparity.raft.architecture import SMALL
-from stages.disparity.raft.checkpoint import save_network
-from stages.disparity.raft.matching import SMALL_UPDATES
-from stages.disparity.raft.network import RaftStereo
-from stages.suture.rig import ENDOSCOPE
 
 PEAK_RATE, WEIGHT_DECAY, WARM_UP = 1e-3, 1e-4, 0.05
 FIRST_MOVES = 0.05

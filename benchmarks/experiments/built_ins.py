@@ -17,25 +17,25 @@ from typing import Any, cast
 import numpy as np
 import open3d as o3d
 import trimesh
+from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.cad_library import CadLibrary, LibraryFile
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph, GraphNode
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.cad.built_ins import is_built_in, may_be_built_in
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, part_transforms, posed_collision, read_model
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.geometry.box_cover import cover_with_boxes
+from scenewright.stages.kit.geometry.boxes import box_rotation, box_yaw
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
 from scipy.spatial import cKDTree
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.experiments.moving import FRAMES, OPENED, PLACE, SIZE, true_motions
 from benchmarks.generated_rooms import STEPS, make_library, make_room
 from benchmarks.steps import opened, step, unrecorded
-from schemas.articulations import Articulations
-from schemas.cad_library import CadLibrary, LibraryFile
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph, GraphNode
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.cad.built_ins import is_built_in, may_be_built_in
-from stages.kit.formats.cad_models import load_collision_parts, part_transforms, posed_collision, read_model
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.geometry.box_cover import cover_with_boxes
-from stages.kit.geometry.boxes import box_rotation, box_yaw
-from stages.kit.geometry.transforms import apply, transform_from_yaw
 
 TUNING = ("kitchen-40",)
 REPORTING = (*(f"kitchen-{seed}" for seed in range(1700, 1704)), "office-1700", "bedroom-1700")

@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.agent.arms.registry import ARMS
+from scenewright.stages.agent.judging import CAUSES, Score, score
+from scenewright.stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
+from scenewright.stages.agent.trials import Setting, run_trial
+from scenewright.stages.agent.world.failures import TABLE_3_4, Rates
+from scenewright.stages.agent.world.floor import Floor
 
 from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Share, Trial, count, mean, pooled
 from benchmarks.tabulation import Figure, markdown
-from stages.agent.arms.registry import ARMS
-from stages.agent.judging import CAUSES, Score, score
-from stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
-from stages.agent.trials import Setting, run_trial
-from stages.agent.world.failures import TABLE_3_4, Rates
-from stages.agent.world.floor import Floor
 
 TUNING, REPORTING = (*range(1100), *range(2000, 2100), *range(4000, 4100), *range(5000, 5200)), range(5200, 5300)
 """Versions 1, 3, 4, 5 and 8 were reported on seeds 1000 to 1099, 2000 to 2099, 4000 to 4099, 5000 to 5099 and 5100 to

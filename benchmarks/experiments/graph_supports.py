@@ -10,16 +10,17 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.evaluate.graph_measures import GraphComparison, optional_nodes
+from scenewright.stages.evaluate.truth import TrueRoom
+
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.generated_rooms import STEPS, make_room
 from benchmarks.graph_scores import RELATIONS, distance_figures, judge, read_room
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import opened, unrecorded
-from schemas.contact_graph import ContactGraphFile
-from schemas.ground_truth import GroundTruth
-from schemas.scene_parts import Relation
-from stages.evaluate.graph_measures import GraphComparison, optional_nodes
-from stages.evaluate.truth import TrueRoom
 
 TUNING, REPORTING = tuple(f"studio-{k}" for k in range(40, 44)), tuple(f"studio-{k}" for k in range(1000, 1004))
 CASES = {"reporting": REPORTING, "tuning": TUNING}

@@ -14,21 +14,21 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.evaluate.correspondence import point_overlaps
+from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
+from scenewright.stages.kit.formats.ply_files import read_ply
+from scenewright.stages.kit.stage import Parameters
 from scipy.spatial import cKDTree
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.generated_rooms import STEPS, RoomFolder, make_room
 from benchmarks.graph_scores import OPTIONS, Figures, distance_figures, judge, read_room
 from benchmarks.steps import made, opened, unrecorded
-from schemas.contact_graph import ContactGraphFile
-from schemas.panoptic_map import PanopticMap
-from schemas.segments import Segments
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.evaluate.correspondence import point_overlaps
-from stages.evaluate.truth import TrueRoom
-from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
-from stages.kit.formats.ply_files import read_ply
-from stages.kit.stage import Parameters
 
 ROOMS = ("kitchen-2000", "office-2000")
 FRAMES = 60

@@ -9,19 +9,16 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from pydantic import Field
-
-from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
-from benchmarks.tabulation import markdown
-from stages.kit.language.chat import Chat, ChatSettings
-from stages.kit.language.scripted import ScriptedBackend
-from stages.kit.predicates.expressions import text_of
-from stages.kit.predicates.goal_words import goal_phrases
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.stage import Parameters
-from stages.kit.tasks.pddl import domain_text
-from stages.kit.tasks.strips import Atom, Domain
-from stages.kit.tasks.task_planner import TaskPlan
-from stages.predicates.execution import (
+from scenewright.stages.kit.language.chat import Chat, ChatSettings
+from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.kit.predicates.expressions import text_of
+from scenewright.stages.kit.predicates.goal_words import goal_phrases
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.kit.tasks.pddl import domain_text
+from scenewright.stages.kit.tasks.strips import Atom, Domain
+from scenewright.stages.kit.tasks.task_planner import TaskPlan
+from scenewright.stages.predicates.execution import (
     Abstraction,
     Attempt,
     Planner,
@@ -32,20 +29,23 @@ from stages.predicates.execution import (
     oracle,
     timed_plan,
 )
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.opening import STAND_IN
-from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.random_exploration import RandomLearner
-from stages.predicates.learning.setting import KITCHEN_GIVEN
-from stages.predicates.learning.thesis import ThesisLearner, stand_in
-from stages.predicates.learning.thesis_memory import ThesisMemory
-from stages.predicates.measure.accuracy import balanced_accuracy, drawn_cases
-from stages.predicates.measure.operators import Done, allowed_accuracy, expected_share
-from stages.predicates.tasks import SETS, Task, tasks_of
-from stages.predicates.teacher.simulated import SimulatedTeacher, Wording
-from stages.predicates.training import Training, train
-from stages.predicates.truth import true_domain, truth_of
-from stages.predicates.world.catalogue import DOMAINS, kitchen_file
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.opening import STAND_IN
+from scenewright.stages.predicates.learning.ours import OursLearner
+from scenewright.stages.predicates.learning.random_exploration import RandomLearner
+from scenewright.stages.predicates.learning.setting import KITCHEN_GIVEN
+from scenewright.stages.predicates.learning.thesis import ThesisLearner, stand_in
+from scenewright.stages.predicates.learning.thesis_memory import ThesisMemory
+from scenewright.stages.predicates.measure.accuracy import balanced_accuracy, drawn_cases
+from scenewright.stages.predicates.measure.operators import Done, allowed_accuracy, expected_share
+from scenewright.stages.predicates.tasks import SETS, Task, tasks_of
+from scenewright.stages.predicates.teacher.simulated import SimulatedTeacher, Wording
+from scenewright.stages.predicates.training import Training, train
+from scenewright.stages.predicates.truth import true_domain, truth_of
+from scenewright.stages.predicates.world.catalogue import DOMAINS, kitchen_file
+
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
+from benchmarks.tabulation import markdown
 
 TUNING, REPORTING = range(210), range(300, 310)
 TRAINING_TASKS, SET_TASKS = 10, 10

@@ -23,24 +23,24 @@ from typing import Protocol
 import numba
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.kit.formats.frames import CAMERA_FRAME, FrameReader
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.rendering.splatting.rasterizer import View
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.splat.build_stage import method_of, rasterizer_of
+from scenewright.stages.splat.building import placed_poses
+from scenewright.stages.splat.render_stage import figures_of
+from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.triangulation import with_points
+from scenewright.stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
 
 from benchmarks.experiment import Bench, Experiment, Interval, Results, Trial, mean, ratio
 from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS, error_seed, make_room
 from benchmarks.splats.lerf import Lerf
 from benchmarks.steps import made, opened
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.kit.formats.frames import CAMERA_FRAME, FrameReader
-from stages.kit.geometry.transforms import inverse
-from stages.kit.rendering.splatting.rasterizer import View
-from stages.kit.stage import Parameters
-from stages.splat.build_stage import method_of, rasterizer_of
-from stages.splat.building import placed_poses
-from stages.splat.render_stage import figures_of
-from stages.splat.training import Trainer
-from stages.splat.triangulation import with_points
-from stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
 
 REAL = {
     "office": "hololens_office",

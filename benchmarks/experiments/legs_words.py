@@ -21,6 +21,21 @@ from typing import Protocol
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.stages.kit.geometry.boxes import box_iou
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.open_words.calibration import BUNDLED as CALIBRATION
+from scenewright.stages.kit.open_words.embedded import BUNDLED as ENCODER
+from scenewright.stages.kit.open_words.finding import Finder
+from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.options import EncoderParameters
+from scenewright.stages.kit.open_words.relevancy import margins, query_rows, relevancy
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.rasterizer import View
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.splat.asked_figures import calibration_error, recall_at_rejection
+from scenewright.stages.splat.language.pyramid import pyramid
+from scenewright.stages.splat.ply import read_gaussians
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.experiments.real import EXPECTED
@@ -29,21 +44,6 @@ from benchmarks.reporting_seeds import Method, newest
 from benchmarks.splats.langsplat import langsplat
 from benchmarks.splats.lerf import Lerf
 from benchmarks.words.asked import ANNOTATIONS, NAMED_ROOMS, AskedLog, AskedPlace, AskedRoom, Query
-from schemas.language_map import LanguageMap
-from stages.kit.geometry.boxes import box_iou
-from stages.kit.geometry.cameras import scaled
-from stages.kit.open_words.calibration import BUNDLED as CALIBRATION
-from stages.kit.open_words.embedded import BUNDLED as ENCODER
-from stages.kit.open_words.finding import Finder
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.open_words.options import EncoderParameters
-from stages.kit.open_words.relevancy import margins, query_rows, relevancy
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.rasterizer import View
-from stages.kit.stage import Parameters
-from stages.splat.asked_figures import calibration_error, recall_at_rejection
-from stages.splat.language.pyramid import pyramid
-from stages.splat.ply import read_gaussians
 
 GROUP = "asked rooms"
 REPORTING = newest(GROUP).seeds

@@ -16,18 +16,18 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pydantic import Field
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.backends.objects.backend import BUNDLED
+from scenewright.stages.segment.backends.objects.boosting import read_trees
+from scenewright.stages.segment.backends.objects.grouping import by_trees
+from scenewright.stages.segment.backends.objects.pairs import FEATURES
+from scenewright.stages.segment.backends.objects.plain import segment_plain
+from scenewright.stages.segment.backends.objects.segmentation import segment_objects
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, median
 from benchmarks.mosd_frames import CAMERA, FOLDER, LabelledFrame, frame_files, frame_names, kind_of, read_frame
 from benchmarks.object_masks import score_object_masks
-from stages.kit.drawing.palette import instance_color
-from stages.kit.stage import Parameters
-from stages.segment.backends.objects.backend import BUNDLED
-from stages.segment.backends.objects.boosting import read_trees
-from stages.segment.backends.objects.grouping import by_trees
-from stages.segment.backends.objects.pairs import FEATURES
-from stages.segment.backends.objects.plain import segment_plain
-from stages.segment.backends.objects.segmentation import segment_objects
 
 QUICK_STEP = 5
 """Every how many-th frame with --quick."""

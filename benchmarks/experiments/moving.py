@@ -15,22 +15,22 @@ from typing import Any, Literal
 
 import numpy as np
 import open3d as o3d
+from scenewright.schemas.articulations import Articulation
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.ground_truth import GroundTruth, TrueObject
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.articulate.joints import Cloud
+from scenewright.stages.articulate.parameters import ArticulateParameters
+from scenewright.stages.articulate.stage import Used, gather, grid_of, regions_of, run, watch
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, model_folder, part_transforms
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.transforms import apply
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, median
 from benchmarks.generated_rooms import STEPS, make_library, make_room
 from benchmarks.steps import context_in, opened
-from schemas.articulations import Articulation
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.ground_truth import GroundTruth, TrueObject
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.articulate.joints import Cloud
-from stages.articulate.parameters import ArticulateParameters
-from stages.articulate.stage import Used, gather, grid_of, regions_of, run, watch
-from stages.kit.formats.cad_models import load_collision_parts, model_folder, part_transforms
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.transforms import apply
 
 TUNING = ("kitchen-40", "office-41", "bedroom-40")
 REPORTING = (*(f"kitchen-{seed}" for seed in range(1700, 1704)), "office-1700", "bedroom-1700")

@@ -19,26 +19,26 @@ from typing import Any
 import cv2
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.trajectories import read_tum, write_tum
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.measurement.pose_error import align_rigidly, associate, trajectory_error
+from scenewright.stages.kit.measurement.relative_pose_error import trajectory_drift
+from scenewright.stages.kit.registration.alignment import judge
+from scenewright.stages.kit.registration.pyramid import build_pyramid
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.poses.world import laid_onto
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial, only
 from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS
 from benchmarks.steps import made, opened, unrecorded
-from schemas.ground_truth import GroundTruth
-from schemas.segments import Segments
-from schemas.sequence import Sequence as SequenceArtifact
-from schemas.trajectory import Trajectory
-from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.trajectories import read_tum, write_tum
-from stages.kit.geometry.cameras import intrinsic_matrix
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.measurement.pose_error import align_rigidly, associate, trajectory_error
-from stages.kit.measurement.relative_pose_error import trajectory_drift
-from stages.kit.registration.alignment import judge
-from stages.kit.registration.pyramid import build_pyramid
-from stages.kit.stage import Parameters
-from stages.poses.world import laid_onto
 
 RECIPES = ("room", "kitchen", "office", "bedroom")
 REPORTING_SEEDS = range(1100, 1106)
@@ -401,7 +401,7 @@ EXPERIMENT = Experiment(
     places=frozenset({"data"}),
     quick={"frames": 240},
     steps=("poses", "segment", "fuse", "evaluate", *STEPS),
-    code={OPEN3D: ("stages.kit.measurement.pose_error", "stages.kit.formats.trajectories")},
+    code={OPEN3D: ("scenewright.stages.kit.measurement.pose_error", "scenewright.stages.kit.formats.trajectories")},
     more_figures=more_figures,
     pictures=draw_paths,
 )

@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 import trimesh
 from pydantic import Field
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.engine.chain import run_pipeline
+from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline
+from scenewright.stages.engine.reading import read_manifest
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.steps import StepFailed, opened
-from schemas.contact_graph import ContactGraph
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import TREE_RELATIONS
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.engine.chain import run_pipeline
-from stages.engine.pipelines import pipeline_path, read_pipeline
-from stages.engine.reading import read_manifest
-from stages.kit.stage import Parameters
 
 EXPECTATIONS = Path(__file__).resolve().parents[1] / "expectations" / "real.toml"
 EXPECTED: dict[str, dict[str, Any]] = tomllib.loads(EXPECTATIONS.read_text(encoding="utf-8"))

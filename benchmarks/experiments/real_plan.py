@@ -14,17 +14,17 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.plan import Plan
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.boxes import transform_points_to_box, upright_box
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.truth.support_annotation import AnnotatedNode, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.steps import made, opened
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.interactive_scene import InteractiveScene
-from schemas.plan import Plan
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.boxes import transform_points_to_box, upright_box
-from stages.kit.stage import Parameters
-from stages.truth.support_annotation import AnnotatedNode, read_support_annotation
 
 ANNOTATION = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real" / "kitchen.json"
 LOG = "kitchen"

@@ -17,17 +17,17 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from pydantic import Field
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.truth.annotated_points import instances_of
+from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.perfect_maps import write_map
 from benchmarks.steps import opened, step, unrecorded
 from benchmarks.tabulation import markdown
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.stage import Parameters
-from stages.truth.annotated_points import instances_of
-from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
 LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))

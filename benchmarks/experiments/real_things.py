@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.truth.annotated_points import instances_of
+from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Trial, only
 from benchmarks.steps import opened, step
-from schemas.panoptic_map import PanopticMap
-from schemas.vocabulary import UNNAMED, load_vocabulary
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.stage import Parameters
-from stages.truth.annotated_points import instances_of
-from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
 LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))

@@ -18,20 +18,20 @@ from typing import Any
 import numpy as np
 import trimesh
 from pydantic import Field
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.outside import file_json
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.evaluate.alignment_errors import alignment_error
+from scenewright.stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape, sample_triangles
+from scenewright.stages.evaluate.replacement_measures import retrieval_rank
+from scenewright.stages.evaluate.shape_loading import model_shape, placed_candidate
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.stage import Parameters
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, statistic
 from benchmarks.steps import made, opened
-from schemas.cad_scene import CadScene
-from schemas.outside import file_json
-from schemas.panoptic_map import PanopticMap
-from stages.evaluate.alignment_errors import alignment_error
-from stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape, sample_triangles
-from stages.evaluate.replacement_measures import retrieval_rank
-from stages.evaluate.shape_loading import model_shape, placed_candidate
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.stage import Parameters
 
 SCAN = "scene0470_00"
 USUAL_HEIGHT = {"03001627": ("chair", 0.85), "04379243": ("table", 0.75), "02747177": ("bin", 0.4)}

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.stages.engine.chain import run_pipeline
+from scenewright.stages.engine.pipelines import Pipeline, pipeline_path, read_pipeline
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Trial, only
 from benchmarks.steps import StepFailed, made
-from stages.engine.chain import run_pipeline
-from stages.engine.pipelines import Pipeline, pipeline_path, read_pipeline
-from stages.kit.formats.frames import FrameReader
-from stages.kit.stage import Parameters
 
 TUNING, REPORTING = ("100",), ("1100",)
 """A tuning seed that proves that the comparison runs, and a reporting seed."""

@@ -17,25 +17,25 @@ from pathlib import Path
 import numpy as np
 import torch
 from pydantic import Field
+from scenewright.schemas.suture_needle import SutureNeedle
+from scenewright.stages.kit.measurement.bootstrap import Interval
+from scenewright.stages.kit.measurement.proportions import wilson_interval
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.suture.evaluation.judgement import judged
+from scenewright.stages.suture.masks import learned_masks, spoiled_masks
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from scenewright.stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
+from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
+from scenewright.stages.suture.segmentation.infer import Segmenter
+from scenewright.stages.suture.world.clutter import cluttered, false_masks
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.sampling import seen_scene
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count
 from benchmarks.reporting_seeds import Method, newest
 from benchmarks.steps import made, opened
 from benchmarks.tabulation import Figure
-from schemas.suture_needle import SutureNeedle
-from stages.kit.measurement.bootstrap import Interval
-from stages.kit.measurement.proportions import wilson_interval
-from stages.kit.stage import Parameters
-from stages.suture.evaluation.judgement import judged
-from stages.suture.masks import learned_masks, spoiled_masks
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
-from stages.suture.segmentation.checkpoint import BUNDLED
-from stages.suture.segmentation.infer import Segmenter
-from stages.suture.world.clutter import cluttered, false_masks
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.sampling import seen_scene
 
 NEEDLES = "needles"
 """Group of the reporting seeds (reporting_seeds.toml)."""

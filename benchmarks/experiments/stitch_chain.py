@@ -12,11 +12,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from pydantic import Field
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.suture.options import ARM_NAMES
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.steps import made
-from stages.kit.stage import Parameters
-from stages.suture.options import ARM_NAMES
 
 CHAIN, SEED = "chain", "2000"
 """Of scenes and trials; no other part uses seeds from here on."""

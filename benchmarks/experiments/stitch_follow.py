@@ -16,16 +16,16 @@ from tempfile import TemporaryDirectory
 import cv2
 import numpy as np
 import torch
+from scenewright.stages.suture.evaluation.judgement import judged
+from scenewright.stages.suture.following import Follower, growing_pairs, name_of
+from scenewright.stages.suture.masks import masks_in, network_masks
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, NeedlePose
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.sampling import seen_scene
+from scenewright.stages.suture.world.scene import moved_scene, random_motions
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
-from stages.suture.evaluation.judgement import judged
-from stages.suture.following import Follower, growing_pairs, name_of
-from stages.suture.masks import masks_in, network_masks
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, NeedlePose
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.sampling import seen_scene
-from stages.suture.world.scene import moved_scene, random_motions
 
 FRAMES = 8
 OWN, WHOLE = "own_masks", "whole"

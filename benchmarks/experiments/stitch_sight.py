@@ -11,20 +11,20 @@ import time
 from collections.abc import Iterator, Sequence
 
 import cv2
+from scenewright.schemas.suture_trial import SutureRun
+from scenewright.stages.suture.options import ARM_NAMES
+from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
+from scenewright.stages.suture.trials.machine import run_trial
+from scenewright.stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from scenewright.stages.suture.trials.policies import POLICIES
+from scenewright.stages.suture.trials.records import run_of
+from scenewright.stages.suture.trials.sight import Looked, LookingEyes
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.experiments.stitch_trials.arms import NETWORK_EYES
 from benchmarks.experiments.stitch_trials.experiment import TUNING, over, rate
 from benchmarks.stitch.eyes import drawn_looks
 from benchmarks.tabulation import markdown
-from schemas.suture_trial import SutureRun
-from stages.suture.options import ARM_NAMES
-from stages.suture.segmentation.checkpoint import BUNDLED
-from stages.suture.trials.machine import run_trial
-from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
-from stages.suture.trials.policies import POLICIES
-from stages.suture.trials.records import run_of
-from stages.suture.trials.sight import Looked, LookingEyes
 
 TRIALS = {"geometry": 20, "pictures": 20, "error_model": 20, "network_model": 20}
 """Case -> trials."""

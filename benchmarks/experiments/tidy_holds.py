@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from math import cos, hypot, pi, sin
 
 import numpy as np
+from scenewright.stages.tableware.actions.grasp import grasp, grasp_two
+from scenewright.stages.tableware.simulation.physics import PhysicsTable
+from scenewright.stages.tableware.world.footprints import footprint
+from scenewright.stages.tableware.world.items import Item, Kind, Table, make_item, stand_height
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean, median, share
-from stages.tableware.actions.grasp import grasp, grasp_two
-from stages.tableware.simulation.physics import PhysicsTable
-from stages.tableware.world.footprints import footprint
-from stages.tableware.world.items import Item, Kind, Table, make_item, stand_height
 
 CASES = (
     "c",

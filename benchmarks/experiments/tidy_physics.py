@@ -12,19 +12,20 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from scenewright.stages.kit.measurement.bootstrap import Interval
+from scenewright.stages.kit.measurement.proportions import wilson_interval
+from scenewright.stages.tableware.planning.choice import make_policy
+from scenewright.stages.tableware.planning.joint import JointPolicy
+from scenewright.stages.tableware.planning.policy import Policy
+from scenewright.stages.tableware.planning.time_model import EXACT
+from scenewright.stages.tableware.simulation.arm_times import arm_times
+from scenewright.stages.tableware.simulation.physics_trial import run_physics_trial
+from scenewright.stages.tableware.world.scenes import make_table
+
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.experiments.tidy_fast.arms import DELAYS, OURS
 from benchmarks.tabulation import Figure, markdown
 from benchmarks.tidy.rivals import against, faster, no_slower
-from stages.kit.measurement.bootstrap import Interval
-from stages.kit.measurement.proportions import wilson_interval
-from stages.tableware.planning.choice import make_policy
-from stages.tableware.planning.joint import JointPolicy
-from stages.tableware.planning.policy import Policy
-from stages.tableware.planning.time_model import EXACT
-from stages.tableware.simulation.arm_times import arm_times
-from stages.tableware.simulation.physics_trial import run_physics_trial
-from stages.tableware.world.scenes import make_table
 
 TIERS = ("tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3")
 FAR = 5.0

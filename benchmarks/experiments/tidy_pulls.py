@@ -14,14 +14,14 @@ from functools import partial
 from math import cos, hypot, pi, sin
 
 import numpy as np
+from scenewright.stages.tableware.actions.pull import Pull
+from scenewright.stages.tableware.actions.pull_grasp import pull_grasp
+from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.simulation.holds import PAD, PAD_WIDTH
+from scenewright.stages.tableware.simulation.physics import PhysicsTable, Speeds
+from scenewright.stages.tableware.world.items import STANDARD, Kind, Table, make_item, stand_height
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, share
-from stages.tableware.actions.pull import Pull
-from stages.tableware.actions.pull_grasp import pull_grasp
-from stages.tableware.planning.rules import Rules
-from stages.tableware.simulation.holds import PAD, PAD_WIDTH
-from stages.tableware.simulation.physics import PhysicsTable, Speeds
-from stages.tableware.world.items import STANDARD, Kind, Table, make_item, stand_height
 
 PLURAL: dict[str, Kind] = {"cups": "cup", "bowls": "bowl"}
 LENGTHS = (20, 30, 40)

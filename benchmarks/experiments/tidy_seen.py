@@ -10,15 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from scenewright.stages.tableware.planning.choice import make_policy
+from scenewright.stages.tableware.planning.time_model import fitted
+from scenewright.stages.tableware.sight import Eyes
+from scenewright.stages.tableware.simulation.fast import FastWorld
+from scenewright.stages.tableware.simulation.trial import run_in
+from scenewright.stages.tableware.world.scenes import TIERS, make_table
+
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean
 from benchmarks.experiments.tidy_detect.experiment import conditions
 from benchmarks.experiments.tidy_fast.arms import WORLDS
-from stages.tableware.planning.choice import make_policy
-from stages.tableware.planning.time_model import fitted
-from stages.tableware.sight import Eyes
-from stages.tableware.simulation.fast import FastWorld
-from stages.tableware.simulation.trial import run_in
-from stages.tableware.world.scenes import TIERS, make_table
 
 LEAST_CONFIDENCE = 0.3
 TUNING, REPORTING = range(30), range(1000, 1030)

@@ -12,18 +12,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.stages.kit.measurement.bootstrap import Interval
+from scenewright.stages.tableware.planning.joint import JointPolicy, plan
+from scenewright.stages.tableware.planning.policy import Policy
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel, fitted
+from scenewright.stages.tableware.policies.pull import PullPolicy
+from scenewright.stages.tableware.policies.stack import StackPolicy
+from scenewright.stages.tableware.simulation.fast import run_trial
+from scenewright.stages.tableware.world.scenes import make_table
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, ratio
 from benchmarks.experiments.tidy_fast.arms import OURS, WORLDS
 from benchmarks.tidy.rivals import faster, no_slower
-from stages.kit.measurement.bootstrap import Interval
-from stages.tableware.planning.joint import JointPolicy, plan
-from stages.tableware.planning.policy import Policy
-from stages.tableware.planning.time_model import Chances, TimeModel, fitted
-from stages.tableware.policies.pull import PullPolicy
-from stages.tableware.policies.stack import StackPolicy
-from stages.tableware.simulation.fast import run_trial
-from stages.tableware.world.scenes import make_table
 
 DEAR, CHEAP = 1.3, 0.7
 TUNING, REPORTING = range(60), range(2200, 2212)

@@ -30,17 +30,17 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.stages.engine.batch.expansion import Batch, PlannedRun, make_jobs, read_batch, scene_command
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.local_executor import LocalExecutor, processors
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scheduler import run_jobs
+from scenewright.stages.engine.batch.session import BatchEnd, run_batch
+from scenewright.stages.engine.chain import REPOSITORY
+from scenewright.stages.kit.measurement.tables import Table, as_markdown
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
-from stages.engine.batch.expansion import Batch, PlannedRun, make_jobs, read_batch, scene_command
-from stages.engine.batch.job import Job
-from stages.engine.batch.local_executor import LocalExecutor, processors
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scheduler import run_jobs
-from stages.engine.batch.session import BatchEnd, run_batch
-from stages.engine.chain import REPOSITORY
-from stages.kit.measurement.tables import Table, as_markdown
 
 AIM_EFFICIENCY = 1.8
 """Scenes per second on two cores over those on one."""

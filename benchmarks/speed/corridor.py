@@ -14,18 +14,17 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment
-from schemas.vocabulary import load_vocabulary
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import look_at
-from stages.segment.fusion_ours import fuse
-from stages.segment.geometric import segment_depth
-from stages.segment.one_frame import describe
-from stages.segment.panoptic import PanopticFrame, PanopticMask
-from stages.segment.parameters import SegmentParameters
-from stages.segment.settings import fusion_settings, geometric_settings
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import FrameSegment
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.segment.fusion_ours import fuse
+from scenewright.stages.segment.geometric import segment_depth
+from scenewright.stages.segment.one_frame import describe
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 
 CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
 LENGTH, WIDTH, HEIGHT = 4.0, 2.5, 2.5

@@ -26,15 +26,15 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import FrameSegment
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.geometry.cameras import back_project, intrinsic_matrix
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.measurement.tables import Table, as_markdown
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
-from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment
-from schemas.vocabulary import load_vocabulary
-from stages.kit.geometry.cameras import back_project, intrinsic_matrix
-from stages.kit.geometry.transforms import look_at
-from stages.kit.measurement.tables import Table, as_markdown
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
@@ -113,11 +113,11 @@ Mesh = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple[Step, Mesh]:
     """Return what integrates frame k, and what gives the mesh. `whole`: with association, counts and merges."""
-    from stages.fuse.integration import integrate
-    from stages.fuse.parameters import FuseParameters
-    from stages.fuse.smoothing import smoothed_tsdf
-    from stages.fuse.stage import new_mapper
-    from stages.fuse.surface import extract_surface
+    from scenewright.stages.fuse.integration import integrate
+    from scenewright.stages.fuse.parameters import FuseParameters
+    from scenewright.stages.fuse.smoothing import smoothed_tsdf
+    from scenewright.stages.fuse.stage import new_mapper
+    from scenewright.stages.fuse.surface import extract_surface
 
     options = FuseParameters.model_validate(
         {"voxel_size": voxel_size, "truncation_voxels": TRUNCATION_VOXELS, "maximum_depth": RANGE}

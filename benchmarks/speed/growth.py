@@ -29,6 +29,10 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.measurement.tables import Table, as_markdown
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
@@ -44,10 +48,6 @@ from benchmarks.speed.corridor import (
     save_frames,
 )
 from benchmarks.speed.fusion import memory, reset_peak
-from schemas.vocabulary import load_vocabulary
-from stages.kit.measurement.tables import Table, as_markdown
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DISTINCT = 50
@@ -99,11 +99,11 @@ def frame_at(frames: list[CorridorFrame], number: int, standing: bool) -> tuple[
 
 def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standing: bool) -> list[dict[str, float]]:
     """Fuse `count` frames; return one row of figures for each window of the walk, the last with the extraction."""
-    from stages.fuse import mapping
-    from stages.fuse.closing import MaskSource
-    from stages.fuse.ours import Ours
-    from stages.fuse.parameters import FuseParameters
-    from stages.fuse.stage import new_mapper, write_map
+    from scenewright.stages.fuse import mapping
+    from scenewright.stages.fuse.closing import MaskSource
+    from scenewright.stages.fuse.ours import Ours
+    from scenewright.stages.fuse.parameters import FuseParameters
+    from scenewright.stages.fuse.stage import new_mapper, write_map
 
     timers = Timers()
     for name in ("index_segments", "measure_overlap"):
@@ -170,10 +170,10 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
 
 def segment_parts(frames: list[CorridorFrame]) -> dict[str, float]:
     """Return processor ms a frame of `segment` without its network, by part, and the peak memory [MB]."""
-    from stages.segment.fusion_ours import fuse
-    from stages.segment.geometric import segment_depth
-    from stages.segment.parameters import SegmentParameters
-    from stages.segment.settings import fusion_settings, geometric_settings
+    from scenewright.stages.segment.fusion_ours import fuse
+    from scenewright.stages.segment.geometric import segment_depth
+    from scenewright.stages.segment.parameters import SegmentParameters
+    from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 
     options = SegmentParameters.model_validate({})
     reset_peak()
@@ -198,8 +198,8 @@ def segment_parts(frames: list[CorridorFrame]) -> dict[str, float]:
 def listing_memory(frames: list[CorridorFrame], count: int) -> dict[str, float]:
     """Return what the list of segments of a log of `count` frames takes once `fuse` has read it, and while it reads,
     before there is a map [MB]: the one thing that it holds of every frame."""
-    from schemas.segments import FrameSegments, SegmentsFile
-    from stages.fuse.listings import Listings
+    from scenewright.schemas.segments import FrameSegments, SegmentsFile
+    from scenewright.stages.fuse.listings import Listings
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "segments.json"

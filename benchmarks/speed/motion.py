@@ -18,21 +18,21 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics, random_starts
+from scenewright.stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
+from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
+from scenewright.stages.kit.simulation.robot import Robot
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
-from schemas.base import as_transform
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Box
-from stages.kit.geometry.transforms import quaternion_of
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics, random_starts
-from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
-from stages.kit.simulation.engine import engine, native_output_to_stderr
-from stages.kit.simulation.robot import Robot
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.world import PhysicsWorld
 
 BASE = np.zeros(3)
 RESOLUTION = np.full(7, 0.05)

@@ -25,14 +25,14 @@ from typing import Any
 
 import psutil
 from pydantic import Field
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.engine.batch.processes import descendants, resident_memory
+from scenewright.stages.engine.chain import REPOSITORY
+from scenewright.stages.kit.measurement.tables import Table, as_markdown
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import circumstances, write_measured
 from benchmarks.tabulation import Figure
-from schemas.errors import UsageError
-from stages.engine.batch.processes import descendants, resident_memory
-from stages.engine.chain import REPOSITORY
-from stages.kit.measurement.tables import Table, as_markdown
 
 BACKENDS = ("auto", "detector", "geometric")
 QUICK_FRAMES = 20
@@ -69,7 +69,7 @@ class Run:
 def run_once(code: Path, folder: Path, settings: dict[str, str]) -> Run:
     """Run the pipeline by the code of a checkout. Raises RuntimeError when it fails."""
     python = code / ".venv" / "bin" / "python"
-    words = [str(python), "-m", "cli", "run", "reconstruct", "--out", str(folder), "--json"]
+    words = [str(python), "-m", "scenewright", "run", "reconstruct", "--out", str(folder), "--json"]
     shutil.rmtree(folder, ignore_errors=True)  # not --force, which would make the library again
     words += [word for name, value in settings.items() for word in ("--set", f"{name}={value}")]
     environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
@@ -170,7 +170,7 @@ def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
 def _make_library(code: Path, folder: Path) -> None:
     """Make the CAD library once, where the runs of a code share it."""
     python = code / ".venv" / "bin" / "python"
-    words = [str(python), "-m", "cli", "library", "build", "--seed", "1", "--shared", str(folder / ".shared")]
+    words = [str(python), "-m", "scenewright", "library", "build", "--seed", "1", "--shared", str(folder / ".shared")]
     subprocess.run(
         [*words, "--out", str(folder / "library"), "--quiet"],
         cwd=code,

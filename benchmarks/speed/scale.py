@@ -29,23 +29,23 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import Field
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.engine.batch.expansion import Batch, read_batch
+from scenewright.stages.engine.batch.local_executor import LocalExecutor
+from scenewright.stages.engine.batch.ray_executor import RayExecutor, load_ray
+from scenewright.stages.engine.batch.results import RESULTS_NAME, SceneResult, latest_by_job, read_results
+from scenewright.stages.engine.batch.scene_run import PROCESS_NAME
+from scenewright.stages.engine.batch.session import run_batch
+from scenewright.stages.engine.batch.spec import RayOptions
+from scenewright.stages.engine.batch.storage import stored_digest
+from scenewright.stages.engine.reading import read_manifest
+from scenewright.stages.engine.runner import PROCESSOR
+from scenewright.stages.engine.store import TIMINGS_NAME
+from scenewright.stages.kit.measurement.tables import Table, as_markdown
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
 from benchmarks.speed.batch import measure_scheduler
-from schemas.errors import UsageError
-from stages.engine.batch.expansion import Batch, read_batch
-from stages.engine.batch.local_executor import LocalExecutor
-from stages.engine.batch.ray_executor import RayExecutor, load_ray
-from stages.engine.batch.results import RESULTS_NAME, SceneResult, latest_by_job, read_results
-from stages.engine.batch.scene_run import PROCESS_NAME
-from stages.engine.batch.session import run_batch
-from stages.engine.batch.spec import RayOptions
-from stages.engine.batch.storage import stored_digest
-from stages.engine.reading import read_manifest
-from stages.engine.runner import PROCESSOR
-from stages.engine.store import TIMINGS_NAME
-from stages.kit.measurement.tables import Table, as_markdown
 
 NODES = 3
 PATIENCE = 3600.0

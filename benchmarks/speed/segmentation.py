@@ -24,17 +24,14 @@ import numba
 import numpy as np
 import trimesh
 from pydantic import Field
-
-from benchmarks.options import Measurement, asked
-from benchmarks.results import write_measured
-from schemas.scene_parts import Camera
-from schemas.vocabulary import load_vocabulary
-from stages.kit.geometry.cameras import back_project, intrinsic_matrix
-from stages.kit.geometry.transforms import look_at
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.segment.fusion import FusionSettings
-from stages.segment.fusion_ours import fuse
-from stages.segment.geometric import (
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.geometry.cameras import back_project, intrinsic_matrix
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.segment.fusion import FusionSettings
+from scenewright.stages.segment.fusion_ours import fuse
+from scenewright.stages.segment.geometric import (
     GeometricSettings,
     depth_discontinuity,
     edge_map,
@@ -43,8 +40,11 @@ from stages.segment.geometric import (
     segment_depth,
     smooth_depth,
 )
-from stages.segment.normals import surface_normals
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.normals import surface_normals
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+
+from benchmarks.options import Measurement, asked
+from benchmarks.results import write_measured
 
 CAMERA = Camera(width=640, height=480, fx=560.0, fy=560.0, cx=319.5, cy=239.5)
 VIEWS = 6
@@ -218,9 +218,9 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
         "opencv-findPlanes/whole": median_seconds(planes, repeats),
         "open3d/normals": median_seconds(lambda k: open3d_normals(pick(smooth, k)), slow),
     }
-    from stages.segment.backends.network.backend import load_predictor
-    from stages.segment.backends.network.features import mount_of_pose
-    from stages.segment.backends.network.weights import BUNDLED
+    from scenewright.stages.segment.backends.network.backend import load_predictor
+    from scenewright.stages.segment.backends.network.features import mount_of_pose
+    from scenewright.stages.segment.backends.network.weights import BUNDLED
 
     predictor = load_predictor(BUNDLED, load_vocabulary())
     nowhere = mount_of_pose(None, gravity_known=False, floor_is_zero=False)
@@ -238,7 +238,7 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
     )
     seconds["ours/frame-by-network"] = median_seconds(by_network, slow)
     if weights is not None:
-        from stages.segment.backends.detector.yolox import Detector
+        from scenewright.stages.segment.backends.detector.yolox import Detector
 
         for name, side in (("detector-whole-image", 0), ("detector-tiles", 480)):
             detector = Detector(weights, score_threshold=0.3, suppression_overlap=0.5, tile_side=side)

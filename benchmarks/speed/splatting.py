@@ -18,18 +18,18 @@ from dataclasses import replace
 
 import numba
 import numpy as np
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, Rasterizer, View
+from scenewright.stages.kit.rendering.splatting.reference import ReferenceRasterizer
+from scenewright.stages.splat.build_stage import method_of
+from scenewright.stages.splat.seeding import Seeds
+from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.views import PosedView
 
 from benchmarks.options import Measurement, asked
 from benchmarks.results import write_measured
-from schemas.scene_parts import Camera
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.rasterizer import Picture, Rasterizer, View
-from stages.kit.rendering.splatting.reference import ReferenceRasterizer
-from stages.splat.build_stage import method_of
-from stages.splat.seeding import Seeds
-from stages.splat.training import Trainer
-from stages.splat.views import PosedView
 
 SIZES = ((160, 120), (320, 240), (640, 480))
 COUNTS = (5_000, 20_000, 80_000)

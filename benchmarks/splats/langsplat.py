@@ -16,16 +16,15 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 import torch
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.open_words.encoder import Encoder
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, Rasterizer, View
+from scenewright.stages.splat.language.looks import Sight
+from scenewright.stages.splat.language.pieces import pieces
 from scipy.spatial import cKDTree
 from torch import nn
-
-from stages.kit.geometry.cameras import scaled
-from stages.kit.geometry.transforms import inverse
-from stages.kit.open_words.encoder import Encoder
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.rasterizer import Picture, Rasterizer, View
-from stages.splat.language.looks import Sight
-from stages.splat.language.pieces import pieces
 
 CODE = 3
 """Numbers of a code, as there."""

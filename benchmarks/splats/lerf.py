@@ -15,14 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.splat.language.field import ENTRIES, HashGrid, LanguageField, Space
+from scenewright.stages.splat.language.pyramid import Level
+from scenewright.stages.splat.methods.method import Rate
+from scenewright.stages.splat.views import PosedView
 from torch import nn
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import inverse
-from stages.splat.language.field import ENTRIES, HashGrid, LanguageField, Space
-from stages.splat.language.pyramid import Level
-from stages.splat.methods.method import Rate
-from stages.splat.views import PosedView
 
 RAYS, FIRST_SAMPLES, SAMPLES, LANGUAGE_SAMPLES = 512, 48, 32, 24
 NEAR, FAR = 0.1, 8.0

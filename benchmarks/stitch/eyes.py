@@ -9,14 +9,13 @@ from contextlib import suppress
 
 import cv2
 import numpy as np
-
-from stages.kit.geometry.transforms import apply
-from stages.suture.motion.needle import ARC_POINTS
-from stages.suture.rig import TWO_CAMERAS
-from stages.suture.trials.machine import run_trial
-from stages.suture.trials.perception import FOLDER, Seen, perception_model
-from stages.suture.trials.policies import POLICIES
-from stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.suture.motion.needle import ARC_POINTS
+from scenewright.stages.suture.rig import TWO_CAMERAS
+from scenewright.stages.suture.trials.machine import run_trial
+from scenewright.stages.suture.trials.perception import FOLDER, Seen, perception_model
+from scenewright.stages.suture.trials.policies import POLICIES
+from scenewright.stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes
 
 ACROSS, STATES, SHOWN = 3, 9, (640, 480)
 YELLOW, WHITE = (60, 220, 250), (255, 255, 255)

@@ -23,15 +23,15 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.measurement.proportions import wilson_interval
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.suture.evaluation.judgement import Estimate
+from scenewright.stages.suture.trials.perception import FOLDER, Errors, PerceptionModel, perception_model
+from scenewright.stages.suture.trials.sight import Looked
 
 from benchmarks.keeping import kept_records
 from benchmarks.options import asked
-from schemas.errors import UsageError
-from stages.kit.measurement.proportions import wilson_interval
-from stages.kit.stage import Parameters
-from stages.suture.evaluation.judgement import Estimate
-from stages.suture.trials.perception import FOLDER, Errors, PerceptionModel, perception_model
-from stages.suture.trials.sight import Looked
 
 STRAY = 5.0
 """An end farther off than this [mm] strays: thread, a jaw or the other end was taken for it."""

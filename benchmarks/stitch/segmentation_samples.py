@@ -11,10 +11,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.stages.suture.segmentation.model import CLASSES
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
 
 from benchmarks.stitch.segmentation_views import EYES, read_eye
-from stages.suture.segmentation.model import CLASSES
-from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
 
 CROP = 192
 REACH = 196

@@ -22,6 +22,10 @@ from pathlib import Path
 import numpy as np
 import torch
 from pydantic import Field
+from scenewright.stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
+from scenewright.stages.suture.segmentation.checkpoint import load_network, save_network
+from scenewright.stages.suture.segmentation.infer import Segmenter, normalised
+from scenewright.stages.suture.segmentation.model import CLASSES, SutureNetwork
 from torch.nn import functional
 
 from benchmarks.options import Recipe, asked
@@ -29,10 +33,6 @@ from benchmarks.stitch.segmentation_samples import Views, masks_of, sample
 from benchmarks.stitch.segmentation_views import kept_view
 from benchmarks.stitch.trial_views import kept_trial
 from benchmarks.training.run import TrainingRun, rate_at, train
-from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
-from stages.suture.segmentation.checkpoint import load_network, save_network
-from stages.suture.segmentation.infer import Segmenter, normalised
-from stages.suture.segmentation.model import CLASSES, SutureNetwork
 
 WEIGHT_DECAY, WARM_UP = 0.02, 0.03
 FILE = "segmentation.safetensors"

@@ -11,14 +11,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.suture.rig import StereoRig
+from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.sampling import seen_scene
 
 from benchmarks.experiment import Bench
-from schemas.errors import BadInput
-from stages.kit.stage import Parameters
-from stages.suture.rig import StereoRig
-from stages.suture.segmentation.checkpoint import BUNDLED
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.sampling import seen_scene
 
 CALIBRATION_ERROR = 0.15
 """Standard deviation of the right eye's error [px], as in the needle benchmark's ordinary cases."""

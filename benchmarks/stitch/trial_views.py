@@ -10,16 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scenewright.stages.suture.rig import TWO_CAMERAS
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.machine import run_trial
+from scenewright.stages.suture.trials.perception import FOLDER, Eyes, Seen, perception_model
+from scenewright.stages.suture.trials.policies import POLICIES
+from scenewright.stages.suture.trials.sight import CALIBRATION_ERROR, TrialScene, pictured
+from scenewright.stages.suture.world.render import render
+from scenewright.stages.suture.world.scene import make_scene
 
 from benchmarks.stitch.segmentation_views import is_kept, keep_view
-from stages.suture.rig import TWO_CAMERAS
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.machine import run_trial
-from stages.suture.trials.perception import FOLDER, Eyes, Seen, perception_model
-from stages.suture.trials.policies import POLICIES
-from stages.suture.trials.sight import CALIBRATION_ERROR, TrialScene, pictured
-from stages.suture.world.render import render
-from stages.suture.world.scene import make_scene
 
 ARMS = ("ours", "thesis")
 SEED_OF_CHOICE = 83

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.tableware.vision.error_model import FILE, ErrorModel, KindErrors
+from scenewright.stages.tableware.world.items import STANDARD, UTENSILS, Kind
 
 from benchmarks.experiments.tidy_detect.experiment import REPORTING
 from benchmarks.experiments.tidy_detect.score import Match
 from benchmarks.keeping import kept_records
 from benchmarks.options import asked
-from stages.kit.stage import Parameters
-from stages.tableware.vision.error_model import FILE, ErrorModel, KindErrors
-from stages.tableware.world.items import STANDARD, UTENSILS, Kind
 
 
 def kind_errors(kind: Kind, matches: list[Match], images: int) -> KindErrors:

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.tableware.simulation.arm_times import FILE, ArmTimes
 from scipy.optimize import nnls
 
 from benchmarks.experiments.tidy_physics import Run, delay_of
 from benchmarks.keeping import kept_records
 from benchmarks.options import asked
-from stages.kit.stage import Parameters
-from stages.tableware.simulation.arm_times import FILE, ArmTimes
 
 FIRST_REPORTING = 1000
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.measurement.bootstrap import Interval
 
 from benchmarks.experiment import Results, ratio
-from stages.kit.measurement.bootstrap import Interval
 
 SAME = 1e-6
 

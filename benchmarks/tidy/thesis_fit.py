@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from scenewright.stages.tableware.planning.time_model import FILE, PLACEMENT_KINDS, Drops, Fit, Times
+
 from benchmarks.tidy.printed import PRINTED
-from stages.tableware.planning.time_model import FILE, PLACEMENT_KINDS, Drops, Fit, Times
 
 COMMAND = "python -m benchmarks.tidy.thesis_fit"
 

@@ -13,16 +13,16 @@ import sys
 from pathlib import Path
 
 from pydantic import Field
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.engine.chain import run_command
+from scenewright.stages.kit.measurement.panoptic_quality import average_quality
+from scenewright.stages.segment.backends.network.backend import load_predictor
 
 from benchmarks.options import Recipe, asked
 from benchmarks.results import write_measured
 from benchmarks.training.real_frames import PLACES
 from benchmarks.training.samples import FrameSet
 from benchmarks.training.validation import KNOWN, quality_of
-from schemas.vocabulary import load_vocabulary
-from stages.engine.chain import run_command
-from stages.kit.measurement.panoptic_quality import average_quality
-from stages.segment.backends.network.backend import load_predictor
 
 LIBRARY_SEED, LIBRARY_SHAPES = 41, 12
 """Seed and shapes of every class of the training's own library; other experiments use seeds 0 and 1."""

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 LEVEL = 0.006
 """Heights under one thing may differ by this much [m]."""

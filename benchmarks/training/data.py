@@ -23,25 +23,25 @@ import cv2
 import numpy as np
 import trimesh
 from pydantic import Field
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.kit.geometry.transforms import look_at, transform_from_yaw
+from scenewright.stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
+from scenewright.stages.kit.rendering.light_map import AreaLight
+from scenewright.stages.kit.rendering.patterns import PATTERNS, Material
+from scenewright.stages.kit.rendering.ray_casting import Rendering, SceneRenderer
+from scenewright.stages.kit.rendering.surfaces import TriangleSoup
+from scenewright.stages.synthesize.arrangement import Arrangement, arrange, world_meshes
+from scenewright.stages.synthesize.furniture import Catalogue
+from scenewright.stages.synthesize.recipes import load_recipe, recipe_names
+from scenewright.stages.synthesize.shell import build_room
 
 from benchmarks.options import Recipe, asked
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down
 from benchmarks.training.sensors import coarse_depth, lose_things
 from benchmarks.training.varied_rooms import varied_room
-from schemas.cad_library import CadLibrary
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.engine.reading import open_artifact
-from stages.kit.geometry.transforms import look_at, transform_from_yaw
-from stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
-from stages.kit.rendering.light_map import AreaLight
-from stages.kit.rendering.patterns import PATTERNS, Material
-from stages.kit.rendering.ray_casting import Rendering, SceneRenderer
-from stages.kit.rendering.surfaces import TriangleSoup
-from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
-from stages.synthesize.furniture import Catalogue
-from stages.synthesize.recipes import load_recipe, recipe_names
-from stages.synthesize.shell import build_room
 
 WIDTH, HEIGHT = 320, 240
 DEPTH_UNIT = 0.00025

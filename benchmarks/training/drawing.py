@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scenewright.stages.segment.backends.network.features import STRIDE
 from torch.nn import functional
 
 from benchmarks.training.data import HEIGHT, WIDTH
@@ -15,7 +16,6 @@ from benchmarks.training.drawn_features import CameraBatch, MountBatch, features
 from benchmarks.training.drawn_targets import TargetBatch, targets_of
 from benchmarks.training.draws import Draws
 from benchmarks.training.samples import Frames
-from stages.segment.backends.network.features import STRIDE
 
 CROP_WIDTH, CROP_HEIGHT = 256, 192
 COLOR_DROPOUT, GRAVITY_DROPOUT, FLOOR_DROPOUT = 0.35, 0.3, 0.35

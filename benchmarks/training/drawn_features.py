@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch.nn import functional
-
-from stages.segment.backends.network.features import (
+from scenewright.stages.segment.backends.network.features import (
     LARGEST_HEIGHT,
     LARGEST_INVERSE_DEPTH,
     NORMAL_STEP,
     NORMAL_WINDOW,
     SMOOTHING_WINDOW,
 )
+from torch.nn import functional
 
 DEVIATION, DISTANCE_FACTOR, LEAST_NEIGHBOURS = 0.009, 0.05, 4
 """As `smooth_depth` and `surface_normals` have them."""

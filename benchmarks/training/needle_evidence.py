@@ -20,23 +20,23 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.suture.evaluation.judgement import judged
+from scenewright.stages.suture.masks import learned_masks, spoiled_masks
+from scenewright.stages.suture.needle.estimate import FEWEST_PIXELS, hypotheses
+from scenewright.stages.suture.needle.evidence import WEIGHTS
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.needle.windows import needle_masks
+from scenewright.stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
+from scenewright.stages.suture.segmentation.infer import Segmenter
+from scenewright.stages.suture.world.corruption import noisy_disparity
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.sampling import seen_scene
 from scipy.optimize import minimize
 
 from benchmarks.options import asked
 from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR
 from benchmarks.stitch.trial_views import trial_scenes
-from stages.kit.stage import Parameters
-from stages.suture.evaluation.judgement import judged
-from stages.suture.masks import learned_masks, spoiled_masks
-from stages.suture.needle.estimate import FEWEST_PIXELS, hypotheses
-from stages.suture.needle.evidence import WEIGHTS
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.needle.windows import needle_masks
-from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
-from stages.suture.segmentation.infer import Segmenter
-from stages.suture.world.corruption import noisy_disparity
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.sampling import seen_scene
 
 CAMERAS, ENDOSCOPES, TRIALS = range(400, 424), range(400, 412), range(860, 872)
 FOLDS, RIDGES = 10, (0.3, 0.1, 0.03, 0.01)

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.suture.needle.presence import FEATURES
 from scipy.optimize import minimize
 
 from benchmarks.keeping import kept_records
 from benchmarks.options import asked
-from stages.kit.stage import Parameters
-from stages.suture.needle.presence import FEATURES
 
 RIDGE, FOLDS = 0.1, 10
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.segment.backends.objects.grouping import Agglomeration, PairScorer
+from scenewright.stages.segment.backends.objects.segmentation import ObjectSettings, Pieces, cut_pieces
 
 from benchmarks.mosd_frames import CAMERA, LabelledFrame
-from stages.segment.backends.objects.grouping import Agglomeration, PairScorer
-from stages.segment.backends.objects.segmentation import ObjectSettings, Pieces, cut_pieces
 
 
 @dataclass(frozen=True)

@@ -17,16 +17,9 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
-from scipy.optimize import minimize
-
-from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
-from benchmarks.object_masks import score_object_masks
-from benchmarks.options import Recipe, asked
-from benchmarks.training.pair_recording import pairs_of_frame
-from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
-from schemas.errors import BadInput
-from stages.segment.backends.objects.grouping import by_rules
-from stages.segment.backends.objects.rules import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.objects.grouping import by_rules
+from scenewright.stages.segment.backends.objects.rules import (
     APART,
     CUT,
     OVER,
@@ -38,7 +31,14 @@ from stages.segment.backends.objects.rules import (
     rule_table,
     term_values,
 )
-from stages.segment.backends.objects.segmentation import segment_objects
+from scenewright.stages.segment.backends.objects.segmentation import segment_objects
+from scipy.optimize import minimize
+
+from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
+from benchmarks.object_masks import score_object_masks
+from benchmarks.options import Recipe, asked
+from benchmarks.training.pair_recording import pairs_of_frame
+from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
 
 JOINS = {
     "histogram": 1,

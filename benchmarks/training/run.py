@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 import torch
+from scenewright.schemas.errors import BadInput
 
 from benchmarks.training.run_state import read_state, write_state
-from schemas.errors import BadInput
 
 FACTS, LOG = "state.json", "log.jsonl"
 LOGGED_EVERY = 50

@@ -6,8 +6,7 @@ import os
 from pathlib import Path
 
 import torch
-
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 
 FILE = "state.safetensors"
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import torch
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.segment.backends.network.features import STRIDE, Mount, features
 
 from benchmarks.training.data import DEPTH_UNIT
 from benchmarks.training.drawn_features import CameraBatch
 from benchmarks.training.targets import IGNORED, SOME_THING, Targets, make_targets
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.vocabulary import load_vocabulary
-from stages.segment.backends.network.features import STRIDE, Mount, features
 
 LABELS = 256
 

@@ -20,6 +20,12 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.objects.backend import BUNDLED
+from scenewright.stages.segment.backends.objects.boosting import Trees, write_trees
+from scenewright.stages.segment.backends.objects.grouping import PairScorer, by_trees
+from scenewright.stages.segment.backends.objects.pairs import FEATURES
+from scenewright.stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
 
 from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
 from benchmarks.object_masks import score_object_masks
@@ -27,12 +33,6 @@ from benchmarks.options import Recipe, asked
 from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletops import make_tabletop
 from benchmarks.training.tree_growing import grow_trees
-from schemas.errors import BadInput
-from stages.segment.backends.objects.backend import BUNDLED
-from stages.segment.backends.objects.boosting import Trees, write_trees
-from stages.segment.backends.objects.grouping import PairScorer, by_trees
-from stages.segment.backends.objects.pairs import FEATURES
-from stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
 
 GENERATED, GENERATED_QUICK = 160, 10
 FIRST_TREES, LAST_TREES = 120, 240

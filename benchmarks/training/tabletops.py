@@ -15,10 +15,9 @@ import numpy as np
 import open3d as o3d
 import pybullet
 import trimesh
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import look_at
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import look_at
 
 CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
 TEXTURE = 96

@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 import torch
 from pydantic import Field
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.backends.network.backend import load_predictor
+from scenewright.stages.segment.backends.network.features import STRIDE, Mount, features
+from scenewright.stages.segment.backends.network.grouping import GroupingSettings, group
 
 from benchmarks.options import asked
 from benchmarks.training.samples import FrameSet
 from benchmarks.training.validation import KNOWN, STUFF
-from schemas.vocabulary import load_vocabulary
-from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
-from stages.kit.stage import Parameters
-from stages.segment.backends.network.backend import load_predictor
-from stages.segment.backends.network.features import STRIDE, Mount, features
-from stages.segment.backends.network.grouping import GroupingSettings, group
 
 GRID = {
     "centre_threshold": (0.1, 0.15, 0.2),

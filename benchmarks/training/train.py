@@ -21,6 +21,9 @@ from pathlib import Path
 import numpy as np
 import torch
 from pydantic import Field
+from scenewright.stages.segment.backends.network.features import CHANNELS
+from scenewright.stages.segment.backends.network.model import PanopticNetwork, Widths
+from scenewright.stages.segment.backends.network.weights import save_checkpoint
 from torch.nn import functional
 
 from benchmarks.options import Recipe, asked
@@ -29,9 +32,6 @@ from benchmarks.training.drawn_targets import TargetBatch
 from benchmarks.training.run import TrainingRun, rate_at, train
 from benchmarks.training.samples import FrameSet, Store
 from benchmarks.training.targets import IGNORED
-from stages.segment.backends.network.features import CHANNELS
-from stages.segment.backends.network.model import PanopticNetwork, Widths
-from stages.segment.backends.network.weights import save_checkpoint
 
 PEAK_RATE, WEIGHT_DECAY = 4e-3, 0.02
 WARM_UP, WHOLE_FRAMES = 0.04, 0.12

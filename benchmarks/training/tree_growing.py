@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.objects.boosting import Trees
+from scenewright.stages.segment.backends.objects.boosting import Trees
 
 BINS = 64
 

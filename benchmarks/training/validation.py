@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.backends.network.backend import Predictor, load_predictor
+from scenewright.stages.segment.backends.network.features import Mount
 
 from benchmarks.options import asked
 from benchmarks.training.samples import FrameSet
-from schemas.vocabulary import load_vocabulary
-from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
-from stages.kit.stage import Parameters
-from stages.segment.backends.network.backend import Predictor, load_predictor
-from stages.segment.backends.network.features import Mount
 
 
 @dataclass(frozen=True)

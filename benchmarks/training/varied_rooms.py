@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import trimesh
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.synthesize.furniture import Catalogue
 
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down
 from benchmarks.training.shapes import MAKERS, SMALL_MAKERS, Maker, Random, box, chair, color
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.furniture import Catalogue
 
 LIBRARY_SHARE = 0.45
 """Of the furniture whose class the library has."""

@@ -17,31 +17,31 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.language_map import LanguageMap, LanguageRegion
+from scenewright.schemas.scene_parts import Box, Camera
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.boxes import minimum_box, points_in_box, upright_box
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.open_words.answering import members_of
+from scenewright.stages.kit.open_words.vectors import read_vectors
+from scenewright.stages.splat.evaluate_stage import MARGIN
+from scenewright.stages.splat.language.looks import Sight
+from scenewright.stages.splat.strays import no_strays
+from scenewright.stages.splat.views import PosedView, evenly, posed_frames, read_view
+from scenewright.stages.truth.annotated_points import instances_of
+from scenewright.stages.truth.support_annotation import read_support_annotation
 
 from benchmarks.generated_rooms import RoomFolder, make_room
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import made, opened, unrecorded
 from benchmarks.words.gathering import thing_of
 from benchmarks.words.lexicon import FALSE, TRUE, Phrase, Thing, lexicon, truth_of
-from schemas.cad_library import CadLibrary
-from schemas.ground_truth import GroundTruth
-from schemas.language_map import LanguageMap, LanguageRegion
-from schemas.scene_parts import Box, Camera
-from schemas.sequence import Sequence
-from schemas.splat import Splat
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.boxes import minimum_box, points_in_box, upright_box
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.open_words.answering import members_of
-from stages.kit.open_words.vectors import read_vectors
-from stages.splat.evaluate_stage import MARGIN
-from stages.splat.language.looks import Sight
-from stages.splat.strays import no_strays
-from stages.splat.views import PosedView, evenly, posed_frames, read_view
-from stages.truth.annotated_points import instances_of
-from stages.truth.support_annotation import read_support_annotation
 
 NAMED_ROOMS = tuple(f"{kind}-{1520 + k}" for k, kind in enumerate(2 * ("kitchen", "office", "bedroom", "room")))
 """Reported on once, and tuning rooms since: our network has learned from none of them."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scenewright.stages.kit.open_words.two_towers import SIDE, tokens
 from scipy.ndimage import find_objects
 
 from benchmarks.words.lexicon import FALSE, TRUE, UNKNOWN, Lexicon, Phrase
 from benchmarks.words.samples import RENDERED, Samples
-from stages.kit.open_words.two_towers import SIDE, tokens
 
 LEAST_PIXELS = 40
 """Of a thing in a picture, for a crop about it."""

@@ -16,13 +16,8 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
-from scipy.optimize import minimize
-
-from benchmarks.experiments.real import EXPECTED
-from benchmarks.options import Recipe, asked
-from benchmarks.words.asked import NAMED_ROOMS, AskedLog, AskedRoom
-from schemas.language_map import LanguageMap
-from stages.kit.open_words.calibration import (
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.stages.kit.open_words.calibration import (
     BUNDLED,
     NAMED_SPLAT,
     SHORTEST,
@@ -32,9 +27,14 @@ from stages.kit.open_words.calibration import (
     log_odds,
     recognised,
 )
-from stages.kit.open_words.embedded import EmbeddedEncoder
-from stages.kit.open_words.finding import Finder, class_vectors
-from stages.kit.open_words.relevancy import TEMPERATURE
+from scenewright.stages.kit.open_words.embedded import EmbeddedEncoder
+from scenewright.stages.kit.open_words.finding import Finder, class_vectors
+from scenewright.stages.kit.open_words.relevancy import TEMPERATURE
+from scipy.optimize import minimize
+
+from benchmarks.experiments.real import EXPECTED
+from benchmarks.options import Recipe, asked
+from benchmarks.words.asked import NAMED_ROOMS, AskedLog, AskedRoom
 
 ROOMS = {
     "splat": ("kitchen-40", "office-41"),

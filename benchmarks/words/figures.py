@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+from scenewright.stages.kit.open_words.encoder import Encoder
 
 from benchmarks.words.batches import Crops, Drawer
 from benchmarks.words.lexicon import FALSE, TRUE, Lexicon, Phrase, truth_of
 from benchmarks.words.samples import Samples
-from stages.kit.open_words.encoder import Encoder
 
 CROPS = 1500
 DISTRACTORS = 15

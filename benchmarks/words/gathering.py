@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.ground_truth import TrueObject
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.part_colors import recolored, vertex_colors
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 from benchmarks.words.colors import color_shares
 from benchmarks.words.lexicon import Lexicon, Thing
 from benchmarks.words.rooms import Furnished
 from benchmarks.words.samples import RENDERED, Samples, numbered
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.ground_truth import TrueObject
-from schemas.scene_parts import Camera
-from stages.kit.formats.cad_models import model_folder, posed_mesh
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.part_colors import recolored, vertex_colors
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.rendering.ray_casting import SceneRenderer
 
 PALETTE = (
     np.array(

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from scenewright.stages.kit.open_words.embedded import save_towers
+from scenewright.stages.kit.open_words.relevancy import CANONICAL
+from scenewright.stages.kit.open_words.two_towers import TwoTowers, tokens, words_of
 from torch.nn import functional
 
 from benchmarks.training.run import TrainingRun, rate_at
 from benchmarks.words.batches import Crops, Drawer, PhrasePool, changed, truth_of_crops
 from benchmarks.words.lexicon import FALSE, TRUE, UNKNOWN, Lexicon, Phrase, lexicon
 from benchmarks.words.samples import Samples
-from stages.kit.open_words.embedded import save_towers
-from stages.kit.open_words.relevancy import CANONICAL
-from stages.kit.open_words.two_towers import TwoTowers, tokens, words_of
 
 FILE = "two_towers.safetensors"
 WEIGHT_DECAY, WARM_UP, PEAK = 0.02, 0.05, 2e-3

@@ -12,9 +12,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scenewright.stages.kit.open_words.two_towers import words_of
 
 from benchmarks.words.colors import COLORS
-from stages.kit.open_words.two_towers import words_of
 
 FILE = Path(__file__).with_name("lexicon.toml")
 DOMINANT, TRACE = 0.5, 0.12

@@ -9,9 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.ground_truth import GroundTruth
+
 from benchmarks.steps import made
-from schemas.cad_library import CadLibrary
-from schemas.ground_truth import GroundTruth
 
 RECIPES = ("kitchen", "office", "bedroom", "room", "household", "studio")
 LIBRARIES = tuple(range(11, 17))

@@ -16,6 +16,7 @@ from typing import Literal
 
 import torch
 from pydantic import Field
+from scenewright.stages.kit.open_words.embedded import EmbeddedEncoder
 
 from benchmarks.options import Recipe, asked
 from benchmarks.training.run import train
@@ -25,7 +26,6 @@ from benchmarks.words.learning import FILE, Data, Plan, Run
 from benchmarks.words.lexicon import lexicon
 from benchmarks.words.rooms import LIBRARIES, ROOMS, VALIDATION, VALIDATION_LIBRARY, library, room
 from benchmarks.words.samples import Samples, read_samples, write_samples
-from stages.kit.open_words.embedded import EmbeddedEncoder
 
 VIEWS = 3
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.cad_library import Affordances, CadLibrary, CadModel, InnerVolume
-from stages.kit.formats.cad_models import part_transforms
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.viewing.canvas import Canvas
+from scenewright.schemas.cad_library import Affordances, CadLibrary, CadModel, InnerVolume
+from scenewright.stages.kit.formats.cad_models import part_transforms
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 ROOM, SURFACE, GRASP = (90, 170, 220), (110, 190, 100), (220, 120, 40)
 HEADER = "| model | carried | opens | knobs, levers | contains [l] | carries [m²] | grasps |"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.agent_episode import AgentEpisode, AgentEvaluation
-from schemas.outside import LARGEST_SHOWN, file_content, file_text
-from stages.kit.viewing.canvas import Canvas
+from scenewright.schemas.agent_episode import AgentEpisode, AgentEvaluation
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content, file_text
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 
 def draw_agent_episode(episode: AgentEpisode, canvas: Canvas) -> None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
-from schemas.articulations import Articulation, Articulations
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.viewing.canvas import Canvas
+from scenewright.schemas.articulations import Articulation, Articulations
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 BEFORE, AFTER, AXIS = (0.12, 0.47, 0.71), (1.0, 0.5, 0.05), (0.84, 0.15, 0.16)
 CHANGED = np.array([150, 150, 150], np.uint8)

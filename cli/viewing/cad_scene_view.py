@@ -6,18 +6,17 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-
-from cli.viewing.inputs import input_artifact
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, Replacement
-from schemas.panoptic_map import PanopticMap
-from stages.kit.formats.cad_models import read_model
-from stages.kit.formats.painted_models import painted_mesh
-from stages.kit.measurement.cad_candidates import candidates_of
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.graphs import draw_graph
-from stages.kit.viewing.meshes import load_mesh
-from stages.kit.viewing.scenes import trust_of_models
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, Replacement
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.formats.cad_models import read_model
+from scenewright.stages.kit.formats.painted_models import painted_mesh
+from scenewright.stages.kit.measurement.cad_candidates import candidates_of
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.graphs import draw_graph
+from scenewright.stages.kit.viewing.meshes import load_mesh
+from scenewright.stages.kit.viewing.scenes import trust_of_models
 
 CANDIDATES = "candidates"
 """Candidates that were not chosen lie below this path: drawn, but hidden at first, as they stand in the chosen ones."""

@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 import trimesh
-
-from schemas.artifact import Artifact
-from schemas.cutting_demonstrations import CuttingDemonstrations
-from schemas.cutting_model import CuttingModel
-from schemas.cutting_plan import CuttingEvaluation, CuttingPlan, CuttingTrial
-from schemas.outside import LARGEST_SHOWN, file_content, file_text
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.viewing.canvas import Canvas
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.cutting_demonstrations import CuttingDemonstrations
+from scenewright.schemas.cutting_model import CuttingModel
+from scenewright.schemas.cutting_plan import CuttingEvaluation, CuttingPlan, CuttingTrial
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content, file_text
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 
 def draw_cutting_demonstrations(shown: CuttingDemonstrations, canvas: Canvas) -> None:

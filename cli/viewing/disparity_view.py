@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from cli.viewing.sequence_view import MAXIMUM_FRAMES, draw_sequence
-from schemas.disparity import Disparity, DisparityFile
-from stages.kit.formats.disparity_file import DisparityReader
-from stages.kit.formats.foxglove import encode_jpeg
-from stages.kit.formats.frames import FrameReader
-from stages.kit.stereo.pictures import confidence_colors, disparity_colors
-from stages.kit.viewing.canvas import Canvas
+from scenewright.cli.viewing.sequence_view import MAXIMUM_FRAMES, draw_sequence
+from scenewright.schemas.disparity import Disparity, DisparityFile
+from scenewright.stages.kit.formats.disparity_file import DisparityReader
+from scenewright.stages.kit.formats.foxglove import encode_jpeg
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.stereo.pictures import confidence_colors, disparity_colors
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 
 def draw_disparity(disparity: Disparity, canvas: Canvas) -> None:

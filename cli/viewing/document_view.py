@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.evaluation import Evaluation, Report
-from schemas.exported_scene import ExportedScene
-from schemas.exported_sequence import ExportedSequence
-from schemas.outside import LARGEST_SHOWN, file_content, file_text
-from stages.kit.viewing.canvas import Canvas
+from scenewright.schemas.evaluation import Evaluation, Report
+from scenewright.schemas.exported_scene import ExportedScene
+from scenewright.schemas.exported_sequence import ExportedSequence
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content, file_text
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 
 def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:

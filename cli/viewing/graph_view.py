@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from cli.viewing.inputs import input_artifact
-from schemas.contact_graph import ContactGraph
-from schemas.panoptic_map import PanopticMap
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.graphs import draw_graph_over
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.graphs import draw_graph_over
 
 
 def draw_contact_graph(graph: ContactGraph, canvas: Canvas) -> None:

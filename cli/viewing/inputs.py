@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from schemas.artifact import Artifact
-from schemas.errors import BadInput
-from schemas.kinds import KINDS
-from stages.engine.reading import open_artifact
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.kinds import KINDS
+from scenewright.stages.engine.reading import open_artifact
 
 Kind = TypeVar("Kind", bound=Artifact)
 

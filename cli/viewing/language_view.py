@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-
-from cli.viewing.inputs import input_artifact
-from cli.viewing.splat_view import draw_splat
-from schemas.language_map import Answer, Answers, LanguageMap
-from schemas.splat import Splat
-from stages.kit.drawing.palette import instance_color
-from stages.kit.open_words.vectors import read_vectors
-from stages.kit.viewing.canvas import Canvas
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.cli.viewing.splat_view import draw_splat
+from scenewright.schemas.language_map import Answer, Answers, LanguageMap
+from scenewright.schemas.splat import Splat
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.open_words.vectors import read_vectors
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 FEWEST_LOOKS = 1
 MOST_BOXES = 300

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-
-from cli.viewing.affordance_view import affordance_table, draw_affordances
-from schemas.cad_library import CadLibrary, CadModel
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.cad_models import load_visual_parts, model_folder, part_transforms
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.viewing.canvas import Canvas
+from scenewright.cli.viewing.affordance_view import affordance_table, draw_affordances
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.cad_models import load_visual_parts, model_folder, part_transforms
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 GAP = 0.4
 SWING_STEPS = 12

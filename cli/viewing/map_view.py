@@ -1,5 +1,5 @@
 """Panoptic maps."""
 
-from stages.kit.viewing.maps import draw_panoptic_map
+from scenewright.stages.kit.viewing.maps import draw_panoptic_map
 
 __all__ = ["draw_panoptic_map"]

@@ -5,14 +5,21 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
-from cli.viewing.robot_view import animate_arm, draw_robot
-from schemas.outside import LARGEST_SHOWN, file_content
-from schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP, Packing, PackingArea, PackingBox, PackingStep
-from schemas.scene_parts import Box
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.meshes import draw_solid
+from scenewright.cli.viewing.robot_view import animate_arm, draw_robot
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content
+from scenewright.schemas.packing import (
+    BASKET_SLAB,
+    BASKET_TOP,
+    TABLE_TOP,
+    Packing,
+    PackingArea,
+    PackingBox,
+    PackingStep,
+)
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.meshes import draw_solid
 
 PICTURES = ("layout", "attempts", "scene")
 PERIOD = 0.05

@@ -8,18 +8,17 @@ import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import DecodeError
-
-from cli.viewing.inputs import input_artifact
-from cli.viewing.robot_view import PANDA, ROBOT, draw_robot
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.plan import Plan
-from stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
-from stages.kit.formats.indexed_mcap import IndexedMcap
-from stages.kit.formats.numpy_files import read_all_arrays
-from stages.kit.viewing.canvas import SHELL, Canvas
-from stages.kit.viewing.scenes import draw_scene_folder
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.cli.viewing.robot_view import PANDA, ROBOT, draw_robot
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.plan import Plan
+from scenewright.stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
+from scenewright.stages.kit.formats.indexed_mcap import IndexedMcap
+from scenewright.stages.kit.formats.numpy_files import read_all_arrays
+from scenewright.stages.kit.viewing.canvas import SHELL, Canvas
+from scenewright.stages.kit.viewing.scenes import draw_scene_folder
 
 
 def draw_plan(plan: Plan, canvas: Canvas) -> None:

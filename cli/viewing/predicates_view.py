@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
-from schemas.learned_domain import LearnedDomain
-from schemas.outside import LARGEST_SHOWN, file_text
-from stages.kit.viewing.canvas import Canvas
+from scenewright.schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
+from scenewright.schemas.learned_domain import LearnedDomain
+from scenewright.schemas.outside import LARGEST_SHOWN, file_text
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 
 def draw_learned_domain(learned: LearnedDomain, canvas: Canvas) -> None:

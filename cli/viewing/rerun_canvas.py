@@ -11,15 +11,14 @@ import cv2
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
-
-from cli.viewing.arrangement import Arrangement
-from cli.viewing.viewer_process import viewer_address
-from schemas.errors import BadInput, MissingDependency
-from schemas.scene_parts import Box, Camera
-from stages.kit.formats.foxglove import PNG_START
-from stages.kit.geometry.cameras import intrinsic_matrix
-from stages.kit.geometry.transforms import quaternion_of
-from stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_table, vertex_colors
+from scenewright.cli.viewing.arrangement import Arrangement
+from scenewright.cli.viewing.viewer_process import viewer_address
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.scene_parts import Box, Camera
+from scenewright.stages.kit.formats.foxglove import PNG_START
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
+from scenewright.stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_table, vertex_colors
 
 WORLD = "world"
 DISTRIBUTION = "rerun-sdk"

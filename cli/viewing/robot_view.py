@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.link_poses import link_poses
-from stages.kit.formats.urdf_file import Urdf, parse_urdf
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.meshes import merged, shape_mesh
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.link_poses import link_poses
+from scenewright.stages.kit.formats.urdf_file import Urdf, parse_urdf
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.meshes import merged, shape_mesh
 
 ROBOT = "robot/"
 PANDA = "panda"
@@ -17,7 +16,7 @@ PANDA = "panda"
 def draw_robot(canvas: Canvas, name: str = PANDA) -> Urdf | None:
     """Draw the links of a robot (`load_robot`), each in its own frame, and return its description; None (and a note)
     where that is not installed: then only the room moves."""
-    from stages.kit.simulation.robot_description import load_robot
+    from scenewright.stages.kit.simulation.robot_description import load_robot
 
     try:
         robot = load_robot(name)

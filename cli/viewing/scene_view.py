@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from cli.viewing.inputs import input_artifact
-from schemas.cad_scene import CadScene
-from schemas.interactive_scene import InteractiveScene
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.scenes import draw_scene_with_graph
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.scenes import draw_scene_with_graph
 
 
 def draw_interactive_scene(scene: InteractiveScene, canvas: Canvas) -> None:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-
-from cli.viewing.inputs import input_artifact
-from cli.viewing.sequence_view import MAXIMUM_FRAMES
-from schemas.segments import FrameSegments, Segments
-from schemas.sequence import Sequence
-from schemas.vocabulary import load_vocabulary
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.masks import PanopticReader
-from stages.kit.viewing.canvas import Canvas
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.cli.viewing.sequence_view import MAXIMUM_FRAMES
+from scenewright.schemas.segments import FrameSegments, Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.masks import PanopticReader
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 
 def draw_segments(segments: Segments, canvas: Canvas) -> None:

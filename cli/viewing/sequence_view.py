@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
-from stages.kit.viewing.canvas import Canvas
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 MAXIMUM_FRAMES = 150
 """More frames than this are thinned out, so that a recording stays in the tens of megabytes."""

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.outside import LARGEST_SHOWN, file_content
-from schemas.splat import Splat, SplatViews
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.cameras import scaled
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.harmonics import LEVEL_0
-from stages.kit.rendering.splatting.rasterizer import View
-from stages.kit.viewing.canvas import Canvas
-from stages.splat.ply import read_gaussians
-from stages.splat.views import evenly
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content
+from scenewright.schemas.splat import Splat, SplatViews
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.harmonics import LEVEL_0
+from scenewright.stages.kit.rendering.splatting.rasterizer import View
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.splat.ply import read_gaussians
+from scenewright.stages.splat.views import evenly
 
 FAINT = 0.15
 """Opacity below which a Gaussian is not drawn."""

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-
-from cli.viewing.sequence_view import draw_sequence
-from schemas.errors import BadInput
-from schemas.outside import LARGEST_SHOWN, file_content, file_text
-from schemas.scene_parts import Box
-from schemas.suture_needle import NeedleEstimateRecord, SutureNeedle, SutureThread
-from schemas.suture_scene import StereoRigRecord, SutureScene
-from schemas.suture_trial import SutureEvaluation, SutureTrial
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.geometry.transforms import apply
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.meshes import draw_solid
+from scenewright.cli.viewing.sequence_view import draw_sequence
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content, file_text
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.suture_needle import NeedleEstimateRecord, SutureNeedle, SutureThread
+from scenewright.schemas.suture_scene import StereoRigRecord, SutureScene
+from scenewright.schemas.suture_trial import SutureEvaluation, SutureTrial
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.meshes import draw_solid
 
 STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
 ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.artifact import Artifact
-from schemas.outside import LARGEST_SHOWN, file_content, file_text
-from schemas.scene_parts import Box
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewarePlan
-from schemas.tableware_scene import TablewareItem, TablewareScene
-from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.meshes import draw_solid
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content, file_text
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.tableware_detections import TablewareDetections
+from scenewright.schemas.tableware_plan import TablewarePlan
+from scenewright.schemas.tableware_scene import TablewareItem, TablewareScene
+from scenewright.schemas.tableware_trial import TablewareEvaluation, TablewareTrial
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.meshes import draw_solid
 
 TABLE = (0.78, 0.61, 0.03)
 """Extents of the table top [m]; its surface is at z = 0."""

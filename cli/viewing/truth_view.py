@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-
-from cli.viewing.sequence_view import draw_frames, draw_path
-from schemas.ground_truth import GroundTruth
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.graphs import HIDDEN, draw_graph
-from stages.kit.viewing.maps import instance_colors
-from stages.kit.viewing.scenes import draw_scene_folder
+from scenewright.cli.viewing.sequence_view import draw_frames, draw_path
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.graphs import HIDDEN, draw_graph
+from scenewright.stages.kit.viewing.maps import instance_colors
+from scenewright.stages.kit.viewing.scenes import draw_scene_folder
 
 
 def draw_ground_truth(truth: GroundTruth, canvas: Canvas) -> None:

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cli.viewing
-from cli.viewing.rerun_canvas import RerunCanvas, import_rerun
-from schemas.artifact import Artifact
-from schemas.errors import BadInput, UsageError
-from stages.engine.reading import open_artifact
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.page.page_canvas import PageCanvas
+import scenewright.cli.viewing
+from scenewright.cli.viewing.rerun_canvas import RerunCanvas, import_rerun
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas
 
 PAGE, RECORDING = ".html", ".rrd"
 
@@ -24,8 +24,10 @@ def viewer_of(kind: type[Artifact]) -> Callable[[Any, Canvas], None] | None:
 
     It takes the handle and the canvas. A kind without one is drawn as the kind that it can be read as.
     """
-    files = [entry.name for entry in pkgutil.iter_modules(cli.viewing.__path__) if entry.name.endswith("_view")]
-    modules = [importlib.import_module(f"cli.viewing.{name}") for name in files]
+    files = [
+        entry.name for entry in pkgutil.iter_modules(scenewright.cli.viewing.__path__) if entry.name.endswith("_view")
+    ]
+    modules = [importlib.import_module(f"scenewright.cli.viewing.{name}") for name in files]
     for name in [base.kind for base in kind.__mro__ if issubclass(base, Artifact)]:
         for module in modules:
             draw = getattr(module, f"draw_{name}", None)

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 
-from schemas.errors import MachineFailure
+from scenewright.schemas.errors import MachineFailure
 
 HOST, PORT = "127.0.0.1", 9876
 LONGEST_START = 20.0

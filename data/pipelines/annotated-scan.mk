@@ -13,22 +13,22 @@ $(if $(LABELS),$(if $(wildcard $(LABELS)),,$(error LABELS=$(LABELS): no such fil
 all: $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/annotated-scan.toml $(SCAN) $(LABELS)
-	$(PYTHON) -m cli fuse --from-mesh '$(SCAN)' $(if $(LABELS),--labels '$(LABELS)') --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
+	$(PYTHON) -m scenewright fuse --from-mesh '$(SCAN)' $(if $(LABELS),--labels '$(LABELS)') --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
 
 $(FOLDER)/contact_graph/manifest.json: data/pipelines/annotated-scan.toml $(FOLDER)/panoptic_map/manifest.json
-	$(PYTHON) -m cli graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph
+	$(PYTHON) -m scenewright graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/annotated-scan.toml
-	$(PYTHON) -m cli library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
+	$(PYTHON) -m scenewright library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/cad_scene/manifest.json: data/pipelines/annotated-scan.toml $(FOLDER)/contact_graph/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/cad_library/manifest.json
-	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --seed '$(SEED)' --out $(FOLDER)/cad_scene
+	$(PYTHON) -m scenewright cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --seed '$(SEED)' --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/annotated-scan.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m scenewright urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/evaluation/manifest.json: data/pipelines/annotated-scan.toml $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json
-	$(PYTHON) -m cli evaluate --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
+	$(PYTHON) -m scenewright evaluate --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
 
 $(FOLDER)/report/manifest.json: data/pipelines/annotated-scan.toml $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json
-	$(PYTHON) -m cli report --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report
+	$(PYTHON) -m scenewright report --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report

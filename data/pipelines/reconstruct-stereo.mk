@@ -20,34 +20,34 @@ MAXIMUM_DEPTH ?= 4
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/ground_truth/manifest.json $(FOLDER)/stereo_pairs/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct-stereo.toml
-	$(PYTHON) -m cli library build --shapes-per-class '$(SHAPES)' --small-shapes-per-class '$(SHAPES)' --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
+	$(PYTHON) -m scenewright library build --shapes-per-class '$(SHAPES)' --small-shapes-per-class '$(SHAPES)' --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/ground_truth/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/cad_library/manifest.json
-	$(PYTHON) -m cli synthesize --library $(FOLDER)/cad_library --recipe '$(RECIPE)' --clutter '$(CLUTTER)' --frames '$(FRAMES)' --width '$(WIDTH)' --height '$(HEIGHT)' --stereo-baseline '$(BASELINE)' --no-depth --picture-noise '$(PICTURE_NOISE)' --seed '$(SEED)' --out $(FOLDER)/ground_truth
+	$(PYTHON) -m scenewright synthesize --library $(FOLDER)/cad_library --recipe '$(RECIPE)' --clutter '$(CLUTTER)' --frames '$(FRAMES)' --width '$(WIDTH)' --height '$(HEIGHT)' --stereo-baseline '$(BASELINE)' --no-depth --picture-noise '$(PICTURE_NOISE)' --seed '$(SEED)' --out $(FOLDER)/ground_truth
 
 $(FOLDER)/stereo_pairs/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/ground_truth/manifest.json
-	$(PYTHON) -m cli ingest --log $(FOLDER)/ground_truth/log.mcap --out $(FOLDER)/stereo_pairs
+	$(PYTHON) -m scenewright ingest --log $(FOLDER)/ground_truth/log.mcap --out $(FOLDER)/stereo_pairs
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/stereo_pairs/manifest.json
-	$(PYTHON) -m cli disparity --sequence $(FOLDER)/stereo_pairs --maximum-depth '$(MAXIMUM_DEPTH)' --out $(FOLDER)/sequence
+	$(PYTHON) -m scenewright disparity --sequence $(FOLDER)/stereo_pairs --maximum-depth '$(MAXIMUM_DEPTH)' --out $(FOLDER)/sequence
 
 $(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/sequence/manifest.json
-	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence --backend ground-truth --corruption '$(CORRUPTION)' --out $(FOLDER)/segments
+	$(PYTHON) -m scenewright segment --sequence $(FOLDER)/sequence --backend ground-truth --corruption '$(CORRUPTION)' --out $(FOLDER)/segments
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json
-	$(PYTHON) -m cli fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
+	$(PYTHON) -m scenewright fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
 
 $(FOLDER)/contact_graph/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/panoptic_map/manifest.json
-	$(PYTHON) -m cli graph --panoptic-map $(FOLDER)/panoptic_map --out $(FOLDER)/contact_graph
+	$(PYTHON) -m scenewright graph --panoptic-map $(FOLDER)/panoptic_map --out $(FOLDER)/contact_graph
 
 $(FOLDER)/cad_scene/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/contact_graph/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/cad_library/manifest.json
-	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --out $(FOLDER)/cad_scene
+	$(PYTHON) -m scenewright cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m scenewright urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/evaluation/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/ground_truth/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/interactive_scene/manifest.json
-	$(PYTHON) -m cli evaluate --ground-truth $(FOLDER)/ground_truth --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
+	$(PYTHON) -m scenewright evaluate --ground-truth $(FOLDER)/ground_truth --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
 
 $(FOLDER)/report/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/ground_truth/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json
-	$(PYTHON) -m cli report --ground-truth $(FOLDER)/ground_truth --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report
+	$(PYTHON) -m scenewright report --ground-truth $(FOLDER)/ground_truth --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report

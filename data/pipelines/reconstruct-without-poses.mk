@@ -18,31 +18,31 @@ $(if $(LABELS),$(if $(wildcard $(LABELS)),,$(error LABELS=$(LABELS): no such fil
 all: $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-without-poses.toml $(LOG)
-	$(PYTHON) -m cli ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
+	$(PYTHON) -m scenewright ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
 
 $(FOLDER)/trajectory/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json
-	$(PYTHON) -m cli poses --sequence $(FOLDER)/sequence --method '$(POSES_METHOD)' --seed '$(SEED)' --accept tracking_lost --out $(FOLDER)/trajectory
+	$(PYTHON) -m scenewright poses --sequence $(FOLDER)/sequence --method '$(POSES_METHOD)' --seed '$(SEED)' --accept tracking_lost --out $(FOLDER)/trajectory
 
 $(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS)) $(MASKS) $(LABELS)
-	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
+	$(PYTHON) -m scenewright segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/trajectory/manifest.json
-	$(PYTHON) -m cli fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --trajectory $(FOLDER)/trajectory --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
+	$(PYTHON) -m scenewright fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --trajectory $(FOLDER)/trajectory --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
 
 $(FOLDER)/contact_graph/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/panoptic_map/manifest.json
-	$(PYTHON) -m cli graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph
+	$(PYTHON) -m scenewright graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct-without-poses.toml
-	$(PYTHON) -m cli library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
+	$(PYTHON) -m scenewright library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/cad_scene/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/contact_graph/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/cad_library/manifest.json
-	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --seed '$(SEED)' --out $(FOLDER)/cad_scene
+	$(PYTHON) -m scenewright cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --seed '$(SEED)' --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m scenewright urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/evaluation/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json
-	$(PYTHON) -m cli evaluate --sequence $(FOLDER)/sequence --trajectory $(FOLDER)/trajectory --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
+	$(PYTHON) -m scenewright evaluate --sequence $(FOLDER)/sequence --trajectory $(FOLDER)/trajectory --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
 
 $(FOLDER)/report/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json
-	$(PYTHON) -m cli report --sequence $(FOLDER)/sequence --trajectory $(FOLDER)/trajectory --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report
+	$(PYTHON) -m scenewright report --sequence $(FOLDER)/sequence --trajectory $(FOLDER)/trajectory --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report

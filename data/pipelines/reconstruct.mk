@@ -18,31 +18,31 @@ $(if $(LABELS),$(if $(wildcard $(LABELS)),,$(error LABELS=$(LABELS): no such fil
 all: $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/articulations/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct.toml $(LOG)
-	$(PYTHON) -m cli ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') --pose-convention '$(POSE_CONVENTION)' $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
+	$(PYTHON) -m scenewright ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') --pose-convention '$(POSE_CONVENTION)' $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
 
 $(FOLDER)/segments/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS)) $(wildcard $(SEMANTIC_WEIGHTS)) $(MASKS) $(LABELS)
-	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(SEMANTIC_WEIGHTS),--semantic-weights '$(SEMANTIC_WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
+	$(PYTHON) -m scenewright segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(SEMANTIC_WEIGHTS),--semantic-weights '$(SEMANTIC_WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
 
 $(FOLDER)/articulations/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json
-	$(PYTHON) -m cli articulate --sequence $(FOLDER)/sequence --out $(FOLDER)/articulations
+	$(PYTHON) -m scenewright articulate --sequence $(FOLDER)/sequence --out $(FOLDER)/articulations
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/articulations/manifest.json
-	$(PYTHON) -m cli fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --articulations $(FOLDER)/articulations --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
+	$(PYTHON) -m scenewright fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --articulations $(FOLDER)/articulations --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
 
 $(FOLDER)/contact_graph/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/panoptic_map/manifest.json
-	$(PYTHON) -m cli graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph
+	$(PYTHON) -m scenewright graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct.toml
-	$(PYTHON) -m cli library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
+	$(PYTHON) -m scenewright library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/cad_scene/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/contact_graph/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/articulations/manifest.json
-	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --articulations $(FOLDER)/articulations --seed '$(SEED)' --out $(FOLDER)/cad_scene
+	$(PYTHON) -m scenewright cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --articulations $(FOLDER)/articulations --seed '$(SEED)' --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m scenewright urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/evaluation/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json
-	$(PYTHON) -m cli evaluate --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
+	$(PYTHON) -m scenewright evaluate --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation
 
 $(FOLDER)/report/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json
-	$(PYTHON) -m cli report --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report
+	$(PYTHON) -m scenewright report --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --evaluation $(FOLDER)/evaluation --out $(FOLDER)/report

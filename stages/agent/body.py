@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
+from scenewright.stages.agent.obstacle_map import ObstacleMap
+from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
 
 
 class Body(Protocol):

@@ -15,12 +15,11 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.SceneEntityDeletion_pb2 import SceneEntityDeletion
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-
-from schemas.agent_episode import MapThing
-from stages.agent.obstacle_map import CELL
-from stages.agent.senses import Base
-from stages.kit.formats import foxglove
-from stages.kit.formats.foxglove_log import foxglove_log
+from scenewright.schemas.agent_episode import MapThing
+from scenewright.stages.agent.obstacle_map import CELL
+from scenewright.stages.agent.senses import Base
+from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.foxglove_log import foxglove_log
 
 TRANSFORMS, MAP, SCENE, LOG, WRIST = "/tf", "/map", "/scene", "/log", "/camera/wrist"
 _TOPICS = {TRANSFORMS: FrameTransforms, MAP: Grid, SCENE: SceneUpdate, LOG: Log, WRIST: CompressedImage}

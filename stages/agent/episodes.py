@@ -7,8 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-
-from schemas.agent_episode import (
+from scenewright.schemas.agent_episode import (
     AgentEpisode,
     EpisodeCall,
     EpisodeFile,
@@ -18,20 +17,20 @@ from schemas.agent_episode import (
     MapSnapshot,
     MapThing,
 )
-from schemas.language import LanguageRecord
-from stages.agent.arms.skills import CommonSkills
-from stages.agent.brains.brain import Brain, Reply
-from stages.agent.episode_log import Moment, write_log
-from stages.agent.judging import score
-from stages.agent.language.interpreter import Called, Ran
-from stages.agent.language.values import as_text
-from stages.agent.obstacle_map import CELL, UNKNOWN
-from stages.agent.pictures import Panel, animate_map, draw_growing_map, write_views
-from stages.agent.scene_map import SceneMap
-from stages.agent.session import Session, Turn
-from stages.agent.trials import Setting, run_trial
-from stages.agent.world.truth import World
-from stages.kit.language.failures import LanguageFailed
+from scenewright.schemas.language import LanguageRecord
+from scenewright.stages.agent.arms.skills import CommonSkills
+from scenewright.stages.agent.brains.brain import Brain, Reply
+from scenewright.stages.agent.episode_log import Moment, write_log
+from scenewright.stages.agent.judging import score
+from scenewright.stages.agent.language.interpreter import Called, Ran
+from scenewright.stages.agent.language.values import as_text
+from scenewright.stages.agent.obstacle_map import CELL, UNKNOWN
+from scenewright.stages.agent.pictures import Panel, animate_map, draw_growing_map, write_views
+from scenewright.stages.agent.scene_map import SceneMap
+from scenewright.stages.agent.session import Session, Turn
+from scenewright.stages.agent.trials import Setting, run_trial
+from scenewright.stages.agent.world.truth import World
+from scenewright.stages.kit.language.failures import LanguageFailed
 
 
 class RecordedBrain:

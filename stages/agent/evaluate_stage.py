@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from schemas.agent_episode import AgentEvaluation, AgentEvaluationFile, EvaluatedArm
-from schemas.errors import UsageError
-from stages.agent.arms.registry import ARMS
-from stages.agent.judging import Score, score
-from stages.agent.parameters import EvaluateParameters
-from stages.agent.tasks import TASKS, make_apartment
-from stages.agent.trials import Setting, run_trial
-from stages.agent.world.failures import Rates
-from stages.agent.world.floor import Floor
-from stages.kit.stage import Context
+from scenewright.schemas.agent_episode import AgentEvaluation, AgentEvaluationFile, EvaluatedArm
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.agent.arms.registry import ARMS
+from scenewright.stages.agent.judging import Score, score
+from scenewright.stages.agent.parameters import EvaluateParameters
+from scenewright.stages.agent.tasks import TASKS, make_apartment
+from scenewright.stages.agent.trials import Setting, run_trial
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.floor import Floor
+from scenewright.stages.kit.stage import Context
 
 
 def run(*, parameters: EvaluateParameters, context: Context) -> AgentEvaluation:

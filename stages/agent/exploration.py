@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
-from stages.agent.body import Body
-from stages.agent.obstacle_map import CELL
-from stages.agent.scene_map import SceneMap
-from stages.agent.senses import Base
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.obstacle_map import CELL
+from scenewright.stages.agent.scene_map import SceneMap
+from scenewright.stages.agent.senses import Base
 
 MOST_STOPS = 60
 NEAR = 0.5

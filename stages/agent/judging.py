@@ -6,11 +6,11 @@ from collections import Counter
 from dataclasses import dataclass
 from math import hypot
 
-from stages.agent.goals import NEAR_MIDDLE, Among, Description, Gather, Goal, Move, Shut
-from stages.agent.session import Session
-from stages.agent.world.events import Event
-from stages.agent.world.failures import TABLE_3_4
-from stages.agent.world.truth import World
+from scenewright.stages.agent.goals import NEAR_MIDDLE, Among, Description, Gather, Goal, Move, Shut
+from scenewright.stages.agent.session import Session
+from scenewright.stages.agent.world.events import Event
+from scenewright.stages.agent.world.failures import TABLE_3_4
+from scenewright.stages.agent.world.truth import World
 
 CAUSES = tuple(TABLE_3_4)
 """Rows of the failure table."""

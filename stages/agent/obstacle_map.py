@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 from math import ceil
 
 import numpy as np
+from scenewright.schemas.apartment import LARGEST_SIDE
+from scenewright.stages.agent.fast_marching import distances
+from scenewright.stages.agent.senses import Base, Sweep
 from scipy.ndimage import binary_dilation
-
-from schemas.apartment import LARGEST_SIDE
-from stages.agent.fast_marching import distances
-from stages.agent.senses import Base, Sweep
 
 CELL = 0.1
 """Edge of a cell [m]; cell (i, j) has its middle at (i, j) * CELL of the map frame."""

@@ -7,14 +7,13 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
-
-from schemas.agent_episode import AgentEpisode, AgentEvaluation
-from schemas.errors import UsageError
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from stages.kit.language.options import LanguageParameters
-from stages.kit.services.address import SEGMENTATION, check_address
-from stages.kit.stage import NOT_SHOWN, External, Optionally, Parameters, Stage
+from scenewright.schemas.agent_episode import AgentEpisode, AgentEvaluation
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.services.address import SEGMENTATION, check_address
+from scenewright.stages.kit.stage import NOT_SHOWN, External, Optionally, Parameters, Stage
 
 ArmName = Literal["open_loop", "bool_feedback", "thesis", "ours", "oracle"]
 RECIPE, SHAPES, ROBOT = "agent/apartment.toml", "agent/things.toml", "robots/panda.toml"

@@ -12,10 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from PIL import Image
-
-from schemas.agent_episode import MapThing
-from stages.agent.obstacle_map import CELL
-from stages.agent.senses import Base
+from scenewright.schemas.agent_episode import MapThing
+from scenewright.stages.agent.obstacle_map import CELL
+from scenewright.stages.agent.senses import Base
 
 MOST_PANELS = 6
 MOST_FRAMES, FRAME_MILLISECONDS = 24, 500

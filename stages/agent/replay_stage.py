@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import shutil
 
-from schemas.agent_episode import AgentEpisode
-from schemas.apartment import Apartment
-from schemas.errors import BadInput
-from stages.agent.arms.registry import ARMS
-from stages.agent.brains.open_loop import OpenLoopBrain
-from stages.agent.episodes import RecordedBrain, write_episode
-from stages.agent.parameters import ReplayParameters
-from stages.agent.segmenter_identity import identity_of
-from stages.agent.session import Limits
-from stages.agent.tasks import TASKS
-from stages.agent.trials import Setting, goals_of
-from stages.agent.world.failures import Rates
-from stages.kit.stage import Context
+from scenewright.schemas.agent_episode import AgentEpisode
+from scenewright.schemas.apartment import Apartment
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.agent.arms.registry import ARMS
+from scenewright.stages.agent.brains.open_loop import OpenLoopBrain
+from scenewright.stages.agent.episodes import RecordedBrain, write_episode
+from scenewright.stages.agent.parameters import ReplayParameters
+from scenewright.stages.agent.segmenter_identity import identity_of
+from scenewright.stages.agent.session import Limits
+from scenewright.stages.agent.tasks import TASKS
+from scenewright.stages.agent.trials import Setting, goals_of
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.kit.stage import Context
 
 
 def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context) -> AgentEpisode:

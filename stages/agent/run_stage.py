@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.agent_episode import AgentEpisode
-from schemas.apartment import Apartment
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
-from schemas.outside import LARGEST_SETTINGS
-from stages.agent.arms.registry import ARMS
-from stages.agent.brains.brain import Brain
-from stages.agent.brains.language import LanguageBrain
-from stages.agent.episodes import write_episode
-from stages.agent.parameters import RunParameters
-from stages.agent.segmenter_identity import identity_of
-from stages.agent.session import Limits
-from stages.agent.tasks import TASKS, make_apartment, make_household
-from stages.agent.trials import Setting, goals_of, rules_brain
-from stages.agent.world.failures import Rates
-from stages.agent.world.reconstructed import apartment_of
-from stages.kit.language.chat import Chat
-from stages.kit.language.opening import open_chat
-from stages.kit.language.scripted import ScriptedBackend
-from stages.kit.stage import Context
+from scenewright.schemas.agent_episode import AgentEpisode
+from scenewright.schemas.apartment import Apartment
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
+from scenewright.schemas.outside import LARGEST_SETTINGS
+from scenewright.stages.agent.arms.registry import ARMS
+from scenewright.stages.agent.brains.brain import Brain
+from scenewright.stages.agent.brains.language import LanguageBrain
+from scenewright.stages.agent.episodes import write_episode
+from scenewright.stages.agent.parameters import RunParameters
+from scenewright.stages.agent.segmenter_identity import identity_of
+from scenewright.stages.agent.session import Limits
+from scenewright.stages.agent.tasks import TASKS, make_apartment, make_household
+from scenewright.stages.agent.trials import Setting, goals_of, rules_brain
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.reconstructed import apartment_of
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.opening import open_chat
+from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.kit.stage import Context
 
 
 def run(

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, pi
 
-from stages.agent.body import Body
-from stages.agent.goals import BOXES, CARRIERS, SMALL
-from stages.agent.language.values import ObjectMap, SceneObject
-from stages.agent.senses import Base, Detection, Position, SeenFurniture, Sweep
-from stages.kit.rendering.segmenter_errors import quarter_turn
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.goals import BOXES, CARRIERS, SMALL
+from scenewright.stages.agent.language.values import ObjectMap, SceneObject
+from scenewright.stages.agent.senses import Base, Detection, Position, SeenFurniture, Sweep
+from scenewright.stages.kit.rendering.segmenter_errors import quarter_turn
 
 SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stages.agent.parameters import EyesParameters
-from stages.kit.services.segmentation_client import connect, read_identity
+from scenewright.stages.agent.parameters import EyesParameters
+from scenewright.stages.kit.services.segmentation_client import connect, read_identity
 
 
 def identity_of(address: str) -> str:

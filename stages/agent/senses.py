@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from schemas.plan import Failure
+from scenewright.schemas.plan import Failure
 
 Position = tuple[float, float, float]
 

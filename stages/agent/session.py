@@ -7,15 +7,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
-from schemas.plan import Failure
-from stages.agent.arms.skills import Skills
-from stages.agent.body import Body
-from stages.agent.brains.brain import Brain, Reply
-from stages.agent.language.interpreter import Called, Interpreter, Ran
-from stages.agent.language.program import PlanError, parse_program
-from stages.agent.language.values import Value
-from stages.agent.senses import Base
-from stages.kit.language.failures import LanguageFailed
+from scenewright.schemas.plan import Failure
+from scenewright.stages.agent.arms.skills import Skills
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.brains.brain import Brain, Reply
+from scenewright.stages.agent.language.interpreter import Called, Interpreter, Ran
+from scenewright.stages.agent.language.program import PlanError, parse_program
+from scenewright.stages.agent.language.values import Value
+from scenewright.stages.agent.senses import Base
+from scenewright.stages.kit.language.failures import LanguageFailed
 
 End = Literal["done", "give_up", "ask", "turns", "time", "repeats", "brain"]
 """How a session ended: by the program's word, or by a limit; `brain`: it gave no usable answer."""

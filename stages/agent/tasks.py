@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from schemas.apartment import Apartment
-from stages.agent.goals import FRUIT, TOYS, Among, Gather, Goal, Move, Shut, kind
-from stages.agent.world.generation import Draft, drawn
+from scenewright.schemas.apartment import Apartment
+from scenewright.stages.agent.goals import FRUIT, TOYS, Among, Gather, Goal, Move, Shut, kind
+from scenewright.stages.agent.world.generation import Draft, drawn
 
 CLUTTER = ("book", "can", "sponge", "bottle", "spoon")
 COLORS = ("red", "blue", "green", "white")

@@ -6,22 +6,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from schemas.apartment import Apartment
-from stages.agent.arms.registry import ARMS
-from stages.agent.arms.skills import CommonSkills
-from stages.agent.brains.brain import Brain
-from stages.agent.brains.open_loop import OpenLoopBrain
-from stages.agent.brains.rules import RulesBrain
-from stages.agent.brains.slips import Slips
-from stages.agent.brains.words import NotUnderstood, understood
-from stages.agent.goals import Goal, sought
-from stages.agent.session import Limits, Session, Turn, run_session
-from stages.agent.world.failures import Rates
-from stages.agent.world.fast import FastWorld
-from stages.agent.world.floor import Floor
-from stages.agent.world.reconstructed import mapped
-from stages.agent.world.truth import World
-from stages.kit.rendering.segmenter_errors import Luck
+from scenewright.schemas.apartment import Apartment
+from scenewright.stages.agent.arms.registry import ARMS
+from scenewright.stages.agent.arms.skills import CommonSkills
+from scenewright.stages.agent.brains.brain import Brain
+from scenewright.stages.agent.brains.open_loop import OpenLoopBrain
+from scenewright.stages.agent.brains.rules import RulesBrain
+from scenewright.stages.agent.brains.slips import Slips
+from scenewright.stages.agent.brains.words import NotUnderstood, understood
+from scenewright.stages.agent.goals import Goal, sought
+from scenewright.stages.agent.session import Limits, Session, Turn, run_session
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.fast import FastWorld
+from scenewright.stages.agent.world.floor import Floor
+from scenewright.stages.agent.world.reconstructed import mapped
+from scenewright.stages.agent.world.truth import World
+from scenewright.stages.kit.rendering.segmenter_errors import Luck
 
 WorldName = Literal["fast", "physics"]
 
@@ -61,11 +61,11 @@ def open_world(setting: Setting, arm: str) -> World:
     """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
     if setting.world == "physics":
-        from stages.agent.world.physics.body import PhysicsBody  # heavy: pybullet and Open3D
+        from scenewright.stages.agent.world.physics.body import PhysicsBody  # heavy: pybullet and Open3D
 
         segmenter = None
         if setting.segmenter:
-            from stages.agent.world.physics.asked import AskedSegmenter
+            from scenewright.stages.agent.world.physics.asked import AskedSegmenter
 
             segmenter = AskedSegmenter(setting.segmenter, setting.seed)
         return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed, segmenter)

@@ -15,12 +15,11 @@ from itertools import product
 from typing import Literal, Protocol
 
 import numpy as np
+from scenewright.stages.kit.geometry.planes import fit_plane, plane_rectangle, ransac_planes
+from scenewright.stages.kit.geometry.point_clouds import clusters, thin_to_grid
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.planes import fit_plane, plane_rectangle, ransac_planes
-from stages.kit.geometry.point_clouds import clusters, thin_to_grid
-from stages.kit.geometry.transforms import apply, inverse, transform_from
 
 PLANE = 0.015
 """Points so near to a plane are of it [m]."""

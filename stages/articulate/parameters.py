@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pydantic import Field
-
-from schemas.articulations import Articulations
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.kit.stage import Optionally, Parameters, Stage
+from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.stage import Optionally, Parameters, Stage
 
 
 class ArticulateParameters(Parameters):

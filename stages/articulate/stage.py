@@ -7,23 +7,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.articulations import Articulation, Articulations, ArticulationsFile
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.articulate.joints import Cloud, FoundJoint, find_joints
+from scenewright.stages.articulate.parameters import ArticulateParameters
+from scenewright.stages.articulate.watching import NEAREST, Watched
+from scenewright.stages.kit.formats.frames import FrameReader, require_depth
+from scenewright.stages.kit.formats.trajectories import poses_at, read_tum
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.surface_samples import surface_samples
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.prefetching import prefetched
+from scenewright.stages.kit.stage import Context, Progress
 from scipy import ndimage
-
-from schemas.articulations import Articulation, Articulations, ArticulationsFile
-from schemas.base import as_vector
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.articulate.joints import Cloud, FoundJoint, find_joints
-from stages.articulate.parameters import ArticulateParameters
-from stages.articulate.watching import NEAREST, Watched
-from stages.kit.formats.frames import FrameReader, require_depth
-from stages.kit.formats.trajectories import poses_at, read_tum
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.surface_samples import surface_samples
-from stages.kit.geometry.transforms import apply
-from stages.kit.prefetching import prefetched
-from stages.kit.stage import Context, Progress
 
 MOST_VOXELS = 20_000_000
 """Above this the voxels are made larger."""

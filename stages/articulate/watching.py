@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 import cv2
 import numba
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 NEAREST = 0.3
 """Nearer depth is not used [m]."""

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
-from stages.cad.matching import CUBE_ROTATIONS, Match
+from scenewright.stages.cad.matching import CUBE_ROTATIONS, Match
 
 STEP = 1e-6
 """Of the forward difference (the released code's)."""

@@ -11,17 +11,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-
-from schemas.scene_parts import Box
-from stages.cad.arranging import Placed, Seat, shifted_box
-from stages.cad.bearing import shift_to_bearing
-from stages.cad.conflicts import placed_solid
-from stages.cad.fitting import shape_at
-from stages.cad.free_spots import free_spot
-from stages.cad.model_surfaces import ModelSurface, to_world
-from stages.cad.shapes import Placement
-from stages.kit.geometry.boxes import bottom
-from stages.kit.geometry.convex_solids import Solid
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.cad.arranging import Placed, Seat, shifted_box
+from scenewright.stages.cad.bearing import shift_to_bearing
+from scenewright.stages.cad.conflicts import placed_solid
+from scenewright.stages.cad.fitting import shape_at
+from scenewright.stages.cad.free_spots import free_spot
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.geometry.boxes import bottom
+from scenewright.stages.kit.geometry.convex_solids import Solid
 
 SHRINKING = (0.97, 0.94, 0.9)
 """Scales that are tried, as shares of the fitted one, for what is nowhere free."""

@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import Box, Relation, SurfacePlane
-from stages.cad.conflicts import placed_solid
-from stages.cad.model_surfaces import ModelSurface
-from stages.cad.placing import placed_box, placed_planes
-from stages.cad.settling import Stand, stand_on, tree_order
-from stages.cad.shapes import Placement
-from stages.kit.geometry.convex_solids import Solid
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import Box, Relation, SurfacePlane
+from scenewright.stages.cad.conflicts import placed_solid
+from scenewright.stages.cad.model_surfaces import ModelSurface
+from scenewright.stages.cad.placing import placed_box, placed_planes
+from scenewright.stages.cad.settling import Stand, stand_on, tree_order
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.geometry.convex_solids import Solid
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,10 @@ table at its corners."""
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.scene_parts import Box
-from stages.cad.model_surfaces import ModelSurface, to_model
-from stages.cad.shapes import Placement
-from stages.kit.geometry.boxes import footprint
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_model
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.geometry.boxes import footprint
 
 REACH = 0.005
 """Surface this near below a point bears it [m]."""

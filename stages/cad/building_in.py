@@ -8,22 +8,21 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.articulations import Articulation
-from schemas.contact_graph import ContactGraphFile
-from stages.cad.built_ins import built_in, is_built_in
-from stages.cad.candidates import Shortlist
-from stages.cad.choosing import may_touch
-from stages.cad.conflicts import placed_solid
-from stages.cad.model_surfaces import ModelSurface
-from stages.cad.parameters import CadParameters
-from stages.cad.placing import placed_box
-from stages.cad.settling import UNEXPLAINED_GAP
-from stages.cad.shapes import Placement
-from stages.cad.target import Surroundings, Target, stands_in_wall, unsupported_children
-from stages.kit.formats.entity_meshes import EntityMesh
-from stages.kit.geometry.boxes import bottom
-from stages.kit.geometry.convex_solids import Solid, penetration
+from scenewright.schemas.articulations import Articulation
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.cad.built_ins import built_in, is_built_in
+from scenewright.stages.cad.candidates import Shortlist
+from scenewright.stages.cad.choosing import may_touch
+from scenewright.stages.cad.conflicts import placed_solid
+from scenewright.stages.cad.model_surfaces import ModelSurface
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.placing import placed_box
+from scenewright.stages.cad.settling import UNEXPLAINED_GAP
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.cad.target import Surroundings, Target, stands_in_wall, unsupported_children
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh
+from scenewright.stages.kit.geometry.boxes import bottom
+from scenewright.stages.kit.geometry.convex_solids import Solid, penetration
 
 
 def built_in_instead(

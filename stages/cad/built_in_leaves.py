@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-
-from schemas.articulations import Articulation
-from stages.cad.carcasses import Cells
+from scenewright.schemas.articulations import Articulation
+from scenewright.stages.cad.carcasses import Cells
 
 STRAIGHT = 0.95
 """Cosine from which on a leaf that was seen lies in a side of the carcass."""

@@ -14,23 +14,22 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.articulations import Articulation
-from schemas.base import as_vector
-from schemas.cad_library import CadModel, ModelState
-from schemas.contact_graph import GraphNode
-from schemas.scene_parts import Joint, SurfacePlane
-from stages.cad.built_in_leaves import BuiltInLeaf, leaves_of, shifted
-from stages.cad.carcasses import CLOSEST, Cells, Patches, cells_of, own_yaw, patches_of
-from stages.cad.model_surfaces import ModelSurface, facing_side, load_surface
-from stages.cad.shapes import Placement, shape_of_state
-from stages.cad.target import Surroundings
-from stages.kit.formats.entity_meshes import EntityMesh
-from stages.kit.formats.model_writer import Faceted, PartGeometry, write_model_folder
-from stages.kit.geometry.boxes import bottom, points_in_box
-from stages.kit.geometry.solids import Solid, box, mass_properties
-from stages.kit.geometry.substances import substance_of
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.schemas.articulations import Articulation
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_library import CadModel, ModelState
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.cad.built_in_leaves import BuiltInLeaf, leaves_of, shifted
+from scenewright.stages.cad.carcasses import CLOSEST, Cells, Patches, cells_of, own_yaw, patches_of
+from scenewright.stages.cad.model_surfaces import ModelSurface, facing_side, load_surface
+from scenewright.stages.cad.shapes import Placement, shape_of_state
+from scenewright.stages.cad.target import Surroundings
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh
+from scenewright.stages.kit.formats.model_writer import Faceted, PartGeometry, write_model_folder
+from scenewright.stages.kit.geometry.boxes import bottom, points_in_box
+from scenewright.stages.kit.geometry.solids import Solid, box, mass_properties
+from scenewright.stages.kit.geometry.substances import substance_of
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 BUILT_IN = frozenset(
     {

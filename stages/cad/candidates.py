@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.cad_library import CadModel
-from schemas.contact_graph import GraphNode
-from schemas.vocabulary import load_vocabulary
-from stages.cad.method import CadMethod
-from stages.cad.shapes import Placement, Shape
-from stages.cad.target import Target, unsupported_children
-from stages.kit.geometry.boxes import points_in_box
-from stages.kit.geometry.point_clouds import thin_to_grid
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.cad.method import CadMethod
+from scenewright.stages.cad.shapes import Placement, Shape
+from scenewright.stages.cad.target import Target, unsupported_children
+from scenewright.stages.kit.geometry.boxes import points_in_box
+from scenewright.stages.kit.geometry.point_clouds import thin_to_grid
 
 GRID = 0.01
 BOX_MARGIN = 0.01

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh
+from scenewright.stages.kit.geometry.box_cover import merge_cells
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
-
-from stages.kit.formats.entity_meshes import EntityMesh
-from stages.kit.geometry.box_cover import merge_cells
 
 EDGE = 0.025
 """Longest edge of a patch of surface [m]: larger triangles are cut."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from stages.cad.arranging import Arrangement, arrange
-from stages.cad.candidates import Shortlist
-from stages.cad.conflicts import Selection, min_conflicts, placed_solid
-from stages.cad.method import CadMethod
-from stages.cad.model_surfaces import ModelSurface
-from stages.cad.shapes import Placement
-from stages.kit.geometry.convex_solids import Solid, penetration
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.cad.arranging import Arrangement, arrange
+from scenewright.stages.cad.candidates import Shortlist
+from scenewright.stages.cad.conflicts import Selection, min_conflicts, placed_solid
+from scenewright.stages.cad.method import CadMethod
+from scenewright.stages.cad.model_surfaces import ModelSurface
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.geometry.convex_solids import Solid, penetration
 
 
 def may_touch(graph: ContactGraphFile) -> set[frozenset[str]]:

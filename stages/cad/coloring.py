@@ -8,10 +8,9 @@ that. Parts that nobody saw follow a seen part of the same colour (legs are alik
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_model
+from scenewright.stages.cad.shapes import Placement
 from scipy.stats import trim_mean
-
-from stages.cad.model_surfaces import ModelSurface, to_model
-from stages.cad.shapes import Placement
 
 NEAR = 0.03
 """Vertices farther from the model than this say nothing of its colour [m]."""

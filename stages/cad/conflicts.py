@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.cad.model_surfaces import ModelSurface, to_world
-from stages.cad.shapes import Placement
-from stages.kit.geometry.convex_solids import Solid, convex_solid
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.geometry.convex_solids import Solid, convex_solid
 
 
 def placed_solid(placement: Placement, surface: ModelSurface) -> Solid:

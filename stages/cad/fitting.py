@@ -7,13 +7,12 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-
-from schemas.base import as_vector
-from stages.cad.alignment import turn_about_z
-from stages.cad.model_surfaces import ModelSurface, alignment_error, to_model, to_world
-from stages.cad.shapes import Placement, Shape, relative_planes
-from stages.kit.formats.cad_models import part_transforms
-from stages.kit.geometry.transforms import apply, inverse
+from scenewright.schemas.base import as_vector
+from scenewright.stages.cad.alignment import turn_about_z
+from scenewright.stages.cad.model_surfaces import ModelSurface, alignment_error, to_model, to_world
+from scenewright.stages.cad.shapes import Placement, Shape, relative_planes
+from scenewright.stages.kit.formats.cad_models import part_transforms
+from scenewright.stages.kit.geometry.transforms import apply, inverse
 
 ITERATIONS = 30
 QUICK_ITERATIONS = 8

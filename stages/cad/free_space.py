@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.panoptic_map import PanopticMap
-from stages.kit.formats.numpy_files import read_arrays
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 SIDE = 8
 """Voxels along the edge of a block."""

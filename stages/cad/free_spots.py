@@ -7,8 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.convex_solids import Solid, penetration
+from scenewright.stages.kit.geometry.convex_solids import Solid, penetration
 
 DIRECTIONS = 16
 """Compass directions that are tried, beside those in which the contacts push."""

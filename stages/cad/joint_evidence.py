@@ -12,19 +12,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.articulations import Articulation
+from scenewright.schemas.cad_scene import Ground, JointEvidence
+from scenewright.stages.cad.fitting import AJAR
+from scenewright.stages.cad.leaf_handles import handle_height
+from scenewright.stages.cad.leaf_seams import seam_contrast
+from scenewright.stages.cad.leaves import leaf_of, seen_on
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_model
+from scenewright.stages.cad.seen_motions import seen_motions
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.formats.cad_models import part_transforms
+from scenewright.stages.kit.geometry.transforms import apply
 from scipy.spatial import cKDTree
-
-from schemas.articulations import Articulation
-from schemas.cad_scene import Ground, JointEvidence
-from stages.cad.fitting import AJAR
-from stages.cad.leaf_handles import handle_height
-from stages.cad.leaf_seams import seam_contrast
-from stages.cad.leaves import leaf_of, seen_on
-from stages.cad.model_surfaces import ModelSurface, to_model
-from stages.cad.seen_motions import seen_motions
-from stages.cad.shapes import Placement
-from stages.kit.formats.cad_models import part_transforms
-from stages.kit.geometry.transforms import apply
 
 EXPLAINED, NEAR = 0.75, 0.02
 """A model whose joints are believed explains this share of its thing: vertices that lie so near to it [m]. A model that

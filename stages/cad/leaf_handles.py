@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.cad.leaves import Leaf, Seen
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-
-from stages.cad.leaves import Leaf, Seen
 
 LEAST_HEIGHT, MOST_HEIGHT, NOISES = 0.015, 0.10, 4.0
 """A handle stands out by as much [m], and by so many times the noise of the front."""

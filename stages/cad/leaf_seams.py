@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.cad.leaves import Leaf, Seen
+from scenewright.stages.cad.leaves import Leaf, Seen
 
 INNER = 0.04
 """A leaf's edge that lies so far within the front's outline is no silhouette [m]."""

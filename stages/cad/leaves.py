@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.scene_parts import Joint
-from stages.cad.model_surfaces import ModelSurface
-from stages.kit.formats.cad_models import part_transforms
-from stages.kit.geometry.transforms import apply
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.cad.model_surfaces import ModelSurface
+from scenewright.stages.kit.formats.cad_models import part_transforms
+from scenewright.stages.kit.geometry.transforms import apply
 
 OUTERMOST = 0.08
 """A leaf lies at most this far behind what of the model reaches out farthest on its side (handles) [m]; what lies

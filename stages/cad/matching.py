@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
+from scenewright.stages.cad.shapes import Observed, Planes, Shape
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scipy.optimize import linear_sum_assignment
-
-from stages.cad.shapes import Observed, Planes, Shape
-from stages.kit.geometry.transforms import transform_from_yaw
 
 FORBIDDEN = 1e6
 """Cost of assigning a supporting plane to one that does not support."""

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from schemas.panoptic_map import PanopticMap
-from stages.cad.alignment import AlignmentWeights
-from stages.cad.arranging import Placer
-from stages.cad.free_space import FreeSpace
-from stages.cad.model_surfaces import ModelSurface
-from stages.cad.parameters import CadParameters
-from stages.cad.shapes import Placement
-from stages.cad.target import Target
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.cad.alignment import AlignmentWeights
+from scenewright.stages.cad.arranging import Placer
+from scenewright.stages.cad.free_space import FreeSpace
+from scenewright.stages.cad.model_surfaces import ModelSurface
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.cad.target import Target
 
 
 @dataclass(frozen=True)

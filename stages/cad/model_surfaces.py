@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 import trimesh
-
-from schemas.cad_library import CadModel
-from stages.cad.shapes import Placement
-from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
-from stages.kit.formats.part_colors import vertex_colors
-from stages.kit.geometry.ray_scenes import Triangles, triangles_of
-from stages.kit.geometry.transforms import apply, inverse
+from scenewright.schemas.cad_library import CadModel
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
+from scenewright.stages.kit.formats.part_colors import vertex_colors
+from scenewright.stages.kit.geometry.ray_scenes import Triangles, triangles_of
+from scenewright.stages.kit.geometry.transforms import apply, inverse
 
 SAMPLES = 300
 """Points that stand for the surface of a model where it is compared with free space."""

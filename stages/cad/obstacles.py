@@ -7,13 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from scipy.spatial import QhullError
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.mobility import mobility
-from stages.kit.formats.scene_supports import (
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.mobility import mobility
+from scenewright.stages.kit.formats.scene_supports import (
     Carried,
     carried_by,
     cut_below,
@@ -22,12 +20,13 @@ from stages.kit.formats.scene_supports import (
     resting_height,
     standing_points,
 )
-from stages.kit.geometry.box_cover import cover_with_boxes
-from stages.kit.geometry.boxes import box_yaw
-from stages.kit.geometry.layout_slabs import level_of_layout
-from stages.kit.geometry.solids import hull_or_box
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.measurement.layout_pieces import layout_pieces
+from scenewright.stages.kit.geometry.box_cover import cover_with_boxes
+from scenewright.stages.kit.geometry.boxes import box_yaw
+from scenewright.stages.kit.geometry.layout_slabs import level_of_layout
+from scenewright.stages.kit.geometry.solids import hull_or_box
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.measurement.layout_pieces import layout_pieces
+from scipy.spatial import QhullError
 
 
 def obstacles_of(

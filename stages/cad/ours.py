@@ -9,22 +9,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.panoptic_map import PanopticMap
-from stages.cad.alignment import align, unaligned
-from stages.cad.apart import Apart
-from stages.cad.arranging import Placer, Standing
-from stages.cad.fitting import QUICK_ITERATIONS, fitted, refine, shapes_of_model
-from stages.cad.free_space import FreeSpace, load_free_space
-from stages.cad.matching import Match, rank_matches
-from stages.cad.method import Proposals, alignment_weights, matching_weights
-from stages.cad.model_surfaces import ModelSurface, alignment_error, robust_error
-from stages.cad.parameters import CadParameters
-from stages.cad.placing import placement_of, size_misfit
-from stages.cad.scoring import score_of, would_tip
-from stages.cad.shapes import Observed, Placement, Shape, shape_of_state, turned_frames
-from stages.cad.target import Target, scale_fits, stands_in_wall
-from stages.cad.variety import varied
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.cad.alignment import align, unaligned
+from scenewright.stages.cad.apart import Apart
+from scenewright.stages.cad.arranging import Placer, Standing
+from scenewright.stages.cad.fitting import QUICK_ITERATIONS, fitted, refine, shapes_of_model
+from scenewright.stages.cad.free_space import FreeSpace, load_free_space
+from scenewright.stages.cad.matching import Match, rank_matches
+from scenewright.stages.cad.method import Proposals, alignment_weights, matching_weights
+from scenewright.stages.cad.model_surfaces import ModelSurface, alignment_error, robust_error
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.placing import placement_of, size_misfit
+from scenewright.stages.cad.scoring import score_of, would_tip
+from scenewright.stages.cad.shapes import Observed, Placement, Shape, shape_of_state, turned_frames
+from scenewright.stages.cad.target import Target, scale_fits, stands_in_wall
+from scenewright.stages.cad.variety import varied
 
 TURNS = 3
 """Standing movable things are tried at so many yaws within a quarter turn."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.articulations import Articulations
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.panoptic_map import PanopticMap
-from stages.kit.estimates import grows_with
-from stages.kit.stage import Optionally, Parameters, Stage
+from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.stage import Optionally, Parameters, Stage
 
 
 class CadParameters(Parameters):

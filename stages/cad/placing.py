@@ -5,16 +5,21 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
-from schemas.contact_graph import GraphNode
-from schemas.scene_parts import Box, SurfacePlane
-from stages.cad.alignment import Alignment
-from stages.cad.matching import CUBE_ROTATIONS, Match
-from stages.cad.model_surfaces import ModelSurface, to_world
-from stages.cad.shapes import Placement
-from stages.kit.geometry.boxes import box_corners, clip_polygon, footprint, gravity_aligned_box, polygon_area
-from stages.kit.geometry.planes import UPWARD, moved_planes
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.scene_parts import Box, SurfacePlane
+from scenewright.stages.cad.alignment import Alignment
+from scenewright.stages.cad.matching import CUBE_ROTATIONS, Match
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.geometry.boxes import (
+    box_corners,
+    clip_polygon,
+    footprint,
+    gravity_aligned_box,
+    polygon_area,
+)
+from scenewright.stages.kit.geometry.planes import UPWARD, moved_planes
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 COVER_SHARE = 0.1
 """A surface above a child limits its height when it covers this share of the child's footprint."""

@@ -11,14 +11,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.cad_library import CadModel
-from schemas.contact_graph import ContactGraphFile
-from schemas.panoptic_map import PanopticMap
-from schemas.vocabulary import UNNAMED, load_vocabulary
-from stages.cad.candidates import Shortlist, shortlist
-from stages.cad.method import CadMethod
-from stages.cad.target import Target
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.stages.cad.candidates import Shortlist, shortlist
+from scenewright.stages.cad.method import CadMethod
+from scenewright.stages.cad.target import Target
 
 TRIED, LARGEST_MISFIT = 2, 0.035
 """Classes whose models are fitted, of those that are less than this off before the fit [m]; another one, where one of

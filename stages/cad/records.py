@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.cad_scene import CadCandidate, CadSceneFile, JointEvidence, Replacement
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import TREE_RELATIONS
-from stages.cad.arranging import Arrangement, shifted_box
-from stages.cad.candidates import Shortlist
-from stages.cad.conflicts import Selection
-from stages.cad.model_surfaces import ModelSurface
-from stages.cad.placing import placed_box, placed_planes
-from stages.cad.shapes import Placement
-from stages.cad.stretching import source_of
-from stages.kit.geometry.planes import moved_planes
-from stages.kit.geometry.transforms import transform_from
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_scene import CadCandidate, CadSceneFile, JointEvidence, Replacement
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.stages.cad.arranging import Arrangement, shifted_box
+from scenewright.stages.cad.candidates import Shortlist
+from scenewright.stages.cad.conflicts import Selection
+from scenewright.stages.cad.model_surfaces import ModelSurface
+from scenewright.stages.cad.placing import placed_box, placed_planes
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.cad.stretching import source_of
+from scenewright.stages.kit.geometry.planes import moved_planes
+from scenewright.stages.kit.geometry.transforms import transform_from
 
 
 def candidate_record(placement: Placement) -> CadCandidate:

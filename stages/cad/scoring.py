@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scenewright.stages.cad.free_space import FreeSpace
+from scenewright.stages.cad.matching import Match
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.placing import facing_wall, is_upright, placed_planes, size_misfit, surface_share
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.cad.target import Surroundings
+from scenewright.stages.kit.geometry.boxes import bottom
 from scipy.spatial import ConvexHull, QhullError
-
-from stages.cad.free_space import FreeSpace
-from stages.cad.matching import Match
-from stages.cad.model_surfaces import ModelSurface, to_world
-from stages.cad.parameters import CadParameters
-from stages.cad.placing import facing_wall, is_upright, placed_planes, size_misfit, surface_share
-from stages.cad.shapes import Placement
-from stages.cad.target import Surroundings
-from stages.kit.geometry.boxes import bottom
 
 MOST_MOVE = 0.2
 """A child without any surface below or above it counts as if it moved this far [m]."""

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from schemas.articulations import Articulation
-from schemas.base import as_vector
-from schemas.cad_scene import SeenMotion
-from schemas.scene_parts import Joint
-from stages.cad.model_surfaces import ModelSurface, to_model
-from stages.cad.shapes import Placement
-from stages.kit.formats.cad_models import part_transforms
-from stages.kit.geometry.transforms import apply
+from scenewright.schemas.articulations import Articulation
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_scene import SeenMotion
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_model
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.formats.cad_models import part_transforms
+from scenewright.stages.kit.geometry.transforms import apply
 
 SAME_WAY = np.radians(15.0)
 """Axes within this are those of one joint."""

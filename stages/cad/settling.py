@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile
-from schemas.scene_parts import Box, Relation, SurfacePlane
-from stages.cad.placing import supporting_surface, surface_outline, surface_share
-from stages.kit.geometry.boxes import bottom, footprint
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from scenewright.schemas.scene_parts import Box, Relation, SurfacePlane
+from scenewright.stages.cad.placing import supporting_surface, surface_outline, surface_share
+from scenewright.stages.kit.geometry.boxes import bottom, footprint
 
 WELL_CARRIED = 0.85
 """What stands on a surface with a smaller share of its footprint is moved onto it."""

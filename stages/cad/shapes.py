@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.cad_library import CadModel, ModelState
-from schemas.contact_graph import GraphNode
-from schemas.scene_parts import SurfacePlane
-from stages.kit.geometry.boxes import box_yaw
+from scenewright.schemas.cad_library import CadModel, ModelState
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.kit.geometry.boxes import box_yaw
 
 SAME_YAW = math.radians(5.0)
 """Object frames closer than this are one frame."""

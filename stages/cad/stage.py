@@ -8,40 +8,39 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.articulations import Articulation, Articulations
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.cad_scene import SURROUNDINGS, CadScene, JointEvidence
-from schemas.contact_graph import ContactGraph, ContactGraphFile
-from schemas.errors import BadInput, UsageError
-from schemas.panoptic_map import PanopticMap
-from schemas.vocabulary import load_vocabulary
-from stages.cad.arranging import Arrangement
-from stages.cad.building_in import built_in_instead, colliding_built_ins, yielded
-from stages.cad.built_ins import is_built_in, may_be_built_in
-from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
-from stages.cad.choosing import adjust, select
-from stages.cad.coloring import part_colors
-from stages.cad.conflicts import placed_pieces
-from stages.cad.joint_evidence import Looked, joint_evidence
-from stages.cad.method import CadMethod
-from stages.cad.model_surfaces import ModelSurface, load_surface
-from stages.cad.obstacles import floor_levels, obstacles_of
-from stages.cad.ours import Ours
-from stages.cad.parameters import CadParameters
-from stages.cad.recognition import is_doubtful, might_be, named_by_people, recognised, renamed
-from stages.cad.records import cad_graph, scene_file
-from stages.cad.shapes import Placement
-from stages.cad.stretching import source_of, with_stretched, write_stretched
-from stages.cad.surroundings import footing
-from stages.cad.surroundings_files import area_of, surroundings_of, write_surface
-from stages.cad.target import Surroundings, Target
-from stages.cad.thesis import Thesis
-from stages.kit.formats.cad_models import model_folder
-from stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
-from stages.kit.geometry.convex_solids import convex_solid
-from stages.kit.geometry.point_clouds import sample_large_triangles, vertex_normals
-from stages.kit.stage import Context
+from scenewright.schemas.articulations import Articulation, Articulations
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene, JointEvidence
+from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.cad.arranging import Arrangement
+from scenewright.stages.cad.building_in import built_in_instead, colliding_built_ins, yielded
+from scenewright.stages.cad.built_ins import is_built_in, may_be_built_in
+from scenewright.stages.cad.candidates import Shortlist, models_for, object_points, shortlist
+from scenewright.stages.cad.choosing import adjust, select
+from scenewright.stages.cad.coloring import part_colors
+from scenewright.stages.cad.conflicts import placed_pieces
+from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
+from scenewright.stages.cad.method import CadMethod
+from scenewright.stages.cad.model_surfaces import ModelSurface, load_surface
+from scenewright.stages.cad.obstacles import floor_levels, obstacles_of
+from scenewright.stages.cad.ours import Ours
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.recognition import is_doubtful, might_be, named_by_people, recognised, renamed
+from scenewright.stages.cad.records import cad_graph, scene_file
+from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.cad.stretching import source_of, with_stretched, write_stretched
+from scenewright.stages.cad.surroundings import footing
+from scenewright.stages.cad.surroundings_files import area_of, surroundings_of, write_surface
+from scenewright.stages.cad.target import Surroundings, Target
+from scenewright.stages.cad.thesis import Thesis
+from scenewright.stages.kit.formats.cad_models import model_folder
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
+from scenewright.stages.kit.geometry.convex_solids import convex_solid
+from scenewright.stages.kit.geometry.point_clouds import sample_large_triangles, vertex_normals
+from scenewright.stages.kit.stage import Context
 
 VERTICES, CONFLICTS, SAMPLES = 1, 2, 3
 """Random streams."""

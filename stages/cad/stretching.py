@@ -14,20 +14,19 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_vector
-from schemas.cad_library import CadLibrary, CadModel, ModelState
-from schemas.scene_parts import Joint, SurfacePlane
-from stages.cad.candidates import Shortlist, shortlist
-from stages.cad.method import CadMethod
-from stages.cad.model_surfaces import PLAIN, ModelSurface, surface_of
-from stages.cad.parameters import CadParameters
-from stages.cad.placing import is_upright, size_misfit
-from stages.cad.target import Target
-from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, model_folder
-from stages.kit.formats.model_writer import PartGeometry, write_model_folder
-from stages.kit.formats.part_colors import vertex_colors
-from stages.kit.geometry.solids import Solid, mass_properties, volume
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_library import CadLibrary, CadModel, ModelState
+from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.cad.candidates import Shortlist, shortlist
+from scenewright.stages.cad.method import CadMethod
+from scenewright.stages.cad.model_surfaces import PLAIN, ModelSurface, surface_of
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.placing import is_upright, size_misfit
+from scenewright.stages.cad.target import Target
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, model_folder
+from scenewright.stages.kit.formats.model_writer import PartGeometry, write_model_folder
+from scenewright.stages.kit.formats.part_colors import vertex_colors
+from scenewright.stages.kit.geometry.solids import Solid, mass_properties, volume
 
 SOURCE, FACTORS = "stretched_from", ("stretched_x", "stretched_y", "stretched_z")
 """Entries of a recipe: the id in the library, and the factors along the model's axes."""

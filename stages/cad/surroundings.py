@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh
+from scenewright.stages.kit.geometry.box_cover import cover_with_boxes
+from scenewright.stages.kit.geometry.convex_solids import Solid, convex_solid, penetration
 from scipy.spatial import ConvexHull, QhullError
-
-from stages.kit.formats.entity_meshes import EntityMesh
-from stages.kit.geometry.box_cover import cover_with_boxes
-from stages.kit.geometry.convex_solids import Solid, convex_solid, penetration
 
 Piece = tuple[np.ndarray, np.ndarray]
 """Vertices (V, 3) and faces (F, 3) of a convex polyhedron, world frame."""

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.errors import BadInput
-from schemas.panoptic_map import PanopticMap
-from stages.cad.parameters import CadParameters
-from stages.cad.surroundings import Piece, nameless_surface
-from stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.surroundings import Piece, nameless_surface
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
 
 
 def surroundings_of(

@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.cad_library import CadModel
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.vocabulary import load_vocabulary
-from stages.cad.free_space import FreeSpace
-from stages.cad.model_surfaces import ModelSurface, to_world
-from stages.cad.parameters import CadParameters
-from stages.cad.placing import placed_planes, supporting_surface, wall_depth
-from stages.cad.shapes import Observed, Placement, observed_frames
-from stages.kit.geometry.boxes import bottom
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.cad.free_space import FreeSpace
+from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.placing import placed_planes, supporting_surface, wall_depth
+from scenewright.stages.cad.shapes import Observed, Placement, observed_frames
+from scenewright.stages.kit.geometry.boxes import bottom
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,17 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from schemas.panoptic_map import PanopticMap
-from stages.cad.alignment import align
-from stages.cad.arranging import Placer, Standing
-from stages.cad.free_space import NOTHING_KNOWN, FreeSpace
-from stages.cad.matching import rank_matches
-from stages.cad.method import Proposals, alignment_weights, matching_weights
-from stages.cad.model_surfaces import ModelSurface, alignment_error
-from stages.cad.parameters import CadParameters
-from stages.cad.placing import placement_of
-from stages.cad.shapes import Placement, shape_of_state
-from stages.cad.target import Target, scale_fits, stands_in_wall
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.cad.alignment import align
+from scenewright.stages.cad.arranging import Placer, Standing
+from scenewright.stages.cad.free_space import NOTHING_KNOWN, FreeSpace
+from scenewright.stages.cad.matching import rank_matches
+from scenewright.stages.cad.method import Proposals, alignment_weights, matching_weights
+from scenewright.stages.cad.model_surfaces import ModelSurface, alignment_error
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.placing import placement_of
+from scenewright.stages.cad.shapes import Placement, shape_of_state
+from scenewright.stages.cad.target import Target, scale_fits, stands_in_wall
 
 
 @dataclass(frozen=True)

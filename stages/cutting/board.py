@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from stages.cutting.world.body import Body
-from stages.kit.geometry.substances import FRICTION_OF_LIKE, ROLLING_FRICTION, SPINNING_FRICTION
-from stages.kit.geometry.transforms import transform_from_quaternion
-from stages.kit.simulation.engine import engine
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.geometry.substances import FRICTION_OF_LIKE, ROLLING_FRICTION, SPINNING_FRICTION
+from scenewright.stages.kit.geometry.transforms import transform_from_quaternion
+from scenewright.stages.kit.simulation.engine import engine
 
 SIZE = (1.2, 0.6)
 """Of the board [m]; its top is at z = 0, the floor far below."""

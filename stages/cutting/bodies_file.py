@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.cutting.world.body import Body
-from stages.kit.formats.numpy_files import read_arrays
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 HINT = "make the artifact again"
 MOST_BODIES = 8192

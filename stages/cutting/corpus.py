@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.cutting.demonstrations.cutter import Demonstration
-from stages.cutting.world.body import Body, Plane
-from stages.cutting.world.canonical import Canonical, canonical
-from stages.kit.geometry.transforms import inverse
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration
+from scenewright.stages.cutting.world.body import Body, Plane
+from scenewright.stages.cutting.world.canonical import Canonical, canonical
+from scenewright.stages.kit.geometry.transforms import inverse
 
 POINTS, QUERIES = 256, 384
 """Surface points that the encoder sees, and places at which the decoder is asked, of each fragment."""

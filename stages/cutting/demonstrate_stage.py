@@ -6,17 +6,20 @@ from collections import Counter
 from pathlib import Path
 
 from PIL import Image
-
-from schemas.cutting_demonstrations import CuttingDemonstrations, CuttingDemonstrationsFile, DemonstrationRecord
-from schemas.errors import BadInput
-from stages.cutting.bodies_file import write_bodies
-from stages.cutting.demonstrations.cutter import Demonstration, Scatter
-from stages.cutting.demonstrations.records import record_of
-from stages.cutting.demonstrations.trials import is_for_training, make_trials
-from stages.cutting.parameters import DemonstrateParameters
-from stages.cutting.pictures import apart, draw, strip
-from stages.cutting.recording.session import read_recording
-from stages.kit.stage import Context
+from scenewright.schemas.cutting_demonstrations import (
+    CuttingDemonstrations,
+    CuttingDemonstrationsFile,
+    DemonstrationRecord,
+)
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.bodies_file import write_bodies
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration, Scatter
+from scenewright.stages.cutting.demonstrations.records import record_of
+from scenewright.stages.cutting.demonstrations.trials import is_for_training, make_trials
+from scenewright.stages.cutting.parameters import DemonstrateParameters
+from scenewright.stages.cutting.pictures import apart, draw, strip
+from scenewright.stages.cutting.recording.session import read_recording
+from scenewright.stages.kit.stage import Context
 
 
 def run(record: Path | None, *, parameters: DemonstrateParameters, context: Context) -> CuttingDemonstrations:

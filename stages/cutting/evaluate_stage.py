@@ -5,19 +5,18 @@ from __future__ import annotations
 from contextlib import closing
 
 import numpy as np
-
-from schemas.cutting_model import CuttingModel
-from schemas.cutting_plan import CuttingEvaluation, CuttingEvaluationFile, EvaluatedCutting
-from stages.cutting.measure.scores import Scores
-from stages.cutting.methods import Learned, read_learned
-from stages.cutting.ours.items import item_of
-from stages.cutting.parameters import EvaluateParameters
-from stages.cutting.policy import Goal
-from stages.cutting.sight.laying import Hand
-from stages.cutting.sight.perceiving import PerceivingPolicy
-from stages.cutting.trying import Reached, again, goal_trial, reach
-from stages.kit.measurement.bootstrap import bootstrap_interval
-from stages.kit.stage import Context
+from scenewright.schemas.cutting_model import CuttingModel
+from scenewright.schemas.cutting_plan import CuttingEvaluation, CuttingEvaluationFile, EvaluatedCutting
+from scenewright.stages.cutting.measure.scores import Scores
+from scenewright.stages.cutting.methods import Learned, read_learned
+from scenewright.stages.cutting.ours.items import item_of
+from scenewright.stages.cutting.parameters import EvaluateParameters
+from scenewright.stages.cutting.policy import Goal
+from scenewright.stages.cutting.sight.laying import Hand
+from scenewright.stages.cutting.sight.perceiving import PerceivingPolicy
+from scenewright.stages.cutting.trying import Reached, again, goal_trial, reach
+from scenewright.stages.kit.measurement.bootstrap import bootstrap_interval
+from scenewright.stages.kit.stage import Context
 
 
 def run(model: CuttingModel, *, parameters: EvaluateParameters, context: Context) -> CuttingEvaluation:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from schemas.cutting_demonstrations import CuttingDemonstrations
-from schemas.cutting_model import CuttingModel, CuttingModelFile
-from schemas.errors import BadInput
-from stages.cutting.demonstrations.records import read_demonstrations
-from stages.cutting.methods import learn_methods, productions_of, write_networks
-from stages.cutting.ours.records import grammar_record
-from stages.cutting.parameters import METHODS, LearnParameters
-from stages.kit.stage import Context
+from scenewright.schemas.cutting_demonstrations import CuttingDemonstrations
+from scenewright.schemas.cutting_model import CuttingModel, CuttingModelFile
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.demonstrations.records import read_demonstrations
+from scenewright.stages.cutting.methods import learn_methods, productions_of, write_networks
+from scenewright.stages.cutting.ours.records import grammar_record
+from scenewright.stages.cutting.parameters import METHODS, LearnParameters
+from scenewright.stages.kit.stage import Context
 
 
 def run(demonstrations: CuttingDemonstrations, *, parameters: LearnParameters, context: Context) -> CuttingModel:

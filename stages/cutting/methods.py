@@ -9,23 +9,22 @@ from typing import TypeVar
 
 import numpy as np
 import torch
-
-from schemas.cutting_model import CuttingModel, ThesisProduction
-from schemas.errors import BadInput, UsageError
-from stages.cutting.demonstrations.cutter import Demonstration
-from stages.cutting.learning import MixtureOfPlanes, layers
-from stages.cutting.ours.grammar import Grammar, learn
-from stages.cutting.ours.items import Item, item_of
-from stages.cutting.ours.policy import DOUBT, OursPolicy
-from stages.cutting.ours.records import grammar_of
-from stages.cutting.policy import Goal, Policy
-from stages.cutting.rivals import cloning
-from stages.cutting.thesis import induction
-from stages.cutting.thesis.encoder import Encoder, Features
-from stages.cutting.thesis.model import FEATURES, ThesisModel, learn_features, learn_grammar
-from stages.cutting.thesis.policy import ThesisPolicy
-from stages.kit.formats.network_file import put_tensors
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.schemas.cutting_model import CuttingModel, ThesisProduction
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration
+from scenewright.stages.cutting.learning import MixtureOfPlanes, layers
+from scenewright.stages.cutting.ours.grammar import Grammar, learn
+from scenewright.stages.cutting.ours.items import Item, item_of
+from scenewright.stages.cutting.ours.policy import DOUBT, OursPolicy
+from scenewright.stages.cutting.ours.records import grammar_of
+from scenewright.stages.cutting.policy import Goal, Policy
+from scenewright.stages.cutting.rivals import cloning
+from scenewright.stages.cutting.thesis import induction
+from scenewright.stages.cutting.thesis.encoder import Encoder, Features
+from scenewright.stages.cutting.thesis.model import FEATURES, ThesisModel, learn_features, learn_grammar
+from scenewright.stages.cutting.thesis.policy import ThesisPolicy
+from scenewright.stages.kit.formats.network_file import put_tensors
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 
 HINT = "learn the model again"
 Network = TypeVar("Network", bound=torch.nn.Module)

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.cutting_demonstrations import CuttingDemonstrations
-from schemas.cutting_model import CuttingModel
-from schemas.cutting_plan import CuttingEvaluation, CuttingPlan, CuttingTrial
-from schemas.errors import UsageError
-from stages.cutting.words import read_words
-from stages.kit.known_names import check_names
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.cutting_demonstrations import CuttingDemonstrations
+from scenewright.schemas.cutting_model import CuttingModel
+from scenewright.schemas.cutting_plan import CuttingEvaluation, CuttingPlan, CuttingTrial
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.cutting.words import read_words
+from scenewright.stages.kit.known_names import check_names
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 MethodName = Literal["ours", "thesis", "bc", "qnet"]
 METHODS: tuple[MethodName, ...] = ("ours", "thesis", "bc", "qnet")

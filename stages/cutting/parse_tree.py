@@ -6,10 +6,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
-
-from schemas.cutting_plan import CuttingPlanFile
-from stages.kit.drawing.palette import instance_color
-from stages.kit.drawing.tree_layout import tree_layout
+from scenewright.schemas.cutting_plan import CuttingPlanFile
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.drawing.tree_layout import tree_layout
 
 DOTS, ROW = 100, 0.3
 """Dots and inches of a row."""

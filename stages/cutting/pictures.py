@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from PIL import Image, ImageDraw, ImageFont, ImageOps
-
-from schemas.scene_parts import Camera
-from stages.cutting.world.body import Body
-from stages.kit.drawing.palette import instance_color
-from stages.kit.geometry.transforms import look_at
-from stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 APART = 1.7
 """By which distances between fragments grow in an exploded view."""

@@ -7,34 +7,33 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-
-from schemas.base import as_vector
-from schemas.cutting_demonstrations import CuttingDemonstrations
-from schemas.cutting_model import CuttingModel
-from schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingScores, PlannedCut, WantedFragment
-from schemas.errors import BadInput
-from stages.cutting.bodies_file import write_bodies
-from stages.cutting.demonstrations.records import plane_record, read_demonstrations
-from stages.cutting.measure.scores import Scores, score
-from stages.cutting.methods import Learned, read_learned
-from stages.cutting.ours.grammar import Grammar
-from stages.cutting.ours.imagining import imagine
-from stages.cutting.ours.items import Item, features, item_of
-from stages.cutting.ours.policy import DOUBT
-from stages.cutting.parameters import PlanParameters
-from stages.cutting.parse_tree import draw_tree
-from stages.cutting.pictures import animate, apart, captioned, draw, strip
-from stages.cutting.policy import Carving, Goal, Step, carry_out
-from stages.cutting.sight.pictured import read_pictures
-from stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
-from stages.cutting.sight.seeing import DOUBT_OF_ONE, see
-from stages.cutting.words import read_words
-from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import axis_across, canonical
-from stages.cutting.world.foods import make_food
-from stages.cutting.world.mending import read_bodies_of, read_body
-from stages.kit.geometry.transforms import inverse
-from stages.kit.stage import Context
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cutting_demonstrations import CuttingDemonstrations
+from scenewright.schemas.cutting_model import CuttingModel
+from scenewright.schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingScores, PlannedCut, WantedFragment
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.bodies_file import write_bodies
+from scenewright.stages.cutting.demonstrations.records import plane_record, read_demonstrations
+from scenewright.stages.cutting.measure.scores import Scores, score
+from scenewright.stages.cutting.methods import Learned, read_learned
+from scenewright.stages.cutting.ours.grammar import Grammar
+from scenewright.stages.cutting.ours.imagining import imagine
+from scenewright.stages.cutting.ours.items import Item, features, item_of
+from scenewright.stages.cutting.ours.policy import DOUBT
+from scenewright.stages.cutting.parameters import PlanParameters
+from scenewright.stages.cutting.parse_tree import draw_tree
+from scenewright.stages.cutting.pictures import animate, apart, captioned, draw, strip
+from scenewright.stages.cutting.policy import Carving, Goal, Step, carry_out
+from scenewright.stages.cutting.sight.pictured import read_pictures
+from scenewright.stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
+from scenewright.stages.cutting.sight.seeing import DOUBT_OF_ONE, see
+from scenewright.stages.cutting.words import read_words
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.canonical import axis_across, canonical
+from scenewright.stages.cutting.world.foods import make_food
+from scenewright.stages.cutting.world.mending import read_bodies_of, read_body
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.stage import Context
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-
-from schemas.plan import Failure
-from stages.cutting.world.body import Body, Plane
-from stages.cutting.world.knife import Knife, Refused, cut
+from scenewright.schemas.plan import Failure
+from scenewright.stages.cutting.world.body import Body, Plane
+from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 
 MOST_REFUSALS = 20
 """One after the other, after which nothing more is tried."""

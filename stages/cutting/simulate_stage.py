@@ -6,27 +6,26 @@ from collections.abc import Mapping
 from contextlib import closing
 
 import numpy as np
-
-from schemas.cutting_model import CuttingModel
-from schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingTrial, CuttingTrialFile
-from schemas.errors import BadInput, UsageError
-from stages.cutting.board import Board, laid_out
-from stages.cutting.bodies_file import read_bodies, write_bodies
-from stages.cutting.measure.scores import score
-from stages.cutting.methods import Learned, read_learned
-from stages.cutting.ours.items import Item
-from stages.cutting.ours.policy import DOUBT
-from stages.cutting.parameters import SimulateParameters
-from stages.cutting.pictures import animate, apart, draw, strip
-from stages.cutting.plan_stage import scores_record
-from stages.cutting.policy import Goal, Policy, carry_out
-from stages.cutting.sight.laying import BETWEEN, ROW, Hand, in_rows
-from stages.cutting.sight.perceiving import PerceivingPolicy
-from stages.cutting.sight.pictured import write_pictures
-from stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
-from stages.cutting.sight.views import look
-from stages.cutting.world.body import Body
-from stages.kit.stage import Context
+from scenewright.schemas.cutting_model import CuttingModel
+from scenewright.schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingTrial, CuttingTrialFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.cutting.board import Board, laid_out
+from scenewright.stages.cutting.bodies_file import read_bodies, write_bodies
+from scenewright.stages.cutting.measure.scores import score
+from scenewright.stages.cutting.methods import Learned, read_learned
+from scenewright.stages.cutting.ours.items import Item
+from scenewright.stages.cutting.ours.policy import DOUBT
+from scenewright.stages.cutting.parameters import SimulateParameters
+from scenewright.stages.cutting.pictures import animate, apart, draw, strip
+from scenewright.stages.cutting.plan_stage import scores_record
+from scenewright.stages.cutting.policy import Goal, Policy, carry_out
+from scenewright.stages.cutting.sight.laying import BETWEEN, ROW, Hand, in_rows
+from scenewright.stages.cutting.sight.perceiving import PerceivingPolicy
+from scenewright.stages.cutting.sight.pictured import write_pictures
+from scenewright.stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
+from scenewright.stages.cutting.sight.views import look
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.stage import Context
 
 
 def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameters, context: Context) -> CuttingTrial:

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.cutting.demonstrations.cutter import Demonstration, follow
-from stages.cutting.demonstrations.trials import make_trial
-from stages.cutting.measure.scores import Scores, score
-from stages.cutting.policy import Policy, carry_out
-from stages.cutting.world.body import Body
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration, follow
+from scenewright.stages.cutting.demonstrations.trials import make_trial
+from scenewright.stages.cutting.measure.scores import Scores, score
+from scenewright.stages.cutting.policy import Policy, carry_out
+from scenewright.stages.cutting.world.body import Body
 
 GOALS = 1_000_003
 """Stream of goals: they share nothing with demonstrations."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import get_args
 
-from schemas.cutting_demonstrations import CategoryName
-from schemas.errors import UsageError
+from scenewright.schemas.cutting_demonstrations import CategoryName
+from scenewright.schemas.errors import UsageError
 
 MOST = 200
 """Fragments of a goal in words."""

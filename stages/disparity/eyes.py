@@ -7,15 +7,14 @@ import math
 
 import cv2
 import numpy as np
-
-from schemas.disparity import RowReport
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence
-from stages.disparity.parameters import DisparityParameters
-from stages.disparity.rectification import RowCheck, check_rows, matched_features
-from stages.disparity.semi_global import gray_of
-from stages.kit.formats.frames import FrameReader
+from scenewright.schemas.disparity import RowReport
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.disparity.parameters import DisparityParameters
+from scenewright.stages.disparity.rectification import RowCheck, check_rows, matched_features
+from scenewright.stages.disparity.semi_global import gray_of
+from scenewright.stages.kit.formats.frames import FrameReader
 
 LOOKED_AT = 6
 """Frames of a camera whose features are matched."""

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.disparity import Disparity
-from schemas.errors import UsageError
-from schemas.sequence import Sequence
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.disparity import Disparity
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 NETWORKS = ("raft-stereo",)
 """Methods that are networks: they need weights, and torch."""

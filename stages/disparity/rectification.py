@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 FEATURES = 1500
 MATCH_RATIO = 0.8

@@ -11,11 +11,10 @@ from typing import Literal
 
 import cv2
 import numpy as np
-
-from stages.disparity.consistency import confidence_of, left_right_difference
-from stages.disparity.search_range import search_range
-from stages.disparity.subpixel import smoothed, unlocked
-from stages.kit.stereo.disparity_map import DisparityMap
+from scenewright.stages.disparity.consistency import confidence_of, left_right_difference
+from scenewright.stages.disparity.search_range import search_range
+from scenewright.stages.disparity.subpixel import smoothed, unlocked
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
 Effort = Literal["low", "medium", "high"]
 

@@ -9,21 +9,20 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-
-from schemas.disparity import Disparity, DisparityFile, FrameDisparity, RowReport
-from schemas.errors import BadInput
-from schemas.sequence import Sequence, SequenceFile
-from stages.disparity import semi_global
-from stages.disparity.eyes import check_eyes, is_blank, stereo_cameras
-from stages.disparity.parameters import DisparityParameters
-from stages.disparity.rectification import straightened
-from stages.disparity.search_range import search_range
-from stages.kit.formats.disparity_file import DisparityWriter
-from stages.kit.formats.foxglove import nanoseconds
-from stages.kit.formats.frames import Frame, FrameReader, FrameWriter
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.stage import Context
-from stages.kit.stereo.disparity_map import DisparityMap, depth_of
+from scenewright.schemas.disparity import Disparity, DisparityFile, FrameDisparity, RowReport
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Sequence, SequenceFile
+from scenewright.stages.disparity import semi_global
+from scenewright.stages.disparity.eyes import check_eyes, is_blank, stereo_cameras
+from scenewright.stages.disparity.parameters import DisparityParameters
+from scenewright.stages.disparity.rectification import straightened
+from scenewright.stages.disparity.search_range import search_range
+from scenewright.stages.kit.formats.disparity_file import DisparityWriter
+from scenewright.stages.kit.formats.foxglove import nanoseconds
+from scenewright.stages.kit.formats.frames import Frame, FrameReader, FrameWriter
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap, depth_of
 
 Matcher = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]
 """Left and right (H, W, 3) uint8 RGB, and the limits of the search -> map."""
@@ -77,7 +76,7 @@ def _semi_global(parameters: DisparityParameters, weights: Path | None, context:
 
 def _raft_stereo(parameters: DisparityParameters, weights: Path | None, context: Context) -> tuple[Matcher, str]:
     assert weights is not None  # the declaration asks for them
-    from stages.disparity.raft.matching import open_raft
+    from scenewright.stages.disparity.raft.matching import open_raft
 
     return open_raft(weights, parameters.iterations, parameters.agreement, context.device)
 

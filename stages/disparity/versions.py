@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stages.disparity.parameters import NETWORKS, DisparityParameters
-from stages.kit.library_versions import library_version
+from scenewright.stages.disparity.parameters import NETWORKS, DisparityParameters
+from scenewright.stages.kit.library_versions import library_version
 
 
 def versions(parameters: DisparityParameters) -> dict[str, str]:

@@ -17,13 +17,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
-
-from schemas.edits import Anchor
-from schemas.hand_written import UprightBox
-from schemas.scene_parts import Box
-from stages.edit.map_state import MapState, Thing
-from stages.kit.geometry.boxes import (
+from scenewright.schemas.edits import Anchor
+from scenewright.schemas.hand_written import UprightBox
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.edit.map_state import MapState, Thing
+from scenewright.stages.kit.geometry.boxes import (
     box_corners,
     box_iou,
     box_volume,
@@ -34,6 +32,7 @@ from stages.kit.geometry.boxes import (
     points_in_box,
     upright_box,
 )
+from scipy.spatial import cKDTree
 
 MILLIMETRES = 3
 """Decimals of what is written into edits.toml."""

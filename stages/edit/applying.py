@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, TypeVar
 
-from schemas.edits import AnyEdit, AppliedEdit, Edit
-from stages.edit.anchoring import Conflict, Fitting, Where
+from scenewright.schemas.edits import AnyEdit, AppliedEdit, Edit
+from scenewright.stages.edit.anchoring import Conflict, Fitting, Where
 
 
 class State(Where, Protocol):

@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-
-from schemas.edits import FORMAT, AnyEdit, EditsFile
-from schemas.errors import BadInput, MachineFailure, first_problem
-from schemas.outside import LARGEST_SETTINGS, file_text, file_toml
-from schemas.plain_text import UNPRINTABLE
-from stages.kit.digests import sha256_of_file
+from scenewright.schemas.edits import FORMAT, AnyEdit, EditsFile
+from scenewright.schemas.errors import BadInput, MachineFailure, first_problem
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_text, file_toml
+from scenewright.schemas.plain_text import UNPRINTABLE
+from scenewright.stages.kit.digests import sha256_of_file
 
 HINT = "docs/EDIT.md shows one"
 UNWRITTEN = "nothing was written: look at what it says now, and try again"

@@ -5,15 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.edits import Mark, Support
-from schemas.scene_parts import TREE_RELATIONS, Box, Relation
-from stages.edit.anchoring import Conflict, Fitting, find
-from stages.edit.applying import Done, Table
-from stages.edit.map_state import Thing
-from stages.kit.geometry.boxes import bottom, box_corners, clip_polygon, footprint, polygon_area, refined_box, top
-from stages.kit.geometry.planes import level_plane, plane_height
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.edits import Mark, Support
+from scenewright.schemas.scene_parts import TREE_RELATIONS, Box, Relation
+from scenewright.stages.edit.anchoring import Conflict, Fitting, find
+from scenewright.stages.edit.applying import Done, Table
+from scenewright.stages.edit.map_state import Thing
+from scenewright.stages.kit.geometry.boxes import (
+    bottom,
+    box_corners,
+    clip_polygon,
+    footprint,
+    polygon_area,
+    refined_box,
+    top,
+)
+from scenewright.stages.kit.geometry.planes import level_plane, plane_height
 
 STANDS = ("supports", "contains")
 LARGEST_EXTENSION = 1.0

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.contact_graph import ContactGraph
-from schemas.scene_parts import TREE_RELATIONS
-from stages.edit.anchoring import Fitting
-from stages.edit.applying import apply_edits
-from stages.edit.edits_file import read_edits
-from stages.edit.graph_edits import GRAPH_EDITS, GraphState
-from stages.edit.outcome import outcome_of, write_records
-from stages.edit.parameters import EditMapParameters
-from stages.kit.stage import Context
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.stages.edit.anchoring import Fitting
+from scenewright.stages.edit.applying import apply_edits
+from scenewright.stages.edit.edits_file import read_edits
+from scenewright.stages.edit.graph_edits import GRAPH_EDITS, GraphState
+from scenewright.stages.edit.outcome import outcome_of, write_records
+from scenewright.stages.edit.parameters import EditMapParameters
+from scenewright.stages.kit.stage import Context
 
 
 def run(contact_graph: ContactGraph, edits: Path, *, parameters: EditMapParameters, context: Context) -> ContactGraph:

@@ -9,25 +9,24 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.base import as_transform, as_vector
+from scenewright.schemas.cad_library import CadModel, ModelState
+from scenewright.schemas.cad_scene import CadCandidate, JointEvidence, Replacement
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.edits import AddJoint
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.edit.anchoring import Conflict
+from scenewright.stages.edit.scene_state import SceneState, colored
+from scenewright.stages.kit.formats.cad_models import MODEL_FILE, URDF_FILE, load_visual_parts, part_transforms
+from scenewright.stages.kit.formats.model_writer import PartGeometry, write_model_folder
+from scenewright.stages.kit.formats.urdf_file import parse_urdf, write_urdf
+from scenewright.stages.kit.geometry.boxes import bottom, box_yaw, points_in_box, upright_box
+from scenewright.stages.kit.geometry.convex_pieces import convex_pieces
+from scenewright.stages.kit.geometry.planes import moved_planes
+from scenewright.stages.kit.geometry.solids import Solid, box, hull, mass_properties
+from scenewright.stages.kit.geometry.substances import substance_of
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scipy.spatial import QhullError
-
-from schemas.base import as_transform, as_vector
-from schemas.cad_library import CadModel, ModelState
-from schemas.cad_scene import CadCandidate, JointEvidence, Replacement
-from schemas.contact_graph import GraphNode
-from schemas.edits import AddJoint
-from schemas.scene_parts import Joint
-from stages.edit.anchoring import Conflict
-from stages.edit.scene_state import SceneState, colored
-from stages.kit.formats.cad_models import MODEL_FILE, URDF_FILE, load_visual_parts, part_transforms
-from stages.kit.formats.model_writer import PartGeometry, write_model_folder
-from stages.kit.formats.urdf_file import parse_urdf, write_urdf
-from stages.kit.geometry.boxes import bottom, box_yaw, points_in_box, upright_box
-from stages.kit.geometry.convex_pieces import convex_pieces
-from stages.kit.geometry.planes import moved_planes
-from stages.kit.geometry.solids import Solid, box, hull, mass_properties
-from stages.kit.geometry.substances import substance_of
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 
 FINEST = 0.05
 """Triangles are cut to edges of this length before they are told apart [m]."""

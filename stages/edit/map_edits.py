@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.schemas.edits import Add, Anchor, Delete, Merge, Rename, SetFloor, SetGravity, Split
+from scenewright.schemas.hand_written import UprightBox
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.edit.anchoring import Conflict, Fitting, find, joint_anchor, passes, shares
+from scenewright.stages.edit.applying import Done, Table
+from scenewright.stages.edit.map_state import MapState, Thing
+from scenewright.stages.kit.geometry.boxes import box_rotation, gravity_aligned_box, points_in_box, top, upright_box
+from scenewright.stages.kit.geometry.transforms import rotation_between, transform_from
 from scipy.spatial import cKDTree
-
-from schemas.edits import Add, Anchor, Delete, Merge, Rename, SetFloor, SetGravity, Split
-from schemas.hand_written import UprightBox
-from schemas.scene_parts import Box
-from stages.edit.anchoring import Conflict, Fitting, find, joint_anchor, passes, shares
-from stages.edit.applying import Done, Table
-from stages.edit.map_state import MapState, Thing
-from stages.kit.geometry.boxes import box_rotation, gravity_aligned_box, points_in_box, top, upright_box
-from stages.kit.geometry.transforms import rotation_between, transform_from
 
 FEWEST_VERTICES = 20
 """Of a thing that an edit makes, and of what it leaves of another: as `fuse` drops smaller ones."""

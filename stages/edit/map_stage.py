@@ -6,19 +6,18 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.panoptic_map import PanopticMap
-from stages.edit.anchoring import Fitting
-from stages.edit.applying import apply_edits
-from stages.edit.edits_file import read_edits
-from stages.edit.map_edits import MAP_EDITS
-from stages.edit.map_state import MapState, read_state
-from stages.edit.outcome import outcome_of, write_records
-from stages.edit.parameters import EditMapParameters
-from stages.kit.formats.map_files import mesh_name, write_arrays
-from stages.kit.formats.ply_files import write_ply
-from stages.kit.stage import Context
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.edit.anchoring import Fitting
+from scenewright.stages.edit.applying import apply_edits
+from scenewright.stages.edit.edits_file import read_edits
+from scenewright.stages.edit.map_edits import MAP_EDITS
+from scenewright.stages.edit.map_state import MapState, read_state
+from scenewright.stages.edit.outcome import outcome_of, write_records
+from scenewright.stages.edit.parameters import EditMapParameters
+from scenewright.stages.kit.formats.map_files import mesh_name, write_arrays
+from scenewright.stages.kit.formats.ply_files import write_ply
+from scenewright.stages.kit.stage import Context
 
 KEPT = ("counts.npz", "volume.npz")
 """Which masks were seen where, and the voxels: edits say nothing about these."""

@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.formats.ply_files import ColoredMesh
+from scenewright.stages.kit.geometry.boxes import minimum_box
+from scenewright.stages.kit.geometry.transforms import apply
 from scipy.spatial import cKDTree
-
-from schemas.base import as_vector
-from schemas.errors import BadInput
-from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
-from schemas.scene_parts import Box
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.formats.ply_files import ColoredMesh
-from stages.kit.geometry.boxes import minimum_box
-from stages.kit.geometry.transforms import apply
 
 GREY = 128
 HINT = "make the panoptic map again"

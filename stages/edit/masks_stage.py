@@ -7,20 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import open3d as o3d
-
-from schemas.errors import BadInput
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
-from schemas.sequence import Sequence
-from schemas.vocabulary import load_vocabulary
-from stages.edit.map_state import MapState, read_state
-from stages.edit.parameters import EditMasksParameters
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.formats.masks import write_panoptic_zip
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
-from stages.kit.stage import Context
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.edit.map_state import MapState, read_state
+from scenewright.stages.edit.parameters import EditMasksParameters
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.stage import Context
 
 LABEL = "masks drawn from a map"
 LARGEST_ID = 0xFFFFFF

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from schemas.edits import AppliedEdit, AppliedEditsFile
-from stages.kit.stage import Context
+from scenewright.schemas.edits import AppliedEdit, AppliedEditsFile
+from scenewright.stages.kit.stage import Context
 
 
 def write_records(records: Sequence[AppliedEdit], asked: int, context: Context) -> dict[str, int | str]:

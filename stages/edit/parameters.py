@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pydantic import Field
-
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.panoptic_map import PanopticMap
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class EditMapParameters(Parameters):

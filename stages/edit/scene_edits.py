@@ -7,21 +7,20 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.cad_library import CadModel
-from schemas.cad_scene import CadCandidate, JointEvidence, Replacement
-from schemas.contact_graph import GraphNode
-from schemas.edits import AddJoint, ChooseModel, JointAnchor, Mark, Move, RemoveJoint, SetJoint
-from schemas.scene_parts import Joint
-from stages.edit.anchoring import MILLIMETRES, Conflict, Fitting, find
-from stages.edit.applying import Done, Table
-from stages.edit.graph_edits import and_below, mark, relink
-from stages.edit.joint_making import with_limits, with_new_joint
-from stages.edit.scene_state import SceneState, about
-from stages.kit.formats.cad_models import load_visual_parts, part_transforms, read_model
-from stages.kit.geometry.boxes import bottom, box_yaw
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.cad_scene import CadCandidate, JointEvidence, Replacement
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.edits import AddJoint, ChooseModel, JointAnchor, Mark, Move, RemoveJoint, SetJoint
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.edit.anchoring import MILLIMETRES, Conflict, Fitting, find
+from scenewright.stages.edit.applying import Done, Table
+from scenewright.stages.edit.graph_edits import and_below, mark, relink
+from scenewright.stages.edit.joint_making import with_limits, with_new_joint
+from scenewright.stages.edit.scene_state import SceneState, about
+from scenewright.stages.kit.formats.cad_models import load_visual_parts, part_transforms, read_model
+from scenewright.stages.kit.geometry.boxes import bottom, box_yaw
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 SAME_PLACE, SAME_ANGLE = 1e-3, math.radians(0.1)
 """A thing that is this near to where an edit wants it is there already [m, rad]."""

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.panoptic_map import PanopticMap
-from stages.edit.anchoring import Fitting
-from stages.edit.applying import apply_edits
-from stages.edit.edits_file import read_edits
-from stages.edit.outcome import outcome_of, write_records
-from stages.edit.parameters import EditMapParameters
-from stages.edit.scene_edits import SCENE_EDITS
-from stages.edit.scene_state import SceneState
-from stages.kit.stage import Context
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.edit.anchoring import Fitting
+from scenewright.stages.edit.applying import apply_edits
+from scenewright.stages.edit.edits_file import read_edits
+from scenewright.stages.edit.outcome import outcome_of, write_records
+from scenewright.stages.edit.parameters import EditMapParameters
+from scenewright.stages.edit.scene_edits import SCENE_EDITS
+from scenewright.stages.edit.scene_state import SceneState
+from scenewright.stages.kit.stage import Context
 
 
 def run(

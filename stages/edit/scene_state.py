@@ -8,20 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_transform
-from schemas.cad_library import CadModel
-from schemas.cad_scene import SURROUNDINGS, CadScene, Replacement
-from schemas.contact_graph import GraphNode
-from schemas.errors import BadInput
-from stages.edit.anchoring import Conflict
-from stages.edit.graph_edits import GraphState, relink
-from stages.kit.formats.cad_models import posed_mesh, read_model
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.ply_files import ColoredMesh, write_ply
-from stages.kit.geometry.boxes import box_at_yaw, box_yaw
-from stages.kit.geometry.planes import moved_planes
-from stages.kit.geometry.transforms import apply, transform_from
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene, Replacement
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.edit.anchoring import Conflict
+from scenewright.stages.edit.graph_edits import GraphState, relink
+from scenewright.stages.kit.formats.cad_models import posed_mesh, read_model
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
+from scenewright.stages.kit.geometry.boxes import box_at_yaw, box_yaw
+from scenewright.stages.kit.geometry.planes import moved_planes
+from scenewright.stages.kit.geometry.transforms import apply, transform_from
 
 GREY = 128
 HINT = "run `cad` again"

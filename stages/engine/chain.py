@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from schemas.errors import BadInput
-from stages.engine import forking
-from stages.engine.interruption import PARENT_VARIABLE
-from stages.engine.pipelines import Pipeline, Step, resolve_variables, step_arguments, step_modules
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.engine import forking
+from scenewright.stages.engine.interruption import PARENT_VARIABLE
+from scenewright.stages.engine.pipelines import Pipeline, Step, resolve_variables, step_arguments, step_modules
 
 OUTCOME_EXIT_CODE = 4
 """An artifact was written, but its outcome is not ok."""
@@ -45,7 +45,7 @@ class StepReport:
 
 def command_prefix() -> list[str]:
     """Return the words that start scenewright in a new process, whatever the working folder."""
-    return [sys.executable, "-m", "cli"]
+    return [sys.executable, "-m", "scenewright"]
 
 
 def run_command(arguments: list[str]) -> tuple[int, str]:

@@ -21,15 +21,14 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import ValidationError
-
-from schemas.errors import BadInput, MachineFailure, ScenewrightError
-from schemas.kinds import KINDS
-from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
-from stages.engine import store
-from stages.engine.discovery import all_stages
-from stages.engine.keys import artifact_key
-from stages.engine.reading import input_place, read_manifest
-from stages.kit.digests import external_digest
+from scenewright.schemas.errors import BadInput, MachineFailure, ScenewrightError
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
+from scenewright.stages.engine import store
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.engine.keys import artifact_key
+from scenewright.stages.engine.reading import input_place, read_manifest
+from scenewright.stages.kit.digests import external_digest
 
 Category = Literal["leftover", "superseded", "intermediate", "result"]
 _SUFFIX = r"(?:partial-\d+-[0-9a-f]{8}|old-[0-9a-f]{8}|kept-[0-9a-f]{16}|journal)"

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from schemas.edits import AppliedEditsFile
-from schemas.errors import BadInput
-from schemas.evaluation import Evaluation, MetricsFile
-from schemas.manifest import Manifest
-from schemas.plain_text import cleaned
-from stages.engine.reading import read_manifest
-from stages.engine.run_folders import artifacts_of, is_artifact
+from scenewright.schemas.edits import AppliedEditsFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.evaluation import Evaluation, MetricsFile
+from scenewright.schemas.manifest import Manifest
+from scenewright.schemas.plain_text import cleaned
+from scenewright.stages.engine.reading import read_manifest
+from scenewright.stages.engine.run_folders import artifacts_of, is_artifact
 
 Status = Literal["same", "different", "only in first", "only in second", "unreadable"]
 

@@ -9,9 +9,9 @@ import shutil
 import sys
 from dataclasses import dataclass
 
-from stages.engine.discovery import all_stages
-from stages.engine.model_cache import cache_folder, cached_models
-from stages.kit.library_versions import library_version
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.engine.model_cache import cache_folder, cached_models
+from scenewright.stages.kit.library_versions import library_version
 
 CORE = {
     "typer": "typer",

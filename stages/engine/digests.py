@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from schemas.base import canonical_json
-from schemas.errors import BadInput
-from schemas.manifest import MANIFEST_NAME, FileRecord
-from stages.kit.digests import sha256_of_file, sha256_of_text
+from scenewright.schemas.base import canonical_json
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import MANIFEST_NAME, FileRecord
+from scenewright.stages.kit.digests import sha256_of_file, sha256_of_text
 
 
 def payload_files(root: Path) -> list[Path]:

@@ -6,8 +6,8 @@ import importlib
 from functools import cache
 from pathlib import Path
 
-from schemas.errors import UsageError
-from stages.kit.stage import Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.stage import Stage
 
 STAGES_FOLDER = Path(__file__).resolve().parents[1]
 
@@ -17,7 +17,7 @@ def all_stages() -> dict[str, Stage]:
     """Return every declared step by its command name. Imports declarations only, no step's code."""
     found: dict[str, Stage] = {}
     for parameters_file in sorted(STAGES_FOLDER.glob("*/parameters.py")):
-        module = importlib.import_module(f"stages.{parameters_file.parent.name}.parameters")
+        module = importlib.import_module(f"scenewright.stages.{parameters_file.parent.name}.parameters")
         for stage in getattr(module, "STAGES", None) or [module.STAGE]:
             if stage.folder != parameters_file.parent.name or stage.name in found:
                 raise RuntimeError(f"step {stage.name!r} is declared twice or in the wrong folder: {parameters_file}")

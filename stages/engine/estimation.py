@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-
-from schemas.errors import BadInput, MachineFailure
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.discovery import stage_by_name
-from stages.engine.pipelines import Pipeline, Step
-from stages.engine.reading import open_artifact
-from stages.kit.estimates import MEGABYTE, Estimate, size
-from stages.kit.stage import External, Optionally, Stage
+from scenewright.schemas.errors import BadInput, MachineFailure
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.discovery import stage_by_name
+from scenewright.stages.engine.pipelines import Pipeline, Step
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.kit.estimates import MEGABYTE, Estimate, size
+from scenewright.stages.kit.stage import External, Optionally, Stage
 
 logger = logging.getLogger("scenewright")
 

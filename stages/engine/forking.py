@@ -23,7 +23,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import IO, BinaryIO, NoReturn
 
-from stages.engine import interruption
+from scenewright.stages.engine import interruption
 
 AT_WORK = 1.0
 """A child that runs for so long makes something [s]."""

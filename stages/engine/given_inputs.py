@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from schemas.errors import BadInput
-from stages.engine.discovery import stage_by_name
-from stages.engine.model_cache import resolve_weights
-from stages.engine.pipelines import Pipeline
-from stages.kit.stage import External, Optionally
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.engine.discovery import stage_by_name
+from scenewright.stages.engine.model_cache import resolve_weights
+from scenewright.stages.engine.pipelines import Pipeline
+from scenewright.stages.kit.stage import External, Optionally
 
 
 def given_inputs(pipeline: Pipeline, only: tuple[str, ...] = ()) -> Iterator[tuple[str, External]]:

@@ -9,8 +9,8 @@ import os
 import re
 from pathlib import Path
 
-from schemas.errors import BadInput, MachineFailure, MissingDependency
-from schemas.outside import file_text
+from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency
+from scenewright.schemas.outside import file_text
 
 HUB_ID = re.compile(
     r"(?P<model>[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95})(@(?P<revision>\w[\w.-]*(/\w[\w.-]*)*))?", re.ASCII

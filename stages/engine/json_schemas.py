@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
-from schemas.kinds import KINDS
-from schemas.manifest import Manifest
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import Manifest
 
 
 def json_schemas() -> dict[str, str]:

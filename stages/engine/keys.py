@@ -7,12 +7,12 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from schemas.base import canonical_json
-from schemas.errors import UsageError
-from schemas.vocabulary import VOCABULARY_FILE
-from stages.kit.digests import sha256_of_file, sha256_of_text
-from stages.kit.library_versions import library_version
-from stages.kit.stage import Parameters, Stage
+from scenewright.schemas.base import canonical_json
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.vocabulary import VOCABULARY_FILE
+from scenewright.stages.kit.digests import sha256_of_file, sha256_of_text
+from scenewright.stages.kit.library_versions import library_version
+from scenewright.stages.kit.stage import Parameters, Stage
 
 KEY_FORMAT = 1
 """Raised whenever what goes into the key changes."""
@@ -25,7 +25,9 @@ def library_versions(stage: Stage, parameters: Parameters) -> dict[str, str]:
     """
     found = {name: library_version(name) for name in stage.libraries}
     if stage.versions:
-        found.update(importlib.import_module(f"stages.{stage.folder}.{stage.versions}").versions(parameters))
+        found.update(
+            importlib.import_module(f"scenewright.stages.{stage.folder}.{stage.versions}").versions(parameters)
+        )
     return dict(sorted(found.items()))
 
 

@@ -6,9 +6,9 @@ import os
 import tomllib
 from pathlib import Path
 
-from schemas.base import Model
-from schemas.errors import BadInput
-from stages.kit.digests import sha256_of_file
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.digests import sha256_of_file
 
 MODELS_FILE = Path(__file__).resolve().parents[2] / "data" / "models.toml"
 

@@ -7,18 +7,17 @@ import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, overload
 
-from schemas.artifact import Artifact
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput
-from stages.engine.reading import open_artifact
-from stages.engine.run_folders import artifacts_of
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.engine.run_folders import artifacts_of
 
 if TYPE_CHECKING:
     import networkx
-
-    from stages.kit.formats.disparity_file import DisparityReader
-    from stages.kit.formats.frames import FrameReader
-    from stages.kit.formats.masks import PanopticReader
+    from scenewright.stages.kit.formats.disparity_file import DisparityReader
+    from scenewright.stages.kit.formats.frames import FrameReader
+    from scenewright.stages.kit.formats.masks import PanopticReader
 
 READERS = {
     "frames.mcap": ("frames", "FrameReader"),
@@ -73,7 +72,7 @@ def payload(artifact: Artifact, name: str) -> Any:
     path = artifact.file(name)
     for pattern, (module, reader) in READERS.items():
         if fnmatch.fnmatch(path.name, pattern):
-            read = getattr(importlib.import_module(f"stages.kit.formats.{module}"), reader)
+            read = getattr(importlib.import_module(f"scenewright.stages.kit.formats.{module}"), reader)
             return read(path, may_be_empty=True) if reader == "read_mesh" else read(path)
     raise BadInput(f"{path}: has no reader", hint="open it yourself: .file(name) is its path")
 

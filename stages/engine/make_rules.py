@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 
-from stages.engine.given_inputs import given_inputs
-from stages.engine.pipelines import Pipeline, Step, step_arguments
+from scenewright.stages.engine.given_inputs import given_inputs
+from scenewright.stages.engine.pipelines import Pipeline, Step, step_arguments
 
 _VARIABLE = re.compile(r"^\$([a-z_]+)$")
 
@@ -66,6 +66,6 @@ def makefile_for(pipeline: Pipeline) -> str:
             else:
                 prerequisites.append(f"$(FOLDER)/{source.split('/')[0]}/manifest.json")
         lines.append(f"$(FOLDER)/{step.name}/manifest.json: {' '.join(dict.fromkeys(prerequisites))}")
-        lines.append(f"\t$(PYTHON) -m cli {_recipe(step, pipeline)}")
+        lines.append(f"\t$(PYTHON) -m scenewright {_recipe(step, pipeline)}")
         lines.append("")
     return "\n".join(lines)

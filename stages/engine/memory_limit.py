@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from schemas.errors import MachineFailure, UsageError
+from scenewright.schemas.errors import MachineFailure, UsageError
 
 SECONDS_BETWEEN_LOOKS = 0.1
 SECONDS_BETWEEN_SIGNALS = 5.0
@@ -33,7 +33,7 @@ class _LimitReached(BaseException):
 
 def parse_limit(text: str) -> int:
     """Return the limit [bytes] that `4GiB` or `500 MB` states. Raises UsageError."""
-    from stages.engine.batch.quantities import parse_bytes
+    from scenewright.stages.engine.batch.quantities import parse_bytes
 
     try:
         return parse_bytes(text)

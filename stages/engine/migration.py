@@ -5,13 +5,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from schemas.errors import BadInput, UsageError
-from schemas.kinds import KINDS
-from schemas.manifest import MANIFEST_NAME, Manifest
-from schemas.migrations import MIGRATIONS
-from stages.engine import store
-from stages.engine.digests import content_digest, record_files
-from stages.engine.reading import check_sizes, read_manifest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.schemas.migrations import MIGRATIONS
+from scenewright.stages.engine import store
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.reading import check_sizes, read_manifest
 
 
 def migrate(source: Path, out: Path) -> Manifest:

@@ -16,12 +16,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import BadInput, MachineFailure, MissingDependency
-from stages.engine.hub_cache import find_in_hub_cache, home_folder, is_hub_id
-from stages.engine.known_models import KnownModel, known_models
-from stages.engine.store import sync_folder
-from stages.kit.digests import sha256_of_file
-from stages.kit.stage import Optionally
+from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency
+from scenewright.stages.engine.hub_cache import find_in_hub_cache, home_folder, is_hub_id
+from scenewright.stages.engine.known_models import KnownModel, known_models
+from scenewright.stages.engine.store import sync_folder
+from scenewright.stages.kit.digests import sha256_of_file
+from scenewright.stages.kit.stage import Optionally
 
 logger = logging.getLogger("scenewright")
 

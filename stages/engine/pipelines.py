@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
-
-from schemas.errors import UsageError, first_problem
-from stages.engine.discovery import all_stages, stage_by_name
-from stages.kit.configuration import read_toml
-from stages.kit.stage import Stage
+from scenewright.schemas.errors import UsageError, first_problem
+from scenewright.stages.engine.discovery import all_stages, stage_by_name
+from scenewright.stages.kit.configuration import read_toml
+from scenewright.stages.kit.stage import Stage
 
 PIPELINES_FOLDER = Path(__file__).resolve().parents[2] / "data" / "pipelines"
 _VARIABLE = re.compile(r"^\$([a-z_]+)$")
@@ -116,7 +115,7 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
 def step_modules(pipeline: Pipeline, only: Collection[str] = ()) -> list[str]:
     """Return the module that each of its steps runs, or those of the steps `only`."""
     stages = [stage_by_name(step.stage) for step in pipeline.step if not only or step.name in only]
-    return [f"stages.{stage.folder}.{stage.module}" for stage in stages]
+    return [f"scenewright.stages.{stage.folder}.{stage.module}" for stage in stages]
 
 
 def resolve_variables(pipeline: Pipeline, given: Mapping[str, str]) -> dict[str, str | None]:

@@ -10,9 +10,9 @@ from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
-from schemas.manifest import Provenance
-from stages.kit.digests import sha256_of_file
-from stages.kit.library_versions import library_version
+from scenewright.schemas.manifest import Provenance
+from scenewright.stages.kit.digests import sha256_of_file
+from scenewright.stages.kit.library_versions import library_version
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 

@@ -6,13 +6,13 @@ import os
 from functools import cache
 from pathlib import Path
 
-from schemas.artifact import Artifact
-from schemas.errors import BadInput
-from schemas.kinds import KINDS
-from schemas.manifest import FORMAT_VERSION, LARGEST_MANIFEST, MANIFEST_NAME, Manifest
-from stages.engine.digests import content_digest
-from stages.engine.store import complete_interrupted
-from stages.kit.digests import sha256_of_file
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import FORMAT_VERSION, LARGEST_MANIFEST, MANIFEST_NAME, Manifest
+from scenewright.stages.engine.digests import content_digest
+from scenewright.stages.engine.store import complete_interrupted
+from scenewright.stages.kit.digests import sha256_of_file
 
 
 def read_manifest(root: Path) -> Manifest:

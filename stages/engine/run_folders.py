@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.store import complete_interrupted
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.store import complete_interrupted
 
 
 def is_artifact(folder: Path) -> bool:

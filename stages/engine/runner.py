@@ -13,20 +13,20 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from schemas.artifact import Artifact
-from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
-from schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
-from stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
-from stages.engine.digests import content_digest, record_files
-from stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
-from stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
-from stages.engine.model_cache import resolve_weights, with_usual_models
-from stages.engine.provenance import processor_seconds, provenance_now
-from stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
-from stages.kit.digests import external_digest, external_files
-from stages.kit.estimates import Estimate
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context, External, Optionally, Parameters, Stage
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
+from scenewright.schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
+from scenewright.stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
+from scenewright.stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
+from scenewright.stages.engine.model_cache import resolve_weights, with_usual_models
+from scenewright.stages.engine.provenance import processor_seconds, provenance_now
+from scenewright.stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
+from scenewright.stages.kit.digests import external_digest, external_files
+from scenewright.stages.kit.estimates import Estimate
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context, External, Optionally, Parameters, Stage
 
 logger = logging.getLogger("scenewright")
 
@@ -365,7 +365,7 @@ def _work(stage: Stage, opened: list[_OpenInput], parameters: Parameters, contex
     for item in opened:
         item.check()
     with interruption.waiting():
-        run = importlib.import_module(f"stages.{stage.folder}.{stage.module}").run
+        run = importlib.import_module(f"scenewright.stages.{stage.folder}.{stage.module}").run
     values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
     values.update({item.role: item.value for item in opened})
     return run(**values, parameters=parameters, context=context)

@@ -12,11 +12,11 @@ import os
 import shutil
 from pathlib import Path
 
-from schemas.errors import MachineFailure, ScenewrightError
-from schemas.manifest import Manifest
-from stages.engine import store
-from stages.engine.reading import check_hashes, check_sizes, read_manifest
-from stages.kit.stage import Stage
+from scenewright.schemas.errors import MachineFailure, ScenewrightError
+from scenewright.schemas.manifest import Manifest
+from scenewright.stages.engine import store
+from scenewright.stages.engine.reading import check_hashes, check_sizes, read_manifest
+from scenewright.stages.kit.stage import Stage
 
 KEY_LENGTH = 16
 KEPT = 4

@@ -20,9 +20,9 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from schemas.errors import BadInput, MachineFailure, UsageError
-from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
-from schemas.outside import file_content, json_of
+from scenewright.schemas.errors import BadInput, MachineFailure, UsageError
+from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
+from scenewright.schemas.outside import file_content, json_of
 
 LARGEST_JOURNAL = 2**20
 """Bytes."""

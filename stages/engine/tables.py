@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, get_args
 
-from schemas.artifact import Artifact, Document
-from schemas.base import Model
-from schemas.errors import MissingDependency
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import MissingDependency
 
 if TYPE_CHECKING:
     import pandas

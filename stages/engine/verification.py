@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from schemas.errors import BadInput, ScenewrightError
-from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
-from stages.engine.digests import content_digest, payload_files
-from stages.engine.reading import check_sizes, check_version, input_place, read_manifest
-from stages.engine.store import TIMINGS_NAME
-from stages.kit.digests import external_digest, sha256_of_file
+from scenewright.schemas.errors import BadInput, ScenewrightError
+from scenewright.schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
+from scenewright.stages.engine.digests import content_digest, payload_files
+from scenewright.stages.engine.reading import check_sizes, check_version, input_place, read_manifest
+from scenewright.stages.engine.store import TIMINGS_NAME
+from scenewright.stages.kit.digests import external_digest, sha256_of_file
 
 
 @dataclass(frozen=True)

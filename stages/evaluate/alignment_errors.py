@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.evaluate.model_shapes import PlacedShape
-from stages.kit.measurement.shape_symmetry import Symmetry, symmetric_rotation_error
+from scenewright.stages.evaluate.model_shapes import PlacedShape
+from scenewright.stages.kit.measurement.shape_symmetry import Symmetry, symmetric_rotation_error
 
 SUCCESS_TRANSLATION = 0.20
 """[m] (Avetisyan et al. 2019, Scan2CAD, section 7)."""

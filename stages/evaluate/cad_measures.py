@@ -6,21 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-
-from schemas.cad_scene import CadScene, CadSceneFile, Replacement
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.ground_truth import GroundTruth, TrueObject
-from schemas.interactive_scene import InteractiveSceneFile
-from schemas.scene_parts import Joint
-from stages.evaluate.correspondence import assign, node_affinity
-from stages.evaluate.graph_measures import upright
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.results import Part
-from stages.evaluate.truth import TrueRoom
-from stages.kit.formats.cad_models import posed_mesh, read_model
-from stages.kit.geometry.boxes import box_iou
-from stages.kit.measurement.pose_error import position_error, rotation_period, yaw_error, yaw_of
-from stages.kit.measurement.tables import Cell, Table
+from scenewright.schemas.cad_scene import CadScene, CadSceneFile, Replacement
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.ground_truth import GroundTruth, TrueObject
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.evaluate.correspondence import assign, node_affinity
+from scenewright.stages.evaluate.graph_measures import upright
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.kit.formats.cad_models import posed_mesh, read_model
+from scenewright.stages.kit.geometry.boxes import box_iou
+from scenewright.stages.kit.measurement.pose_error import position_error, rotation_period, yaw_error, yaw_of
+from scenewright.stages.kit.measurement.tables import Cell, Table
 
 QUARTER_TURN = np.pi / 2
 OPEN_FROM = 0.05

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import TREE_RELATIONS, Relation
+from scenewright.stages.evaluate.truth import TrueRoom, stuff_classes
+from scenewright.stages.kit.geometry.boxes import box_iou, box_yaw
+from scenewright.stages.kit.measurement.panoptic_quality import intersection_over_union, merge_stuff
 from scipy.optimize import linear_sum_assignment
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import TREE_RELATIONS, Relation
-from stages.evaluate.truth import TrueRoom, stuff_classes
-from stages.kit.geometry.boxes import box_iou, box_yaw
-from stages.kit.measurement.panoptic_quality import intersection_over_union, merge_stuff
 
 
 def merge_stuff_nodes(graph: ContactGraphFile) -> tuple[ContactGraphFile, dict[str, str]]:

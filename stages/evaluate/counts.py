@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraphFile
-from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from schemas.segments import SegmentsFile
-from schemas.sequence import SequenceFile
-from stages.evaluate.map_measures import PredictedMap
-from stages.evaluate.results import Part
-from stages.evaluate.surfaces import read_surface
-from stages.kit.geometry.planes import fit_plane
-from stages.kit.measurement.edge_agreement import BESIDE_THE_TREE, DIRECTED
-from stages.kit.measurement.tables import Table
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.segments import SegmentsFile
+from scenewright.schemas.sequence import SequenceFile
+from scenewright.stages.evaluate.map_measures import PredictedMap
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.surfaces import read_surface
+from scenewright.stages.kit.geometry.planes import fit_plane
+from scenewright.stages.kit.measurement.edge_agreement import BESIDE_THE_TREE, DIRECTED
+from scenewright.stages.kit.measurement.tables import Table
 
 
 def count_frames(part: Part, info: SequenceFile) -> None:

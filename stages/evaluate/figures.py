@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import Box
-from stages.evaluate.graph_measures import GraphComparison, upright
-from stages.evaluate.truth import stuff_classes
-from stages.kit.drawing.palette import instance_color
-from stages.kit.drawing.plots import plot_bars, plot_floor_plan, plot_graphs, plot_histograms
-from stages.kit.geometry.boxes import footprint
-from stages.kit.measurement.edge_agreement import edge_errors
-from stages.kit.measurement.panoptic_quality import ClassQuality
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.evaluate.graph_measures import GraphComparison, upright
+from scenewright.stages.evaluate.truth import stuff_classes
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.drawing.plots import plot_bars, plot_floor_plan, plot_graphs, plot_histograms
+from scenewright.stages.kit.geometry.boxes import footprint
+from scenewright.stages.kit.measurement.edge_agreement import edge_errors
+from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality
 
 MISSED, WRONG = "#b3261e", "#c2571a"
 

@@ -10,12 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.stages.evaluate.color_difference import color_difference, mean_lab
+from scenewright.stages.evaluate.model_shapes import ModelShape, PlacedShape, supporting_area
 from scipy.spatial import cKDTree
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile
-from schemas.scene_parts import TREE_RELATIONS
-from stages.evaluate.color_difference import color_difference, mean_lab
-from stages.evaluate.model_shapes import ModelShape, PlacedShape, supporting_area
 
 SIZE_RATIO = 0.20
 """An extent is similar within this share of the true one ..."""

@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import TREE_RELATIONS
 from scipy.optimize import linear_sum_assignment
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile
-from schemas.errors import BadInput
-from schemas.scene_parts import TREE_RELATIONS
 
 WRONG_SUPPORT_COST = 2
 EXPANSION_BUDGET = 200_000

@@ -6,20 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.ground_truth import TrueObject
-from schemas.scene_parts import Box
-from stages.evaluate.correspondence import merge_stuff_nodes, node_affinity
-from stages.evaluate.graph_edit_distance import EditDistance, graph_edit_distance, support_tree
-from stages.evaluate.map_measures import precision_table, record_precision
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.results import Part
-from stages.evaluate.truth import TrueRoom, thing_classes
-from stages.kit.geometry.boxes import box_iou, box_yaw, turned_to
-from stages.kit.measurement.average_precision import Candidates, class_precision
-from stages.kit.measurement.edge_agreement import edge_agreement
-from stages.kit.measurement.tables import Table
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.ground_truth import TrueObject
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.evaluate.correspondence import merge_stuff_nodes, node_affinity
+from scenewright.stages.evaluate.graph_edit_distance import EditDistance, graph_edit_distance, support_tree
+from scenewright.stages.evaluate.map_measures import precision_table, record_precision
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.truth import TrueRoom, thing_classes
+from scenewright.stages.kit.geometry.boxes import box_iou, box_yaw, turned_to
+from scenewright.stages.kit.measurement.average_precision import Candidates, class_precision
+from scenewright.stages.kit.measurement.edge_agreement import edge_agreement
+from scenewright.stages.kit.measurement.tables import Table
 
 ANY_CLASS = "any"
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.evaluate.model_shapes import PlacedShape
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.measurement.shape_symmetry import angle_between
 from scipy.optimize import linear_sum_assignment
-
-from stages.evaluate.model_shapes import PlacedShape
-from stages.kit.geometry.transforms import apply
-from stages.kit.measurement.shape_symmetry import angle_between
 
 ANGLE_WEIGHT = 0.5
 """Metres that a radian between axes counts for when joints are paired."""

@@ -5,18 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.panoptic_map import EntitiesFile, PanopticMap
-from stages.evaluate.mesh_distance import distances_to_mesh, surface_agreement
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.point_labels import nearest_labels
-from stages.evaluate.results import Part
-from stages.evaluate.surfaces import Surface, read_surface
-from stages.evaluate.truth import TrueRoom, stuff_classes
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.measurement.average_precision import Candidates, ClassPrecision, class_precision, mean_precision
-from stages.kit.measurement.panoptic_quality import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import EntitiesFile, PanopticMap
+from scenewright.stages.evaluate.mesh_distance import distances_to_mesh, surface_agreement
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.point_labels import nearest_labels
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.surfaces import Surface, read_surface
+from scenewright.stages.evaluate.truth import TrueRoom, stuff_classes
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.measurement.average_precision import (
+    Candidates,
+    ClassPrecision,
+    class_precision,
+    mean_precision,
+)
+from scenewright.stages.kit.measurement.panoptic_quality import (
     ClassQuality,
     average_quality,
     average_quality_thesis_code,
@@ -25,7 +29,7 @@ from stages.kit.measurement.panoptic_quality import (
     overlaps,
     panoptic_quality,
 )
-from stages.kit.measurement.tables import Cell, Table
+from scenewright.stages.kit.measurement.tables import Cell, Table
 
 ANY_CLASS = "any"
 NAMELESS = "object"

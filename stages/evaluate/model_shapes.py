@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-
-from schemas.cad_library import CadModel
-from schemas.scene_parts import Joint
-from stages.kit.formats.cad_models import part_transforms
-from stages.kit.geometry.transforms import apply
-from stages.kit.measurement.convex_overlap import ConvexPiece
-from stages.kit.measurement.shape_symmetry import NO_SYMMETRY, Symmetry, shape_symmetry
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.formats.cad_models import part_transforms
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.measurement.convex_overlap import ConvexPiece
+from scenewright.stages.kit.measurement.shape_symmetry import NO_SYMMETRY, Symmetry, shape_symmetry
 
 SAMPLES = 2000
 """Points on the closed surface that stand for the shape."""

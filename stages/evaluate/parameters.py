@@ -6,21 +6,20 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic import Field
-
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.errors import UsageError
-from schemas.evaluation import Evaluation
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from schemas.plan import Plan
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.kit.estimates import grows_with
-from stages.kit.stage import Optionally, Parameters, Stage
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.plan import Plan
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.stage import Optionally, Parameters, Stage
 
 
 class EvaluateParameters(Parameters):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.plan import PlanFile
-from stages.evaluate.results import Part
-from stages.kit.measurement.tables import Table
+from scenewright.schemas.plan import PlanFile
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.kit.measurement.tables import Table
 
 
 def measure_plan(part: Part, plan: PlanFile) -> None:

@@ -10,19 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.cad_scene import CadScene, CadSceneFile, Replacement
-from schemas.contact_graph import ContactGraphFile
-from schemas.ground_truth import TrueObject
-from stages.evaluate.alignment_errors import AlignmentError, alignment_error
-from stages.evaluate.correspondence import assign, merge_stuff_nodes, node_affinity
-from stages.evaluate.functional_equivalence import Equivalence, equivalence, same_relation
-from stages.evaluate.joint_errors import JointError, joint_errors, placed_joints
-from stages.evaluate.model_shapes import ModelShape, PlacedShape
-from stages.evaluate.shape_loading import model_shapes, placed_candidate
-from stages.evaluate.truth import TrueRoom
-from stages.kit.measurement.layout_pieces import layout_pieces
-from stages.kit.measurement.room_penetrations import Penetration, room_penetrations
+from scenewright.schemas.cad_scene import CadScene, CadSceneFile, Replacement
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.ground_truth import TrueObject
+from scenewright.stages.evaluate.alignment_errors import AlignmentError, alignment_error
+from scenewright.stages.evaluate.correspondence import assign, merge_stuff_nodes, node_affinity
+from scenewright.stages.evaluate.functional_equivalence import Equivalence, equivalence, same_relation
+from scenewright.stages.evaluate.joint_errors import JointError, joint_errors, placed_joints
+from scenewright.stages.evaluate.model_shapes import ModelShape, PlacedShape
+from scenewright.stages.evaluate.shape_loading import model_shapes, placed_candidate
+from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.kit.measurement.layout_pieces import layout_pieces
+from scenewright.stages.kit.measurement.room_penetrations import Penetration, room_penetrations
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from stages.evaluate.replacement_measures import ObjectResult, RoomReplacements
-from stages.evaluate.results import Part
-from stages.kit.measurement.room_penetrations import Penetration
-from stages.kit.measurement.tables import Cell, Table
+from scenewright.stages.evaluate.replacement_measures import ObjectResult, RoomReplacements
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.kit.measurement.room_penetrations import Penetration
+from scenewright.stages.kit.measurement.tables import Cell, Table
 
 NOTE = (
     "Replacement: an object succeeds (Scan2CAD, Avetisyan et al. 2019) when the chosen model is of its class and "

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.kit.measurement.bootstrap import bootstrap_interval
-from stages.kit.measurement.tables import Table
+from scenewright.stages.kit.measurement.bootstrap import bootstrap_interval
+from scenewright.stages.kit.measurement.tables import Table
 
 
 @dataclass

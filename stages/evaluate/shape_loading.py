@@ -8,17 +8,16 @@ from typing import cast
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_scene import CadCandidate
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, read_model
+from scenewright.stages.kit.measurement.convex_overlap import convex_piece
+from scenewright.stages.kit.simulation.shapes import link_shapes
+from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR, read_urdf, with_absolute_meshes
 from trimesh.visual.color import ColorVisuals
-
-from schemas.cad_scene import CadCandidate
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveSceneFile, SceneBody
-from schemas.scene_parts import Joint
-from stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape
-from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, read_model
-from stages.kit.measurement.convex_overlap import convex_piece
-from stages.kit.simulation.shapes import link_shapes
-from stages.kit.simulation.urdf_split import PART_SEPARATOR, read_urdf, with_absolute_meshes
 
 GREY = (128.0, 128.0, 128.0)
 BODY = "body"

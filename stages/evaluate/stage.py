@@ -6,24 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph, ContactGraphFile
-from schemas.errors import BadInput
-from schemas.evaluation import Evaluation, MetricsFile
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from schemas.plan import Plan
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.evaluate import counts, figures
-from stages.evaluate.cad_measures import measure_cad, model_periods, pair_replacements, true_joints
-from stages.evaluate.correspondence import point_overlaps
-from stages.evaluate.graph_measures import compare_graphs, measure_boxes, measure_graph, optional_nodes
-from stages.evaluate.map_measures import (
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.evaluation import Evaluation, MetricsFile
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.plan import Plan
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.evaluate import counts, figures
+from scenewright.stages.evaluate.cad_measures import measure_cad, model_periods, pair_replacements, true_joints
+from scenewright.stages.evaluate.correspondence import point_overlaps
+from scenewright.stages.evaluate.graph_measures import compare_graphs, measure_boxes, measure_graph, optional_nodes
+from scenewright.stages.evaluate.map_measures import (
     PredictedMap,
     label_true_points,
     load_map,
@@ -31,17 +30,17 @@ from stages.evaluate.map_measures import (
     measure_quality,
     measure_surface,
 )
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.plan_measures import measure_plan
-from stages.evaluate.replacement_measures import replacements_of
-from stages.evaluate.replacement_record import record_replacements
-from stages.evaluate.results import Part
-from stages.evaluate.shape_loading import true_shapes
-from stages.evaluate.trajectory_measures import count_poses, measure_trajectory
-from stages.evaluate.truth import TrueRoom, load_truth
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.measurement.tables import write_table
-from stages.kit.stage import Context
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.plan_measures import measure_plan
+from scenewright.stages.evaluate.replacement_measures import replacements_of
+from scenewright.stages.evaluate.replacement_record import record_replacements
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.shape_loading import true_shapes
+from scenewright.stages.evaluate.trajectory_measures import count_poses, measure_trajectory
+from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.measurement.tables import write_table
+from scenewright.stages.kit.stage import Context
 
 FAR_FROM_TRUTH = 0.3
 """An aligned trajectory error from which on the reader is warned [m]."""

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.mesh_files import read_mesh
 
 
 @dataclass(frozen=True)

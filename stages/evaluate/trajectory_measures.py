@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.trajectory import PosesFile
-from stages.evaluate.results import Part
-from stages.kit.measurement.pose_error import trajectory_error
-from stages.kit.measurement.relative_pose_error import trajectory_drift
+from scenewright.schemas.trajectory import PosesFile
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.kit.measurement.pose_error import trajectory_error
+from scenewright.stages.kit.measurement.relative_pose_error import trajectory_drift
 
 
 def measure_trajectory(

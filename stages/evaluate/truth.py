@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth, TrueObject
-from schemas.scene_parts import Box
-from schemas.vocabulary import load_vocabulary
-from stages.evaluate.surfaces import Surface, read_surface
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.geometry.boxes import box_yaw, gravity_aligned_box
-from stages.kit.geometry.transforms import apply
-from stages.kit.measurement.pose_error import yaw_of
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth, TrueObject
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.evaluate.surfaces import Surface, read_surface
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.geometry.boxes import box_yaw, gravity_aligned_box
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.measurement.pose_error import yaw_of
 
 
 @dataclass(frozen=True)

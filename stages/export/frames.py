@@ -8,11 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from schemas.sequence import SequenceFile
-from stages.kit.formats.foxglove import depth_to_millimetres
-from stages.kit.formats.frames import Frame, FrameReader
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import SequenceFile
+from scenewright.stages.kit.formats.foxglove import depth_to_millimetres
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
 
 
 @dataclass(frozen=True)

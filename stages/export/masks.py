@@ -7,14 +7,13 @@ from contextlib import contextmanager
 from typing import Protocol
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.segments import FrameSegment, Segments
-from schemas.sequence import Sequence
-from schemas.vocabulary import VOID, load_vocabulary
-from stages.export.frames import ExportMask, FrameMasks
-from stages.kit.formats.frames import Frame
-from stages.kit.formats.masks import PanopticReader
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.segments import FrameSegment, Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import VOID, load_vocabulary
+from scenewright.stages.export.frames import ExportMask, FrameMasks
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.formats.masks import PanopticReader
 
 
 class MaskSource(Protocol):

@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.exported_scene import ExportedScene
-from schemas.exported_sequence import ExportedSequence
-from schemas.interactive_scene import InteractiveScene
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from stages.export.registry import STREAMS, all_formats, dialects, layouts
-from stages.export.scene_registry import scene_formats
-from stages.kit.estimates import Estimate, Inputs, grows_with
-from stages.kit.stage import Optionally, Parameters, Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.exported_scene import ExportedScene
+from scenewright.schemas.exported_sequence import ExportedSequence
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.export.registry import STREAMS, all_formats, dialects, layouts
+from scenewright.stages.export.scene_registry import scene_formats
+from scenewright.stages.kit.estimates import Estimate, Inputs, grows_with
+from scenewright.stages.kit.stage import Optionally, Parameters, Stage
 
 if TYPE_CHECKING:
     Layout = str

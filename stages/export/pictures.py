@@ -6,8 +6,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from stages.kit.formats.foxglove import PNG_START
+from scenewright.stages.kit.formats.foxglove import PNG_START
 
 PNG_COMPRESSION = 3
 """zlib level of depth images: 9 takes five times longer for a few per cent."""

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
 
-from stages.kit.declared import declared_in
+from scenewright.stages.kit.declared import declared_in
 
 STREAMS = ("color", "depth", "right", "labels", "pose")
 
@@ -45,13 +45,13 @@ class SequenceFormat:
     @property
     def module(self) -> str:
         """The module with `write`."""
-        return f"stages.export.formats.{self.name}.writer"
+        return f"scenewright.stages.export.formats.{self.name}.writer"
 
 
 @cache
 def all_formats() -> tuple[SequenceFormat, ...]:
     """Return every declared format in its order. Imports declarations only."""
-    return declared_in("stages.export.formats", SequenceFormat, "FORMAT")
+    return declared_in("scenewright.stages.export.formats", SequenceFormat, "FORMAT")
 
 
 def layouts() -> tuple[str, ...]:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput
-from schemas.interactive_scene import SceneBody
-from stages.kit.formats.urdf_file import Link, UrdfJoint
-from stages.kit.formats.written_scene import WrittenScene
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.stages.kit.formats.urdf_file import Link, UrdfJoint
+from scenewright.stages.kit.formats.written_scene import WrittenScene
 
 MOVING = ("revolute", "prismatic", "continuous")
 

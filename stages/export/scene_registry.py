@@ -7,10 +7,10 @@ from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
-from schemas.errors import MissingDependency
-from stages.kit.declared import declared_in
-from stages.kit.library_versions import library_version
-from stages.kit.stage import Extra
+from scenewright.schemas.errors import MissingDependency
+from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.library_versions import library_version
+from scenewright.stages.kit.stage import Extra
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class SceneFormat:
     @property
     def module(self) -> str:
         """The module with `write`."""
-        return f"stages.export.scene_formats.{self.name}.writer"
+        return f"scenewright.stages.export.scene_formats.{self.name}.writer"
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Written:
 @cache
 def scene_formats() -> tuple[SceneFormat, ...]:
     """Return every declared format in its order. Imports declarations only."""
-    return declared_in("stages.export.scene_formats", SceneFormat, "FORMAT")
+    return declared_in("scenewright.stages.export.scene_formats", SceneFormat, "FORMAT")
 
 
 def scene_format(name: str) -> SceneFormat:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib
 
-from schemas.exported_scene import ExportedScene, SceneExportFile
-from schemas.interactive_scene import InteractiveScene
-from stages.export.parameters import SceneExportParameters
-from stages.export.scene_bodies import MOVING, SceneToExport
-from stages.export.scene_registry import Written, scene_format
-from stages.kit.formats.written_scene import WrittenScene
-from stages.kit.stage import Context
+from scenewright.schemas.exported_scene import ExportedScene, SceneExportFile
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.export.parameters import SceneExportParameters
+from scenewright.stages.export.scene_bodies import MOVING, SceneToExport
+from scenewright.stages.export.scene_registry import Written, scene_format
+from scenewright.stages.kit.formats.written_scene import WrittenScene
+from scenewright.stages.kit.stage import Context
 
 
 def run(scene: InteractiveScene, *, parameters: SceneExportParameters, context: Context) -> ExportedScene:

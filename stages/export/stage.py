@@ -7,17 +7,17 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any
 
-from schemas.errors import UsageError
-from schemas.exported_sequence import ExportedSequence, ExportFile
-from schemas.scene_parts import Camera
-from schemas.segments import Segments
-from schemas.sequence import Sequence, SequenceFile
-from stages.export.frames import ExportJob, Tally, export_frames
-from stages.export.masks import masks_of
-from stages.export.parameters import ExportParameters
-from stages.export.registry import SequenceFormat, format_for
-from stages.kit.formats.frames import FrameReader
-from stages.kit.stage import Context
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.exported_sequence import ExportedSequence, ExportFile
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence, SequenceFile
+from scenewright.stages.export.frames import ExportJob, Tally, export_frames
+from scenewright.stages.export.masks import masks_of
+from scenewright.stages.export.parameters import ExportParameters
+from scenewright.stages.export.registry import SequenceFormat, format_for
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.stage import Context
 
 WORLD_NOTE = "poses are world_from_camera in the sequence's world: metres, z up, OpenCV cameras"
 

@@ -10,10 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.vocabulary import Vocabulary
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.kit.class_extents import extent_of, is_plausible
+from scenewright.schemas.vocabulary import Vocabulary
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.kit.class_extents import extent_of, is_plausible
 
 MOST = 0.5
 """Share of what was said of a piece that its name has more than."""

@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 import trimesh
-
-from schemas.errors import BadInput
-from schemas.outside import file_text
-from stages.fuse.parts import connected_parts
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_all_arrays, read_arrays
-from stages.kit.formats.scenenn_annotation import read_annotation
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_text
+from scenewright.stages.fuse.parts import connected_parts
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.numpy_files import read_all_arrays, read_arrays
+from scenewright.stages.kit.formats.scenenn_annotation import read_annotation
 
 LARGEST_JSON = 2**28
 """Bytes."""

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-
-from schemas.scene_parts import Camera
-from stages.fuse.counts import TripleCounts
-from stages.fuse.integration import intrinsics_of
-from stages.fuse.voxel_blocks import SIDE, VoxelBlocks, find, mix, pack
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.integration import intrinsics_of
+from scenewright.stages.fuse.voxel_blocks import SIDE, VoxelBlocks, find, mix, pack
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.fuse.annotated_scan import AnnotatedScan
-from stages.fuse.point_surface import local_axes
-from stages.fuse.unnamed_pieces import CEILING, FLOOR, LEVEL, SAME_LEVEL, unnamed_pieces
-from stages.fuse.walls import of_walls
-from stages.kit.geometry.cells import cell_keys
-from stages.kit.geometry.point_clouds import vertex_normals
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.fuse.annotated_scan import AnnotatedScan
+from scenewright.stages.fuse.point_surface import local_axes
+from scenewright.stages.fuse.unnamed_pieces import CEILING, FLOOR, LEVEL, SAME_LEVEL, unnamed_pieces
+from scenewright.stages.fuse.walls import of_walls
+from scenewright.stages.kit.geometry.cells import cell_keys
+from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 
 FLOOR_SHARE, LEAST_FLOOR = 0.25, 0.5
 """The floor is the lowest level that holds this share of the surface of the one that holds most, and this much at least

@@ -5,22 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.panoptic_map import EntitiesFile, Entity
-from schemas.vocabulary import UNNAMED, Vocabulary
-from stages.fuse.agreed_names import with_agreed_names, without_claimed
-from stages.fuse.counts import TripleCounts
-from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
-from stages.fuse.impossible_names import without_impossible_names
-from stages.fuse.mapping import PanopticMapper
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
-from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.strange_places import share_told, sure_things, thing_score, without_names
-from stages.fuse.surface import Surface, extract_surface
-from stages.kit.formats.map_files import mesh_name
-from stages.kit.stage import Progress
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.panoptic_map import EntitiesFile, Entity
+from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
+from scenewright.stages.fuse.agreed_names import with_agreed_names, without_claimed
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
+from scenewright.stages.fuse.impossible_names import without_impossible_names
+from scenewright.stages.fuse.mapping import PanopticMapper
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
+from scenewright.stages.fuse.smoothing import smoothed_tsdf
+from scenewright.stages.fuse.strange_places import share_told, sure_things, thing_score, without_names
+from scenewright.stages.fuse.surface import Surface, extract_surface
+from scenewright.stages.kit.formats.map_files import mesh_name
+from scenewright.stages.kit.stage import Progress
 
 FLAT_TOPPED = ("table", "desk")
 """Classes of things that are a level top on legs."""

@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.fuse.counts import TripleCounts
-from stages.fuse.merging import Grouping
-from stages.fuse.parts import absorb_pieces, absorb_specks, drop_far_parts, spread_labels
-from stages.fuse.surface import Surface
-from stages.kit.formats.map_files import cut_mesh, face_labels
-from stages.kit.formats.ply_files import ColoredMesh
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.merging import Grouping
+from scenewright.stages.fuse.parts import absorb_pieces, absorb_specks, drop_far_parts, spread_labels
+from scenewright.stages.fuse.surface import Surface
+from scenewright.stages.kit.formats.map_files import cut_mesh, face_labels
+from scenewright.stages.kit.formats.ply_files import ColoredMesh
 
 SPREAD_COSINE = 0.7
 """Labels spread to unlabelled vertices over surface that bends by less than 45 degrees from vertex to vertex."""

@@ -7,19 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.errors import BadInput
-from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.fuse.annotated_scan import AnnotatedScan, instances_by_class, read_scan
-from stages.fuse.bare_scan import told_apart
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.point_surface import thinned, tiles_of_points
-from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name, write_arrays
-from stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
-from stages.kit.labels import ANYTHING, OWN, Label, LabelSet, load_label_set, plain, read_label_file
-from stages.kit.stage import Context
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.fuse.annotated_scan import AnnotatedScan, instances_by_class, read_scan
+from scenewright.stages.fuse.bare_scan import told_apart
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.point_surface import thinned, tiles_of_points
+from scenewright.stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name, write_arrays
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
+from scenewright.stages.kit.labels import ANYTHING, OWN, Label, LabelSet, load_label_set, plain, read_label_file
+from scenewright.stages.kit.stage import Context
 
 KEPT_FACES = 2_000_000
 """Finer meshes are thinned to one vertex in each cube of --voxel-size."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from stages.fuse.voxel_blocks import AWAY, VoxelBlocks, find, pack
+from scenewright.stages.fuse.voxel_blocks import AWAY, VoxelBlocks, find, pack
 
 TILE = 4
 """Pixels a side that are looked at together."""

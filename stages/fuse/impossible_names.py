@@ -12,11 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.vocabulary import Vocabulary
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.fuse.partition import NAMED_SHARE
-from stages.kit.class_extents import extent_of, is_plausible
+from scenewright.schemas.vocabulary import Vocabulary
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.partition import NAMED_SHARE
+from scenewright.stages.kit.class_extents import extent_of, is_plausible
 
 BELIEVED = 0.5
 """Score of the masks of a name, averaged over all frame segments that were matched to the thing (0 where no mask was),

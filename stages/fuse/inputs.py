@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.segments import Segments, SegmentsFile
-from schemas.sequence import Sequence
-from schemas.vocabulary import Vocabulary
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import Segments, SegmentsFile
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import Vocabulary
 
 
 def check_segments(segments: SegmentsFile, camera: Camera, frame_count: int, vocabulary: Vocabulary) -> None:

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, parallel_chunksize, prange
-
-from schemas.scene_parts import Camera
-from stages.fuse.hits import count_hits
-from stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VoxelBlocks
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.fuse.hits import count_hits
+from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VoxelBlocks
 
 LARGEST_VOTE = 32000
 CHUNK = 64

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.segments import FrameSegment, SegmentsFile
+from scenewright.schemas.segments import FrameSegment, SegmentsFile
 
 
 class Listings:

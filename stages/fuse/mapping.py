@@ -6,16 +6,21 @@ from collections.abc import Sequence
 from copy import copy, deepcopy
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment
-from stages.fuse.association import Prediction, index_segments, match_segments, measure_overlap, overlapping_labels
-from stages.fuse.integration import integrate
-from stages.fuse.merging import Merging, SharedSegment
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.regularization import MergedLabels
-from stages.fuse.voxel_blocks import COORDINATE_LIMIT, SIDE, VoxelBlocks
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import FrameSegment
+from scenewright.stages.fuse.association import (
+    Prediction,
+    index_segments,
+    match_segments,
+    measure_overlap,
+    overlapping_labels,
+)
+from scenewright.stages.fuse.integration import integrate
+from scenewright.stages.fuse.merging import Merging, SharedSegment
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.regularization import MergedLabels
+from scenewright.stages.fuse.voxel_blocks import COORDINATE_LIMIT, SIDE, VoxelBlocks
 
 
 class PanopticMapper:

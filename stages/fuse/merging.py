@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from stages.fuse.association import Prediction
-from stages.fuse.counts import ClassInstance, TripleCounts
-from stages.fuse.regularization import MergedLabels
+from scenewright.stages.fuse.association import Prediction
+from scenewright.stages.fuse.counts import ClassInstance, TripleCounts
+from scenewright.stages.fuse.regularization import MergedLabels
 
 FrameInstance = tuple[int, int]
 """(o, c): instance within the frame, class."""

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numba
 import numpy as np
-
-from schemas.articulations import Articulations
-from schemas.scene_parts import Camera
-from stages.kit.formats.numpy_files import read_arrays
+from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 HIDDEN = 0.06
 """A voxel that lies so far behind the measured depth is hidden, and says nothing of that pixel [m]."""

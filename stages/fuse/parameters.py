@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.articulations import Articulations
-from schemas.errors import UsageError
-from schemas.panoptic_map import PanopticMap
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.kit.estimates import Estimate, Inputs
-from stages.kit.labels import LABEL_TABLES
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.estimates import Estimate, Inputs
+from scenewright.stages.kit.labels import LABEL_TABLES
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class FuseParameters(Parameters):

@@ -13,9 +13,9 @@ from functools import reduce
 from heapq import heapify, heappop, heappush
 from operator import or_
 
-from stages.fuse.counts import TripleCounts
-from stages.fuse.merging import Grouping
-from stages.fuse.regularization import PairEvidence
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.merging import Grouping
+from scenewright.stages.fuse.regularization import PairEvidence
 
 SURE_VOTES = 3
 """From so many predictions on, the leading class of a segment is believed."""

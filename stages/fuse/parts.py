@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from numba import njit
+from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 from scipy.spatial import cKDTree
-
-from stages.kit.geometry.point_clouds import vertex_normals
 
 
 @njit(cache=True)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from stages.fuse.closing import ClosedMap
-from stages.fuse.voxel_blocks import FIXED_POINT, VoxelBlocks
-from stages.kit.formats.map_files import mesh_name, write_arrays
-from stages.kit.formats.ply_files import ColoredMesh, write_ply
+from scenewright.stages.fuse.closing import ClosedMap
+from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, VoxelBlocks
+from scenewright.stages.kit.formats.map_files import mesh_name, write_arrays
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
 
 
 def volume_arrays(blocks: VoxelBlocks, merged: np.ndarray) -> dict[str, np.ndarray]:

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.fuse.surface import Surface
-from stages.fuse.unnamed_pieces import CEILING, FLOOR, topped_parts, unnamed_pieces
-from stages.fuse.walls import of_walls
-from stages.kit.formats.map_files import cut_mesh, face_labels
-from stages.kit.geometry.point_clouds import vertex_normals
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.surface import Surface
+from scenewright.stages.fuse.unnamed_pieces import CEILING, FLOOR, topped_parts, unnamed_pieces
+from scenewright.stages.fuse.walls import of_walls
+from scenewright.stages.kit.formats.map_files import cut_mesh, face_labels
+from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.geometry.cells import row_keys
 from scipy.spatial import cKDTree
-
-from stages.kit.geometry.cells import row_keys
 
 NEIGHBOURS = 12
 """Points around one that say how the surface lies there."""

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
-
-from stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.counts import TripleCounts
 
 Pair = tuple[int, int]
 """(smaller label, larger label)"""

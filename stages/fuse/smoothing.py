@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-
-from stages.fuse.surface import find_neighbours, voxel_at
-from stages.fuse.voxel_blocks import SIDE, VOXELS, VoxelBlocks
+from scenewright.stages.fuse.surface import find_neighbours, voxel_at
+from scenewright.stages.fuse.voxel_blocks import SIDE, VOXELS, VoxelBlocks
 
 
 @njit(parallel=True, cache=True)

@@ -8,31 +8,30 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.articulations import Articulations
-from schemas.panoptic_map import SNAPSHOTS, PanopticMap
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.fuse.closing import MaskSource, close_map, is_strange
-from stages.fuse.from_mesh import run_from_mesh
-from stages.fuse.inputs import check_origin, check_segments
-from stages.fuse.listings import Listings
-from stages.fuse.mapping import PanopticMapper
-from stages.fuse.merging import Merging
-from stages.fuse.ours import Ours
-from stages.fuse.outdated import Outdated
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.payload import write_meshes, write_payload
-from stages.fuse.separate import Separate
-from stages.fuse.thesis import Thesis
-from stages.kit.formats.frames import Frame, FrameReader, require_depth
-from stages.kit.formats.masks import PanopticReader
-from stages.kit.formats.trajectories import poses_at, read_tum
-from stages.kit.prefetching import prefetched
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
+from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.panoptic_map import SNAPSHOTS, PanopticMap
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.fuse.closing import MaskSource, close_map, is_strange
+from scenewright.stages.fuse.from_mesh import run_from_mesh
+from scenewright.stages.fuse.inputs import check_origin, check_segments
+from scenewright.stages.fuse.listings import Listings
+from scenewright.stages.fuse.mapping import PanopticMapper
+from scenewright.stages.fuse.merging import Merging
+from scenewright.stages.fuse.ours import Ours
+from scenewright.stages.fuse.outdated import Outdated
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.payload import write_meshes, write_payload
+from scenewright.stages.fuse.separate import Separate
+from scenewright.stages.fuse.thesis import Thesis
+from scenewright.stages.kit.formats.frames import Frame, FrameReader, require_depth
+from scenewright.stages.kit.formats.masks import PanopticReader
+from scenewright.stages.kit.formats.trajectories import poses_at, read_tum
+from scenewright.stages.kit.prefetching import prefetched
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
 MERGING: dict[str, Callable[[FuseParameters, frozenset[int]], Merging]] = {
     "ours": Ours,

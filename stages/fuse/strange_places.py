@@ -11,8 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 
 LEAST_THING_SCORE = 0.3
 """Score of the masks of things, averaged over all frame segments that were matched to an entity (0 where no mask was),

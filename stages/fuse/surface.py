@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-
-from stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VOXELS, VoxelBlocks, find, pack
+from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VOXELS, VoxelBlocks, find, pack
 
 SMALL_STEPS, ALL = 0b000111, 0b111111
 """Bits of a voxel's crossings."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import combinations
 
-from stages.fuse.association import Prediction, associate_instances
-from stages.fuse.counts import TripleCounts
-from stages.fuse.merging import FrameInstance, Grouping, SharedSegment
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.regularization import MergedLabels, PairEvidence, merge_instances, merge_segments
+from scenewright.stages.fuse.association import Prediction, associate_instances
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.merging import FrameInstance, Grouping, SharedSegment
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.regularization import MergedLabels, PairEvidence, merge_instances, merge_segments
 
 
 class Thesis:

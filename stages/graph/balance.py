@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.kit.geometry.boxes import convex_hull
+from scenewright.stages.kit.geometry.planes import plane_height
 from scipy.spatial import cKDTree
-
-from schemas.scene_parts import Relation
-from stages.graph.nodes import Entity
-from stages.kit.geometry.boxes import convex_hull
-from stages.kit.geometry.planes import plane_height
 
 FOOT_HEIGHT = 0.03
 """Points within this height over the lowest one can touch the ground [m]."""

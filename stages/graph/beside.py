@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from schemas.scene_parts import Relation
-from stages.graph.balance import leaning_relation
-from stages.graph.evidence import on_surface, with_leaning_contact
-from stages.graph.nodes import Entity
-from stages.graph.parameters import GraphParameters
-from stages.graph.shared_support import PartialSupport, partial_supports, together_with
-from stages.graph.support import Candidate
-from stages.graph.tree import descends_from
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.graph.balance import leaning_relation
+from scenewright.stages.graph.evidence import on_surface, with_leaning_contact
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.shared_support import PartialSupport, partial_supports, together_with
+from scenewright.stages.graph.support import Candidate
+from scenewright.stages.graph.tree import descends_from
 
 FULLY_CARRIED = 0.9
 """Over so much of its footprint a carrier needs no help."""

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Relation
-from stages.graph.entities import Kept, load_entities, suppose_floor
-from stages.graph.evidence import relation_of
-from stages.graph.method import GraphMethod
-from stages.graph.nodes import Entity
-from stages.graph.parameters import GraphParameters
-from stages.graph.refinement import proximal_relations, register_hidden_planes
-from stages.graph.support import Candidate
-from stages.graph.tree import choose_parents
-from stages.kit.geometry.boxes import refined_box
-from stages.kit.stage import Context
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.graph.entities import Kept, load_entities, suppose_floor
+from scenewright.stages.graph.evidence import relation_of
+from scenewright.stages.graph.method import GraphMethod
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.refinement import proximal_relations, register_hidden_planes
+from scenewright.stages.graph.support import Candidate
+from scenewright.stages.graph.tree import choose_parents
+from scenewright.stages.kit.geometry.boxes import refined_box
+from scenewright.stages.kit.stage import Context
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-
-from schemas.scene_parts import Box
-from stages.graph.nodes import SAME_HEIGHT, Entity, level_patch
-from stages.graph.parameters import GraphParameters
-from stages.graph.support import (
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.graph.nodes import SAME_HEIGHT, Entity, level_patch
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.support import (
     ORDER_TOLERANCE,
     Candidate,
     best_first,
@@ -19,9 +18,9 @@ from stages.graph.support import (
     stands_inside,
     support_score,
 )
-from stages.graph.touching import SINKING, hidden_reach, seam_share, smaller_share, touches
-from stages.kit.geometry.boxes import clip_polygon, footprint, polygon_area, transform_points_to_box
-from stages.kit.geometry.planes import plane_height
+from scenewright.stages.graph.touching import SINKING, hidden_reach, seam_share, smaller_share, touches
+from scenewright.stages.kit.geometry.boxes import clip_polygon, footprint, polygon_area, transform_points_to_box
+from scenewright.stages.kit.geometry.planes import plane_height
 
 HIDDEN_FACTOR = 0.8
 """A plane that nobody saw is worth less than the same plane seen."""

@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.panoptic_map import Entity as MapEntity
-from schemas.panoptic_map import PanopticMap
-from schemas.vocabulary import load_vocabulary
-from stages.graph.method import GraphMethod
-from stages.graph.nodes import THINNEST_DISTANCE, Entity, PlaneSearch, patch_from_fit, surface_planes
-from stages.graph.parameters import GraphParameters
-from stages.kit.digests import sha256_of_file
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.geometry.boxes import convex_hull, minimum_box
-from stages.kit.geometry.planes import PlaneFit
-from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid, vertex_normals
-from stages.kit.stage import Context
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import Entity as MapEntity
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.graph.method import GraphMethod
+from scenewright.stages.graph.nodes import THINNEST_DISTANCE, Entity, PlaneSearch, patch_from_fit, surface_planes
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.kit.digests import sha256_of_file
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.geometry.boxes import convex_hull, minimum_box
+from scenewright.stages.kit.geometry.planes import PlaneFit
+from scenewright.stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid, vertex_normals
+from scenewright.stages.kit.stage import Context
 
 SAMPLES, PLANES = 1, 2
 """Random streams."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
-
-from schemas.base import Vector3, as_vector
-from schemas.scene_parts import Box, Relation
-from stages.graph.balance import LEAST_HEIGHT
-from stages.graph.nodes import Entity, Patch
-from stages.graph.support import Candidate
-from stages.kit.geometry.boxes import (
+from scenewright.schemas.base import Vector3, as_vector
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.stages.graph.balance import LEAST_HEIGHT
+from scenewright.stages.graph.nodes import Entity, Patch
+from scenewright.stages.graph.support import Candidate
+from scenewright.stages.kit.geometry.boxes import (
     bottom,
     box_corners,
     box_volume,
@@ -21,7 +19,8 @@ from stages.kit.geometry.boxes import (
     polygon_area,
     top,
 )
-from stages.kit.geometry.planes import plane_height
+from scenewright.stages.kit.geometry.planes import plane_height
+from scipy.spatial import cKDTree
 
 UPRIGHT_NORMAL = 0.5
 """Planes whose normal's z is below this are sides, those above surfaces [-]."""

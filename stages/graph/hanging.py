@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.graph.support import Candidate
 from scipy.spatial import cKDTree
-
-from stages.graph.nodes import Entity
-from stages.graph.support import Candidate
 
 NEIGHBOURHOOD = 0.5
 """The ceiling over an object is what lies within this ground distance of its middle [m]; the object hides the rest."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-
-from schemas.scene_parts import Box, Relation
-from schemas.vocabulary import SemanticClass
-from stages.graph.nodes import Entity, SmallSupports
-from stages.graph.support import Candidate
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.schemas.vocabulary import SemanticClass
+from scenewright.stages.graph.nodes import Entity, SmallSupports
+from scenewright.stages.graph.support import Candidate
 
 
 class GraphMethod(Protocol):

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Box, SurfacePlane
-from stages.kit.geometry.boxes import bottom, convex_hull, polygon_area, top
-from stages.kit.geometry.planes import PlaneFit, level_plane, plane_rectangle, ransac_plane, ransac_planes
-from stages.kit.geometry.point_clouds import clusters
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Box, SurfacePlane
+from scenewright.stages.kit.geometry.boxes import bottom, convex_hull, polygon_area, top
+from scenewright.stages.kit.geometry.planes import PlaneFit, level_plane, plane_rectangle, ransac_plane, ransac_planes
+from scenewright.stages.kit.geometry.point_clouds import clusters
 
 GRAVITY = np.array([0.0, 0.0, -1.0])
 CONTAINER_CLASSES = frozenset(

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.scene_parts import Box
-from stages.graph.round_footprint import RoundFootprint, round_footprint
-from stages.kit.geometry.boxes import gravity_aligned_box, minimum_rectangle
-from stages.kit.geometry.point_clouds import without_strays
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.graph.round_footprint import RoundFootprint, round_footprint
+from scenewright.stages.kit.geometry.boxes import gravity_aligned_box, minimum_rectangle
+from scenewright.stages.kit.geometry.point_clouds import without_strays
 
 Extent = tuple[float, float]
 """Least and largest coordinate [m]."""

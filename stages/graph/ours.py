@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.scene_parts import Box, Relation
-from schemas.vocabulary import UNNAMED, SemanticClass
-from stages.graph.beside import relations_beside
-from stages.graph.corrected_support import HIDDEN_TOP_DISTANCE, candidates_for
-from stages.graph.hanging import hanging_candidate
-from stages.graph.nodes import Entity, SmallSupports
-from stages.graph.observed_box import BoxFit, observed_box
-from stages.graph.parameters import GraphParameters
-from stages.graph.shared_support import shared_candidates
-from stages.graph.support import Candidate
-from stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
-from stages.graph.walls import search_trees, wall_candidate
-from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.schemas.vocabulary import UNNAMED, SemanticClass
+from scenewright.stages.graph.beside import relations_beside
+from scenewright.stages.graph.corrected_support import HIDDEN_TOP_DISTANCE, candidates_for
+from scenewright.stages.graph.hanging import hanging_candidate
+from scenewright.stages.graph.nodes import Entity, SmallSupports
+from scenewright.stages.graph.observed_box import BoxFit, observed_box
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.shared_support import shared_candidates
+from scenewright.stages.graph.support import Candidate
+from scenewright.stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
+from scenewright.stages.graph.walls import search_trees, wall_candidate
+from scenewright.stages.kit.geometry.boxes import box_volume, boxes_overlap_volume
 
 LEDGE_AREA = 0.05
 """Least area of a supporting surface in a wall entity [m^2]."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.contact_graph import ContactGraph
-from schemas.panoptic_map import PanopticMap
-from stages.kit.estimates import grows_with
-from stages.kit.stage import Parameters, Stage
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.stage import Parameters, Stage
 
 
 class GraphParameters(Parameters):

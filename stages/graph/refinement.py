@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.scene_parts import Box, Relation
-from stages.graph.evidence import Surfaces, shared_middle
-from stages.graph.nodes import SAME_HEIGHT, Entity
-from stages.graph.support import Candidate
-from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, minimum_box
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.stages.graph.evidence import Surfaces, shared_middle
+from scenewright.stages.graph.nodes import SAME_HEIGHT, Entity
+from scenewright.stages.graph.support import Candidate
+from scenewright.stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, minimum_box
 
 LEAST_SHARED_VOLUME = 1e-6
 """Boxes that merely touch share less than this by rounding [m^3]."""

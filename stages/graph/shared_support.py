@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-
-from stages.graph.corrected_support import hull_overlap
-from stages.graph.nodes import Entity
-from stages.graph.parameters import GraphParameters
-from stages.graph.support import Candidate, height_gap, inside_share, stands_inside, support_score
-from stages.kit.geometry.boxes import clip_polygon, footprint
-from stages.kit.geometry.planes import plane_height
+from scenewright.stages.graph.corrected_support import hull_overlap
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.support import Candidate, height_gap, inside_share, stands_inside, support_score
+from scenewright.stages.kit.geometry.boxes import clip_polygon, footprint
+from scenewright.stages.kit.geometry.planes import plane_height
 
 SAME_LEVEL = 0.02
 """Planes nearer than this in height carry one thing together [m]."""

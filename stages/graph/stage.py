@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace as dataclass_replace
 
-from schemas.contact_graph import ContactGraph
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import TREE_RELATIONS
-from stages.graph.building import build_graph
-from stages.graph.entities import Kept
-from stages.graph.method import GraphMethod
-from stages.graph.ours import Ours
-from stages.graph.parameters import GraphParameters
-from stages.graph.thesis import Thesis
-from stages.graph.timeline import Stand, build_timeline
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.stages.graph.building import build_graph
+from scenewright.stages.graph.entities import Kept
+from scenewright.stages.graph.method import GraphMethod
+from scenewright.stages.graph.ours import Ours
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.thesis import Thesis
+from scenewright.stages.graph.timeline import Stand, build_timeline
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
 METHODS: dict[str, Callable[[GraphParameters], GraphMethod]] = {"ours": Ours, "thesis": Thesis}
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from schemas.scene_parts import Box
-from stages.graph.nodes import Entity, Patch
-from stages.kit.geometry.boxes import bottom, footprint_overlap
-from stages.kit.geometry.planes import plane_height
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.graph.nodes import Entity, Patch
+from scenewright.stages.kit.geometry.boxes import bottom, footprint_overlap
+from scenewright.stages.kit.geometry.planes import plane_height
 
 INSIDE_SHARE = 0.7
 """A child is inside a container when this share of its footprint is within the container's."""

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from schemas.scene_parts import Box, Relation
-from schemas.vocabulary import SemanticClass
-from stages.graph.nodes import Entity, SmallSupports, level_patch
-from stages.graph.observed_box import BoxFit, observed_box
-from stages.graph.parameters import GraphParameters
-from stages.graph.support import (
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.schemas.vocabulary import SemanticClass
+from scenewright.stages.graph.nodes import Entity, SmallSupports, level_patch
+from scenewright.stages.graph.observed_box import BoxFit, observed_box
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.support import (
     ORDER_TOLERANCE,
     Candidate,
     best_first,
@@ -22,10 +21,10 @@ from stages.graph.support import (
     stands_inside,
     support_score,
 )
-from stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
-from stages.graph.walls import search_trees, wall_candidate
-from stages.kit.geometry.boxes import clip_polygon, footprint, transform_points_to_box
-from stages.kit.geometry.planes import plane_height
+from scenewright.stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
+from scenewright.stages.graph.walls import search_trees, wall_candidate
+from scenewright.stages.kit.geometry.boxes import clip_polygon, footprint, transform_points_to_box
+from scenewright.stages.kit.geometry.planes import plane_height
 
 
 @dataclass(frozen=True)

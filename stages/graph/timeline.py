@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.contact_graph import (
+from scenewright.schemas.contact_graph import (
     SCENE_NODE,
     Beside,
     ContactGraphFile,
@@ -15,9 +15,9 @@ from schemas.contact_graph import (
     Reattached,
     TimelineFile,
 )
-from schemas.scene_parts import TREE_RELATIONS, Relation
-from stages.graph.nodes import Entity
-from stages.graph.tracks import Tracks
+from scenewright.schemas.scene_parts import TREE_RELATIONS, Relation
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.graph.tracks import Tracks
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ Both are mended with what a camera does see, the foot of the object and the surf
 from __future__ import annotations
 
 import numpy as np
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.graph.nodes import Entity, Patch
+from scenewright.stages.kit.geometry.boxes import footprint_overlap
 from scipy.spatial import cKDTree
-
-from schemas.scene_parts import Box
-from stages.graph.nodes import Entity, Patch
-from stages.kit.geometry.boxes import footprint_overlap
 
 SINKING = 0.01
 """An object touches planes that are at most this far above its bottom (noise), ... [m]."""

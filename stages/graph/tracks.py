@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from itertools import count
 
 import numpy as np
+from scenewright.stages.graph.nodes import Entity
 from scipy.optimize import linear_sum_assignment
-
-from stages.graph.nodes import Entity
 
 CELL = 0.04
 """Edge of the grid on which surfaces are compared [m]."""

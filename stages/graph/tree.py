@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.contact_graph import SCENE_NODE
-from stages.graph.nodes import Entity
-from stages.graph.support import Candidate
+from scenewright.schemas.contact_graph import SCENE_NODE
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.graph.support import Candidate
 
 FLOOR_CONFIDENCE = 0.1
 """Of a relation to the floor that only says: it has to stand on something."""

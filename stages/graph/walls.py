@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.graph.nodes import Entity
+from scenewright.stages.graph.support import Candidate
 from scipy.spatial import cKDTree
-
-from schemas.scene_parts import SurfacePlane
-from stages.graph.nodes import Entity
-from stages.graph.support import Candidate
 
 NEAREST_SHARE = 0.02
 """The distance is that of the nearest 2 % of the object's points: one leaked vertex is no contact."""

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.source import LoadedFrame, Unusable
-from stages.kit.formats.foxglove import decode_color, millimetres_to_depth
-from stages.kit.geometry.cameras import back_project
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.source import LoadedFrame, Unusable
+from scenewright.stages.kit.formats.foxglove import decode_color, millimetres_to_depth
+from scenewright.stages.kit.geometry.cameras import back_project
 
 
 def registered_loader(

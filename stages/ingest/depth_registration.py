@@ -11,9 +11,8 @@ import math
 
 import numpy as np
 from numba import njit
-
-from schemas.scene_parts import Camera
-from stages.kit.formats.foxglove import depth_to_millimetres, millimetres_to_depth
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.foxglove import depth_to_millimetres, millimetres_to_depth
 
 RELATIVE_STEP = 0.05
 """Depth change between neighbouring pixels, relative to depth, that a slanted surface explains."""

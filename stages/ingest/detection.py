@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from schemas.errors import BadInput
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.registry import LogLayout, all_layouts
-from stages.ingest.source import LogSource
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.registry import LogLayout, all_layouts
+from scenewright.stages.ingest.source import LogSource
 
 
 class LogFormat(NamedTuple):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.source import Unusable
-from stages.kit.formats.foxglove import JPEG_START, PNG_START, decode_color, depth_to_millimetres
-from stages.kit.formats.image_headers import may_be_decoded
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.formats.foxglove import JPEG_START, PNG_START, decode_color, depth_to_millimetres
+from scenewright.stages.kit.formats.image_headers import may_be_decoded
 
 INVALID_DEPTH = 65535
 

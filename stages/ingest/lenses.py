@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.images import fitted_color
-from stages.ingest.messages.records import CalibrationRecord
-from stages.ingest.source import Unusable
-from stages.kit.geometry.cameras import intrinsic_matrix
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.images import fitted_color
+from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
 
 OPENCV_MODELS = (
     "",

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.sequence import Sequence
-from stages.ingest.pose_convention_names import PoseConvention
-from stages.ingest.registry import all_layouts
-from stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
-from stages.kit.stage import External, Parameters, Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.ingest.pose_convention_names import PoseConvention
+from scenewright.stages.ingest.registry import all_layouts
+from scenewright.stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
+from scenewright.stages.kit.stage import External, Parameters, Stage
 
 if TYPE_CHECKING:
     LogFormatName = str

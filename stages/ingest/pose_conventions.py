@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS, POSE_CONVENTIONS, PoseConvention
 from scipy.spatial.transform import Rotation
-
-from stages.ingest.pose_convention_names import CONVENTION_WORDS, POSE_CONVENTIONS, PoseConvention
 
 __all__ = ["CONVENTION_WORDS", "POSE_CONVENTIONS", "PoseConvention", "converted"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from stages.kit.declared import declared_in
+from scenewright.stages.kit.declared import declared_in
 
 
 @dataclass(frozen=True)
@@ -29,4 +29,4 @@ class LogLayout:
 @cache
 def all_layouts() -> tuple[LogLayout, ...]:
     """Return every declared layout in the order in which they are tried. Imports declarations only."""
-    return declared_in("stages.ingest.layouts", LogLayout, "LAYOUT")
+    return declared_in("scenewright.stages.ingest.layouts", LogLayout, "LAYOUT")

@@ -7,11 +7,10 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.pose_conventions import converted
-from stages.ingest.source import Entry
-from stages.kit.geometry.transforms import is_rigid
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.pose_conventions import converted
+from scenewright.stages.ingest.source import Entry
+from scenewright.stages.kit.geometry.transforms import is_rigid
 
 POSE_TOLERANCE = 1e-2
 """Deviation from a rotation that rounding in a text file explains; more is no pose."""

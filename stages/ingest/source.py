@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import LabelEntry
 
 Role = Literal[
     "color", "depth", "right", "labels", "calibration", "transforms", "pose", "imu", "points", "other", "unreadable"

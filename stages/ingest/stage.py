@@ -10,20 +10,19 @@ from typing import Any, Literal, get_args
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.pose_convention_names import CONVENTION_WORDS
-from stages.ingest.selection import NOT_SELECTED, largest_step, select
-from stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
-from stages.kit.formats.foxglove import millimetres_to_depth, nanoseconds
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.surface_samples import surface_samples
-from stages.kit.geometry.upright_world import make_upright
-from stages.kit.stage import Context
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
+from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
+from scenewright.stages.kit.formats.foxglove import millimetres_to_depth, nanoseconds
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.surface_samples import surface_samples
+from scenewright.stages.kit.geometry.upright_world import make_upright
+from scenewright.stages.kit.stage import Context
 
 GRAVITY_FRAMES = 60
 """Frames whose depth is looked at to find the floor."""

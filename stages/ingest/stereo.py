@@ -6,11 +6,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.lenses import Lens, has_projection, lens_of, scaled_matrix, turned_lens
-from stages.ingest.messages.records import CalibrationRecord
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.lenses import Lens, has_projection, lens_of, scaled_matrix, turned_lens
+from scenewright.stages.ingest.messages.records import CalibrationRecord
 
 SMALLEST_BASELINE = 1e-3
 """Eyes nearer to each other than this [m] are one camera."""

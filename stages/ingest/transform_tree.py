@@ -5,10 +5,9 @@ from __future__ import annotations
 from array import array
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
 from scipy.spatial.transform import Rotation, Slerp
-
-from schemas.errors import BadInput
-from stages.kit.geometry.transforms import inverse, transform_from
 
 SAME = 100_000_000
 """Samples of an edge that stands still are kept every so many nanoseconds: a robot publishes hundreds a second for

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-
-from schemas.errors import UsageError
-from schemas.outside import file_toml
-from stages.kit.stage import NOT_SHOWN, Parameters, Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.outside import file_toml
+from scenewright.stages.kit.stage import NOT_SHOWN, Parameters, Stage
 
 LARGEST_TOML = 16 * 2**20
 """Bytes."""

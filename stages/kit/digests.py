@@ -6,10 +6,10 @@ import errno
 import hashlib
 from pathlib import Path
 
-from schemas.base import canonical_json
-from schemas.errors import BadInput
-from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
-from schemas.outside import opened
+from scenewright.schemas.base import canonical_json
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
+from scenewright.schemas.outside import opened
 
 
 def sha256_of_file(path: Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from schemas.errors import UsageError
+from scenewright.schemas.errors import UsageError
 
 
 def check_names(option: str, names: Sequence[str], known: Sequence[str]) -> None:

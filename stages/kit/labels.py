@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import ValidationError
-
-from schemas.base import Model
-from schemas.errors import BadInput, first_problem
-from schemas.outside import file_text, file_toml
-from schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import file_text, file_toml
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
 
 LABELS_FOLDER = Path(__file__).resolve().parents[2] / "data" / "labels"
 LABEL_FILES = {

@@ -12,10 +12,9 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, field_validator
 from pydantic_core import CoreSchema
-
-from schemas.artifact import Artifact
-from schemas.base import bounded
-from stages.kit.estimates import Formula
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.base import bounded
+from scenewright.stages.kit.estimates import Formula
 
 Item = TypeVar("Item")
 

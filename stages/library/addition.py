@@ -7,28 +7,35 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile, LibraryFile
-from schemas.errors import BadInput, UsageError
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.cad_models import model_folder
-from stages.kit.formats.model_writer import write_model_folder
-from stages.kit.stage import Context
-from stages.library.importing.assembly import Assembled, assembled
-from stages.library.importing.classes import class_of, usual_size
-from stages.library.importing.discovery import Unread, find_models
-from stages.library.importing.frames import AXES, UNITS, Choice, axis_name, choose, model_rotation, upright_rotation
-from stages.library.importing.fronts import told_front
-from stages.library.importing.grouping import grouped, source_points
-from stages.library.importing.limits import few_findings, plain_text, told_refusals
-from stages.library.importing.mapping import SKIP, Entry, Mapping, read_mapping
-from stages.library.importing.placing import centered, placed_parts, plain_name, turned
-from stages.library.importing.report import table_lines
-from stages.library.importing.source_folder import SourceFolder
-from stages.library.importing.source_model import Declared, Direction, SourceModel
-from stages.library.importing.versions import uses_coacd
-from stages.library.parameters import AdditionParameters
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile, LibraryFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.cad_models import model_folder
+from scenewright.stages.kit.formats.model_writer import write_model_folder
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.library.importing.assembly import Assembled, assembled
+from scenewright.stages.library.importing.classes import class_of, usual_size
+from scenewright.stages.library.importing.discovery import Unread, find_models
+from scenewright.stages.library.importing.frames import (
+    AXES,
+    UNITS,
+    Choice,
+    axis_name,
+    choose,
+    model_rotation,
+    upright_rotation,
+)
+from scenewright.stages.library.importing.fronts import told_front
+from scenewright.stages.library.importing.grouping import grouped, source_points
+from scenewright.stages.library.importing.limits import few_findings, plain_text, told_refusals
+from scenewright.stages.library.importing.mapping import SKIP, Entry, Mapping, read_mapping
+from scenewright.stages.library.importing.placing import centered, placed_parts, plain_name, turned
+from scenewright.stages.library.importing.report import table_lines
+from scenewright.stages.library.importing.source_folder import SourceFolder
+from scenewright.stages.library.importing.source_model import Declared, Direction, SourceModel
+from scenewright.stages.library.importing.versions import uses_coacd
+from scenewright.stages.library.parameters import AdditionParameters
 
 IMPORTS_FILE = "imports.json"
 Y_UP_FORMATS = ("OBJ", "ShapeNetSem")

@@ -9,13 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.cad_library import Affordances, CadModel, GraspPlace, InnerVolume, JointUse, SupportSurface
-from schemas.scene_parts import Joint, SurfacePlane
-from stages.kit.geometry.solids import Solid
-from stages.library.joint_kinds import joint_kind
-from stages.library.rays import SolidRays
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_library import Affordances, CadModel, GraspPlace, InnerVolume, JointUse, SupportSurface
+from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.kit.geometry.solids import Solid
+from scenewright.stages.library.joint_kinds import joint_kind
+from scenewright.stages.library.rays import SolidRays
 
 OPENING_KINDS = ("door", "drawer", "lid")
 LEVEL = 0.98

@@ -6,10 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import MassProperties, Solid, bar, mass_properties
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import MassProperties, Solid, bar, mass_properties
 
 Color = tuple[int, int, int]
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.cad_library import JointKind
-from schemas.scene_parts import Joint
+from scenewright.schemas.cad_library import JointKind
+from scenewright.schemas.scene_parts import Joint
 
 UPRIGHT = 0.7
 """|z| of the axis beyond which it counts as vertical."""

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_library import CadModel, ModelState
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.formats.model_writer import PartGeometry
+from scenewright.stages.kit.geometry.solids import Solid
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.library.design import Design, mass_of
+from scenewright.stages.library.joint_kinds import joint_kind
+from scenewright.stages.library.surfaces import surface_planes
 from scipy.spatial.transform import Rotation
-
-from schemas.base import as_vector
-from schemas.cad_library import CadModel, ModelState
-from schemas.scene_parts import Joint
-from stages.kit.formats.model_writer import PartGeometry
-from stages.kit.geometry.solids import Solid
-from stages.kit.geometry.transforms import transform_from
-from stages.library.design import Design, mass_of
-from stages.library.joint_kinds import joint_kind
-from stages.library.surfaces import surface_planes
 
 BODY = "body"
 TURNED = ("knob", "lever")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.cad_library import CadLibrary
-from stages.kit.estimates import Estimate, Inputs
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.stages.kit.estimates import Estimate, Inputs
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class LibraryParameters(Parameters):

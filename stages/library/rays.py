@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from stages.kit.geometry.solids import Solid
+from scenewright.stages.kit.geometry.solids import Solid
 
 PARALLEL = 1e-9
 SEAM = 1e-9

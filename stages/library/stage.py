@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from schemas.cad_library import CadLibrary, LibraryFile
-from schemas.errors import UsageError
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.model_writer import write_model_folder
-from stages.kit.stage import Context
-from stages.library.affordances import affordances
-from stages.library.design import centered
-from stages.library.families import GENERATORS
-from stages.library.modelling import closed_solids, describe, part_geometries
-from stages.library.parameters import LibraryParameters
+from scenewright.schemas.cad_library import CadLibrary, LibraryFile
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.model_writer import write_model_folder
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.library.affordances import affordances
+from scenewright.stages.library.design import centered
+from scenewright.stages.library.families import GENERATORS
+from scenewright.stages.library.modelling import closed_solids, describe, part_geometries
+from scenewright.stages.library.parameters import LibraryParameters
 
 
 def run(*, parameters: LibraryParameters, context: Context) -> CadLibrary:

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.kit.geometry.solids import Solid
 from shapely.geometry import Polygon
-
-from schemas.base import as_vector
-from schemas.errors import BadInput
-from schemas.scene_parts import SurfacePlane
-from stages.kit.geometry.solids import Solid
 
 COVER_GAPS = (0.0005, 0.003)
 """What stands at these distances from a surface covers it [m] (a closed door before the edges of a carcass)."""

@@ -13,11 +13,10 @@ from math import acos, atan2, cos, hypot, pi, sin, sqrt
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.motion.compiled_check import link_frames
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
-from stages.kit.simulation.robot_description import RobotDescription, load_robot
+from scenewright.stages.kit.motion.compiled_check import link_frames
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
+from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
 
 Limits = Literal["fr3", "panda"]
 FR3_LOWER = np.array([-5.3093, -1.5133, -2.4937, -2.7478, -2.48, 0.8521, -5.7995])

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.packing import TABLE_TOP
-from stages.kit.motion.collision import Collision
-from stages.kit.simulation.engine import engine, native_output_to_stderr
-from stages.pack.arm import FixedArm
-from stages.pack.hand import Named
-from stages.pack.solids import Block
+from scenewright.schemas.packing import TABLE_TOP
+from scenewright.stages.kit.motion.collision import Collision
+from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
+from scenewright.stages.pack.arm import FixedArm
+from scenewright.stages.pack.hand import Named
+from scenewright.stages.pack.solids import Block
 
 FINGER_OPENING = 0.04
 """Each finger from the middle [m]."""

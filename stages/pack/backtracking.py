@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from stages.pack.records import Action, Attempt, BoxState, Observation
-from stages.pack.sampling import QUARTER_TURNS, inset_draw, pick_and_place
+from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation
+from scenewright.stages.pack.sampling import QUARTER_TURNS, inset_draw, pick_and_place
 
 TRIES = 10
 """Placements tried of a box before the box before it is placed anew."""

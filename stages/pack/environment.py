@@ -10,16 +10,15 @@ from dataclasses import dataclass, replace
 from math import atan2
 
 import numpy as np
-
-from schemas.packing import BASKET_TOP, TABLE_TOP
-from schemas.plan import Failure
-from stages.pack.arm import Limits, ToolPose
-from stages.pack.hand import Named, place_tool_pose, release_height, tool_over_centre
-from stages.pack.instances import Instance
-from stages.pack.motion import HOME_STANCE, Motion, MotionPlanner, Stance
-from stages.pack.records import Action, BoxState
-from stages.pack.settling import Rest, SettlingTable, rest_of
-from stages.pack.solids import Block, block_over, flat_depth
+from scenewright.schemas.packing import BASKET_TOP, TABLE_TOP
+from scenewright.schemas.plan import Failure
+from scenewright.stages.pack.arm import Limits, ToolPose
+from scenewright.stages.pack.hand import Named, place_tool_pose, release_height, tool_over_centre
+from scenewright.stages.pack.instances import Instance
+from scenewright.stages.pack.motion import HOME_STANCE, Motion, MotionPlanner, Stance
+from scenewright.stages.pack.records import Action, BoxState
+from scenewright.stages.pack.settling import Rest, SettlingTable, rest_of
+from scenewright.stages.pack.solids import Block, block_over, flat_depth
 
 GOAL_MARGIN = 0.015
 """A box is in the basket when its bounds lie within the basket's grown by this on each side [m]."""

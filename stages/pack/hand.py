@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.kit.motion.failures import MotionFailed
-from stages.pack.arm import ToolPose
-from stages.pack.records import BoxState
-from stages.pack.solids import Block, overlap
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.pack.arm import ToolPose
+from scenewright.stages.pack.records import BoxState
+from scenewright.stages.pack.solids import Block, overlap
 
 # Measured on the collision meshes with the fingers 8 cm apart; heights from the tool point, metres.
 PALM = (0.032, 0.104, 0.038, 0.133)

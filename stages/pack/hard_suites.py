@@ -11,15 +11,14 @@ from dataclasses import dataclass, replace
 from math import hypot, pi
 
 import numpy as np
-
-from schemas.errors import UsageError
-from stages.pack.arm import Limits
-from stages.pack.environment import PackingWorld
-from stages.pack.instances import BASKETS, Instance, Obstacle, centred
-from stages.pack.loop import Budget, run_loop
-from stages.pack.motion import MotionPlanner
-from stages.pack.records import Action, BoxState, Observation, Rectangle
-from stages.pack.sampling import pick_and_place
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.pack.arm import Limits
+from scenewright.stages.pack.environment import PackingWorld
+from scenewright.stages.pack.instances import BASKETS, Instance, Obstacle, centred
+from scenewright.stages.pack.loop import Budget, run_loop
+from scenewright.stages.pack.motion import MotionPlanner
+from scenewright.stages.pack.records import Action, BoxState, Observation, Rectangle
+from scenewright.stages.pack.sampling import pick_and_place
 
 STARTS = (
     (0.39, -0.12),

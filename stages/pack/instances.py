@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.pack.records import Action, BoxState, Observation, Rectangle
-from stages.pack.solids import Block, block_over
+from scenewright.stages.pack.records import Action, BoxState, Observation, Rectangle
+from scenewright.stages.pack.solids import Block, block_over
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from schemas.plan import Failure
-from stages.kit.language.actions import ActionLanguage, ActionType, NumberRange, quoted
-from stages.kit.language.messages import Message, say
-from stages.pack.records import Action, Attempt, BoxState, Observation, Rectangle, StepFeedback
+from scenewright.schemas.plan import Failure
+from scenewright.stages.kit.language.actions import ActionLanguage, ActionType, NumberRange, quoted
+from scenewright.stages.kit.language.messages import Message, say
+from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation, Rectangle, StepFeedback
 
 Variant = Literal["backtrack", "scratch", "symbolic"]
 X_RANGE, Y_RANGE, THETA_RANGE = NumberRange(0.0, 1.0, "m"), NumberRange(-1.0, 1.0, "m"), NumberRange(-3.14, 3.14, "rad")

@@ -6,17 +6,16 @@ from collections.abc import Callable, Sequence
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.base import Model
-from schemas.plan import Failure
-from stages.kit.language.actions import LONGEST_NAME, ActionCall, quoted
-from stages.kit.language.chat import Chat
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import say
-from stages.kit.language.plan_schema import plan_schema
-from stages.kit.language.reply_schema import schema_of
-from stages.pack.language_prompt import packing_language, prompt, refused_order_text
-from stages.pack.records import Action, Attempt, Observation
+from scenewright.schemas.base import Model
+from scenewright.schemas.plan import Failure
+from scenewright.stages.kit.language.actions import LONGEST_NAME, ActionCall, quoted
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import say
+from scenewright.stages.kit.language.plan_schema import plan_schema
+from scenewright.stages.kit.language.reply_schema import schema_of
+from scenewright.stages.pack.language_prompt import packing_language, prompt, refused_order_text
+from scenewright.stages.pack.records import Action, Attempt, Observation
 
 TRACE_LENGTH = 5
 """Attempts that the authors' configurations show to the model."""

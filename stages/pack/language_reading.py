@@ -6,7 +6,7 @@ import json
 import re
 from dataclasses import dataclass, field
 
-from stages.pack.language_prompt import ATTEMPT, FAILS, FEASIBLE, NOT_IN_BASKET, NOT_TRIED, REFUSED_ORDER
+from scenewright.stages.pack.language_prompt import ATTEMPT, FAILS, FEASIBLE, NOT_IN_BASKET, NOT_TRIED, REFUSED_ORDER
 
 NAME = r'("(?:[^"\\]|\\.)*")'
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e-?\d+)?)"

@@ -15,12 +15,11 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-
-from stages.kit.language.backend import Request
-from stages.kit.language.chat import Chat, ChatSettings
-from stages.kit.language.scripted import ScriptedBackend
-from stages.pack.language_prompt import Variant
-from stages.pack.language_reading import Place, Seen, SeenPlan, read_prompt
+from scenewright.stages.kit.language.backend import Request
+from scenewright.stages.kit.language.chat import Chat, ChatSettings
+from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.pack.language_prompt import Variant
+from scenewright.stages.pack.language_reading import Place, Seen, SeenPlan, read_prompt
 
 PLACES_LOOKED_AT = 3
 TURNED = 0.2

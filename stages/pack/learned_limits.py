@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf
 
-from stages.pack.hand import hand_blocks, place_tool_pose
-from stages.pack.records import Action, Attempt, BoxState, Observation, Rectangle
-from stages.pack.solids import block_over, flat_depth
+from scenewright.stages.pack.hand import hand_blocks, place_tool_pose
+from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation, Rectangle
+from scenewright.stages.pack.solids import block_over, flat_depth
 
 REACH_MARGIN = 0.001
 REFUSED_SIDE = 0.012

@@ -11,10 +11,9 @@ from functools import cache
 from math import ceil, floor
 
 import numpy as np
-
-from stages.kit.simulation.shapes import link_shapes
-from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
-from stages.pack.arm import FixedArm, Limits, planar_joints
+from scenewright.stages.kit.simulation.shapes import link_shapes
+from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from scenewright.stages.pack.arm import FixedArm, Limits, planar_joints
 
 STEP = 0.02
 MARGIN = 0.02

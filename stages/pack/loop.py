@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from schemas.plan import Failure
-from stages.kit.motion.failures import MotionFailed
-from stages.pack.environment import PackingWorld, State, WrongAction
-from stages.pack.motion import Motion
-from stages.pack.records import Action, Attempt, Proposer, StepFeedback
+from scenewright.schemas.plan import Failure
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.pack.environment import PackingWorld, State, WrongAction
+from scenewright.stages.pack.motion import Motion
+from scenewright.stages.pack.records import Action, Attempt, Proposer, StepFeedback
 
 ITERATIONS = 20
 """Cap of proposer calls of the thesis."""

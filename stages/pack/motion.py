@@ -13,14 +13,13 @@ from functools import partial
 from math import atan2, ceil, cos, hypot, pi, sin
 
 import numpy as np
-
-from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
-from stages.pack.arm import HOME, FixedArm, Limits, ToolPose, planar_joints
-from stages.pack.arm_scene import ArmScene
-from stages.pack.hand import TIP_BELOW_TOOL, Named, end_collision, hand_blocks, held_block, tool_over_centre
-from stages.pack.link_heights import BASE_RADIUS, lowest_on_path, lowest_within
-from stages.pack.records import BoxState
-from stages.pack.solids import overlap
+from scenewright.stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
+from scenewright.stages.pack.arm import HOME, FixedArm, Limits, ToolPose, planar_joints
+from scenewright.stages.pack.arm_scene import ArmScene
+from scenewright.stages.pack.hand import TIP_BELOW_TOOL, Named, end_collision, hand_blocks, held_block, tool_over_centre
+from scenewright.stages.pack.link_heights import BASE_RADIUS, lowest_on_path, lowest_within
+from scenewright.stages.pack.records import BoxState
+from scenewright.stages.pack.solids import overlap
 
 OVER = 0.015
 """What is carried over something passes this far above it [m]."""

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from math import hypot, pi
 
 import numpy as np
-
-from schemas.packing import BASKET_TOP
-from schemas.plan import Failure
-from stages.pack.hand import hand_blocks, place_tool_pose
-from stages.pack.layout_search import LayoutProblem, find_layout
-from stages.pack.learned_limits import LearnedLimits, learn
-from stages.pack.records import Action, Attempt, BoxState, Observation
-from stages.pack.sampling import pick_and_place
+from scenewright.schemas.packing import BASKET_TOP
+from scenewright.schemas.plan import Failure
+from scenewright.stages.pack.hand import hand_blocks, place_tool_pose
+from scenewright.stages.pack.layout_search import LayoutProblem, find_layout
+from scenewright.stages.pack.learned_limits import LearnedLimits, learn
+from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation
+from scenewright.stages.pack.sampling import pick_and_place
 
 QUARTER = pi / 2
 RESTARTS = (2, 2, 3, 6, 16, 16, 16)

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.packing import Packing
-from stages.kit.language.options import LanguageParameters
-from stages.kit.stage import External, Optionally, Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.packing import Packing
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.stage import External, Optionally, Stage
 
 Suite = Literal[
     "published/easy",

@@ -10,13 +10,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from PIL import Image
-
-from stages.kit.drawing.plan_tree import CUT, REACHED, UNMET, Branch, plan_tree
-from stages.pack.environment import PackingWorld, clipped
-from stages.pack.hand import held_block, place_tool_pose
-from stages.pack.loop import PackingRun
-from stages.pack.records import Action, Attempt, BoxState
-from stages.pack.scene_picture import render_scene
+from scenewright.stages.kit.drawing.plan_tree import CUT, REACHED, UNMET, Branch, plan_tree
+from scenewright.stages.pack.environment import PackingWorld, clipped
+from scenewright.stages.pack.hand import held_block, place_tool_pose
+from scenewright.stages.pack.loop import PackingRun
+from scenewright.stages.pack.records import Action, Attempt, BoxState
+from scenewright.stages.pack.scene_picture import render_scene
 
 BOX_COLORS = {
     "red": "#c8553d",

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.packing import TABLE_TOP, PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
-from stages.kit.motion.failures import MotionFailed
-from stages.pack.arm import HOME, FixedArm, Limits, ToolPose
-from stages.pack.environment import X_RANGE, Y_RANGE, upright_block
-from stages.pack.hand import tool_over_centre
-from stages.pack.instances import Instance, Obstacle
-from stages.pack.records import BoxState, Rectangle
-from stages.pack.solids import overlap
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.packing import TABLE_TOP, PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.pack.arm import HOME, FixedArm, Limits, ToolPose
+from scenewright.stages.pack.environment import X_RANGE, Y_RANGE, upright_block
+from scenewright.stages.pack.hand import tool_over_centre
+from scenewright.stages.pack.instances import Instance, Obstacle
+from scenewright.stages.pack.records import BoxState, Rectangle
+from scenewright.stages.pack.solids import overlap
 
 LARGEST_FILE = 1_000_000
 FORM = "docs/LLM3.md shows the form"

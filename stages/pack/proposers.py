@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stages.kit.language.chat import Chat
-from stages.pack.backtracking import Backtracking, CornerBacktracking
-from stages.pack.language_prompt import Variant
-from stages.pack.language_proposer import LanguageProposer, SymbolicProposer
-from stages.pack.own_proposer import OwnProposer, placement_solver
-from stages.pack.records import Proposer
-from stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.pack.backtracking import Backtracking, CornerBacktracking
+from scenewright.stages.pack.language_prompt import Variant
+from scenewright.stages.pack.language_proposer import LanguageProposer, SymbolicProposer
+from scenewright.stages.pack.own_proposer import OwnProposer, placement_solver
+from scenewright.stages.pack.records import Proposer
+from scenewright.stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from schemas.plan import Failure
+from scenewright.schemas.plan import Failure
 
 TWO = tuple[float, float]
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from math import cos, pi, sin
 
 import numpy as np
-
-from stages.pack.records import Action, Attempt, BoxState, Observation
+from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation
 
 QUARTER_TURNS = (0.0, pi / 2)
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.colors import to_rgba
-
-from schemas.packing import BASKET_TOP, TABLE_TOP
-from stages.kit.simulation.engine import engine, native_output_to_stderr
-from stages.pack.arm import FixedArm
-from stages.pack.arm_scene import FINGER_OPENING
-from stages.pack.records import Rectangle
-from stages.pack.solids import Block, block_over
+from scenewright.schemas.packing import BASKET_TOP, TABLE_TOP
+from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
+from scenewright.stages.pack.arm import FixedArm
+from scenewright.stages.pack.arm_scene import FINGER_OPENING
+from scenewright.stages.pack.records import Rectangle
+from scenewright.stages.pack.solids import Block, block_over
 
 TABLE_COLOR, BASKET_COLOR = "#d8d2c4", "#a98d5f"
 FACTOR = 2

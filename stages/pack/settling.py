@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP
-from stages.kit.simulation.engine import engine
-from stages.pack.instances import Instance
-from stages.pack.records import BoxState
+from scenewright.schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.pack.instances import Instance
+from scenewright.stages.pack.records import BoxState
 
 TIME_STEP = 1 / 240
 STEPS = 100

@@ -6,24 +6,23 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-
-from schemas.packing import Packing, PackingAttempt, PackingFile, PackingStep
-from stages.kit.language.chat import Chat
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.opening import open_chat
-from stages.kit.stage import Context
-from stages.pack.environment import PackingWorld
-from stages.pack.hard_suites import hard_instance
-from stages.pack.instances import Instance, published_instance
-from stages.pack.language_prompt import Variant
-from stages.pack.language_scripted import scripted_backend
-from stages.pack.loop import Budget, GaveUp, PackingRun, run_loop
-from stages.pack.motion import MotionPlanner
-from stages.pack.parameters import PackParameters
-from stages.pack.pictures import draw_attempts, draw_layout, draw_scene
-from stages.pack.problem_file import read_problem, to_file
-from stages.pack.proposers import PROPOSERS, Setting
-from stages.pack.records import Action, Attempt, Observation, Proposer
+from scenewright.schemas.packing import Packing, PackingAttempt, PackingFile, PackingStep
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.opening import open_chat
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.pack.environment import PackingWorld
+from scenewright.stages.pack.hard_suites import hard_instance
+from scenewright.stages.pack.instances import Instance, published_instance
+from scenewright.stages.pack.language_prompt import Variant
+from scenewright.stages.pack.language_scripted import scripted_backend
+from scenewright.stages.pack.loop import Budget, GaveUp, PackingRun, run_loop
+from scenewright.stages.pack.motion import MotionPlanner
+from scenewright.stages.pack.parameters import PackParameters
+from scenewright.stages.pack.pictures import draw_attempts, draw_layout, draw_scene
+from scenewright.stages.pack.problem_file import read_problem, to_file
+from scenewright.stages.pack.proposers import PROPOSERS, Setting
+from scenewright.stages.pack.records import Action, Attempt, Observation, Proposer
 
 INSTANCES: dict[str, Callable[[str, PackParameters], Instance]] = {
     "published": lambda cell, parameters: published_instance(cell, parameters.instance),

@@ -8,17 +8,16 @@ from functools import cache
 from typing import Literal, Protocol
 
 import numpy as np
-
-from schemas.plan import Check
-from schemas.scene_parts import Joint
-from stages.kit.declared import declared_in
-from stages.kit.motion.physical_robot import PhysicalRobot
-from stages.kit.motion.segments import Manipulation
-from stages.kit.tasks.strips import Schema
-from stages.plan.believed_tree import TreeState
-from stages.plan.checks import GoalInRoom
-from stages.plan.pick_place import Budgets, GraspStyle
-from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
+from scenewright.schemas.plan import Check
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
+from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.tasks.strips import Schema
+from scenewright.stages.plan.believed_tree import TreeState
+from scenewright.stages.plan.checks import GoalInRoom
+from scenewright.stages.plan.pick_place import Budgets, GraspStyle
+from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 
 
 class Execution(Protocol):
@@ -144,7 +143,7 @@ class PlanAction:
 @cache
 def all_actions() -> tuple[PlanAction, ...]:
     """Return every declared action in the order of the domain."""
-    return declared_in("stages.plan.actions", PlanAction, "ACTION")
+    return declared_in("scenewright.stages.plan.actions", PlanAction, "ACTION")
 
 
 @cache

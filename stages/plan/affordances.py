@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply
-from stages.kit.motion.grasps import narrowest_width
-from stages.kit.motion.kinematics import reach, shoulder_height
-from stages.kit.simulation.robot_description import RobotDescription
-from stages.kit.simulation.world import FRICTION, GRAVITY
-from stages.kit.tasks.strips import Atom
-from stages.plan.regions import Region
-from stages.plan.rim_grasps import has_rim
-from stages.plan.world_model import WorldModel
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.motion.grasps import narrowest_width
+from scenewright.stages.kit.motion.kinematics import reach, shoulder_height
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.kit.simulation.world import FRICTION, GRAVITY
+from scenewright.stages.kit.tasks.strips import Atom
+from scenewright.stages.plan.regions import Region
+from scenewright.stages.plan.rim_grasps import has_rim
+from scenewright.stages.plan.world_model import WorldModel
 
 LAYOUT = ("floor", "wall", "ceiling")
 CARRIER_CLASSES = ("tray", "plate")

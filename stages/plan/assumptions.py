@@ -10,16 +10,15 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.base import as_transform, as_vector
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.errors import UsageError
-from schemas.interactive_scene import SceneBody
-from schemas.plan import BodyMatch
-from schemas.scene_parts import Box, Relation
-from stages.kit.geometry.transforms import apply, transform_from_yaw
-from stages.plan.regions import Region
-from stages.plan.world_model import WorldModel
+from scenewright.schemas.base import as_transform, as_vector
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.plan import BodyMatch
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
+from scenewright.stages.plan.regions import Region
+from scenewright.stages.plan.world_model import WorldModel
 
 USUAL: dict[str, tuple[float, float, float]] = {
     "bottle": (0.066, 0.22, 0.5),

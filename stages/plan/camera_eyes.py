@@ -7,23 +7,22 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import scaled
-from stages.kit.geometry.transforms import apply, inverse, look_at
-from stages.kit.rendering.object_views import LEAST_PIXELS, View, cloud, take
-from stages.kit.rendering.segmenter_errors import SegmenterErrors, quarter_turn
-from stages.kit.simulation.shapes import link_shapes, surface_points
-from stages.plan.affordances import CARRIER_CLASSES
-from stages.plan.correspondence import alike
-from stages.plan.erring_robot import ErringRobot
-from stages.plan.eyes import CELL, NEAR_BY, Room, Seen
-from stages.plan.furniture_fit import FittedFurniture, Range, fit_furniture
-from stages.plan.pictures import RoomPictures
-from stages.plan.pose_fit import fit_upright
-from stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
-from stages.plan.seen_things import SeenThings
-from stages.plan.world_model import WorldModel, body_planes, moved_record
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
+from scenewright.stages.kit.rendering.object_views import LEAST_PIXELS, View, cloud, take
+from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors, quarter_turn
+from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
+from scenewright.stages.plan.affordances import CARRIER_CLASSES
+from scenewright.stages.plan.correspondence import alike
+from scenewright.stages.plan.erring_robot import ErringRobot
+from scenewright.stages.plan.eyes import CELL, NEAR_BY, Room, Seen
+from scenewright.stages.plan.furniture_fit import FittedFurniture, Range, fit_furniture
+from scenewright.stages.plan.pictures import RoomPictures
+from scenewright.stages.plan.pose_fit import fit_upright
+from scenewright.stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
+from scenewright.stages.plan.seen_things import SeenThings
+from scenewright.stages.plan.world_model import WorldModel, body_planes, moved_record
 
 CAMERA = Camera(width=240, height=180, fx=260.0, fy=260.0, cx=119.5, cy=89.5)
 EYES = ((0.0, 1.35), (0.2, 0.85))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping
 
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 HAND = "hand"
 """Parent of what is held."""

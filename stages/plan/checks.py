@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.plan import Check
-from stages.kit.geometry.transforms import apply
-from stages.kit.simulation.shapes import link_shapes
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.schemas.plan import Check
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.simulation.shapes import link_shapes
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 AT_REST = 0.02
 """Largest speed of something that lies still [m/s]."""

@@ -6,26 +6,25 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-
-from schemas.interactive_scene import SceneBody
-from schemas.plan import BodyMatch, Failure
-from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import inverse
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import forward
-from stages.kit.motion.physical_robot import PhysicalRobot
-from stages.kit.motion.segments import Segment, whole_body
-from stages.kit.simulation.robot import base_pose
-from stages.plan.action import MotionRequest, action_named
-from stages.plan.carriers import NOTHING, carrier
-from stages.plan.correspondence import match_joint
-from stages.plan.erring_robot import ErringRobot
-from stages.plan.eyes import Eyes, Room
-from stages.plan.level_carrying import LEVEL_PACE, levelled
-from stages.plan.pick_place import Budgets
-from stages.plan.refinement import DRIVE, Step, grasp_style, put_there_later, refine_action
-from stages.plan.world_model import RobotState, Snapshot, WorldModel, hold_for_checks
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.plan import BodyMatch, Failure
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import forward
+from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
+from scenewright.stages.kit.motion.segments import Segment, whole_body
+from scenewright.stages.kit.simulation.robot import base_pose
+from scenewright.stages.plan.action import MotionRequest, action_named
+from scenewright.stages.plan.carriers import NOTHING, carrier
+from scenewright.stages.plan.correspondence import match_joint
+from scenewright.stages.plan.erring_robot import ErringRobot
+from scenewright.stages.plan.eyes import Eyes, Room
+from scenewright.stages.plan.level_carrying import LEVEL_PACE, levelled
+from scenewright.stages.plan.pick_place import Budgets
+from scenewright.stages.plan.refinement import DRIVE, Step, grasp_style, put_there_later, refine_action
+from scenewright.stages.plan.world_model import RobotState, Snapshot, WorldModel, hold_for_checks
 
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""

@@ -6,11 +6,10 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
-
-from schemas.interactive_scene import SceneBody
-from schemas.plan import BodyMatch
-from schemas.scene_parts import Joint
-from stages.kit.simulation.urdf_split import PART_SEPARATOR
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.plan import BodyMatch
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR
 
 ALIKE = ({"table", "desk"}, {"cabinet", "wall_cabinet"})
 """Classes that segmentation and CAD matching confuse, and that serve the same purpose."""

@@ -8,8 +8,8 @@ off the geometry once; the other predicates change. The actions are the files of
 
 from __future__ import annotations
 
-from stages.kit.tasks.strips import Domain
-from stages.plan.action import all_actions
+from scenewright.stages.kit.tasks.strips import Domain
+from scenewright.stages.plan.action import all_actions
 
 START = "start"
 

@@ -6,18 +6,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import apply
-from stages.kit.motion.arcs import Arc, along_arc, arc_values, tilts
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.base_placement import possible_bases, shoulder_distance
-from stages.kit.motion.doors import ContactPoint, body_from_moved, closing_direction, open_value, push_points
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.segments import Manipulation
-from stages.plan.action import MotionRequest
-from stages.plan.pick_place import Budgets
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.motion.arcs import Arc, along_arc, arc_values, tilts
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.base_placement import possible_bases, shoulder_distance
+from scenewright.stages.kit.motion.doors import (
+    ContactPoint,
+    body_from_moved,
+    closing_direction,
+    open_value,
+    push_points,
+)
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.plan.action import MotionRequest
+from scenewright.stages.plan.pick_place import Budgets
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 OVERSHOOT = 0.02
 """A door is pushed this much beyond shut [rad]; its limit stops it."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.motion.base_placement import plan_drive
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.robot_errors import LOCALISATION
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.stages.kit.motion.base_placement import plan_drive
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.robot_errors import LOCALISATION
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 ROOM = 2.5 * LOCALISATION
 """Kept to everything on the way, where that is possible [m]: so far beside its way may the base be."""

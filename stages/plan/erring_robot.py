@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.motion.physical_robot import PhysicalRobot
-from stages.kit.motion.robot_errors import encoder_errors, stop_error
-from stages.kit.motion.segments import Segment
-from stages.kit.simulation.robot import Configuration, base_pose
-from stages.kit.simulation.robot_description import RobotDescription
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
+from scenewright.stages.kit.motion.robot_errors import encoder_errors, stop_error
+from scenewright.stages.kit.motion.segments import Segment
+from scenewright.stages.kit.simulation.robot import Configuration, base_pose
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 MOVED = 1e-9
 """Rows whose bases differ by more drive it [m], [rad]."""

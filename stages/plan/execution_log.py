@@ -10,11 +10,10 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import Message
-
-from schemas.scene_parts import Camera
-from stages.kit.formats import foxglove
-from stages.kit.formats.foxglove_log import foxglove_log
-from stages.kit.motion.recording import Snapshot
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.foxglove_log import foxglove_log
+from scenewright.stages.kit.motion.recording import Snapshot
 
 COLOR, CALIBRATION, TRANSFORMS = "/camera/color", "/camera/calibration", "/tf"
 _KINDS: dict[str, type[Message]] = {COLOR: CompressedImage, CALIBRATION: CameraCalibration, TRANSFORMS: FrameTransforms}

@@ -8,14 +8,13 @@ from math import hypot
 from typing import Protocol
 
 import numpy as np
-
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import SurfacePlane
-from stages.kit.motion.physical_robot import PhysicalRobot
-from stages.kit.rendering.segmenter_errors import SegmenterErrors, quarter_turn
-from stages.plan.correspondence import renamed
-from stages.plan.erring_robot import ErringRobot
-from stages.plan.world_model import WorldModel, moved_record, true_record
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
+from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors, quarter_turn
+from scenewright.stages.plan.correspondence import renamed
+from scenewright.stages.plan.erring_robot import ErringRobot
+from scenewright.stages.plan.world_model import WorldModel, moved_record, true_record
 
 NEAR_BY = 1.5
 """From so near a look counts as one from near by [m]."""

@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
-from schemas.errors import UsageError
-from stages.kit.tasks.pddl_expressions import Expression, entries, parse_expression, typed_names, word
-from stages.kit.tasks.strips import Atom
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.tasks.pddl_expressions import Expression, entries, parse_expression, typed_names, word
+from scenewright.stages.kit.tasks.strips import Atom
 
 MOST_INSTANCES, MOST_ALTERNATIVES, DEEPEST = 20_000, 512, 12
 """Of a quantifier's bindings in all; of the goal; of nested parts."""

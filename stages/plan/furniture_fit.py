@@ -13,12 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.kit.geometry.cameras import project
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.rendering.object_views import View
+from scenewright.stages.plan.pose_fit import FAR, KEPT, SURE
 from scipy.spatial import cKDTree
-
-from stages.kit.geometry.cameras import project
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.rendering.object_views import View
-from stages.plan.pose_fit import FAR, KEPT, SURE
 
 ROUNDS = 15
 FEW, MANY = 500, 2000

@@ -13,21 +13,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput
-from schemas.learned_domain import LearnedDomainFile
-from schemas.outside import LARGEST_SETTINGS, file_text
-from schemas.plan import Check
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Predicate, check, read
-from stages.kit.predicates.goal_words import goal_phrases
-from stages.kit.predicates.room import ROOM_WORDS, perceive
-from stages.kit.simulation.urdf_split import PART_SEPARATOR
-from stages.kit.tasks.pddl import parse_domain
-from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, Schema, positive_task
-from stages.plan.action import action_named, all_actions
-from stages.plan.domain import DOMAIN
-from stages.plan.world_model import WorldModel
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.learned_domain import LearnedDomainFile
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_text
+from scenewright.schemas.plan import Check
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Predicate, check, read
+from scenewright.stages.kit.predicates.goal_words import goal_phrases
+from scenewright.stages.kit.predicates.room import ROOM_WORDS, perceive
+from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR
+from scenewright.stages.kit.tasks.pddl import parse_domain
+from scenewright.stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, Schema, positive_task
+from scenewright.stages.plan.action import action_named, all_actions
+from scenewright.stages.plan.domain import DOMAIN
+from scenewright.stages.plan.world_model import WorldModel
 
 FAMILIES = {"pick": ("pick", "lift", "take_out"), "place": ("place", "stack")}
 """Operators that several of the chain's schemas carry out; other names stand for the schema of that name."""

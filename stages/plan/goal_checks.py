@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from schemas.plan import BodyMatch, Check
-from stages.kit.simulation.world import PhysicsWorld
-from stages.plan.action import goal_checks
-from stages.plan.checks import GoalInRoom
+from scenewright.schemas.plan import BodyMatch, Check
+from scenewright.stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.plan.action import goal_checks
+from scenewright.stages.plan.checks import GoalInRoom
 
 
 def check_goal(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply
-from stages.kit.motion.grasps import narrowest_width
-from stages.kit.tasks.strips import Atom, atom_text
-from stages.plan.world_model import WorldModel
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.motion.grasps import narrowest_width
+from scenewright.stages.kit.tasks.strips import Atom, atom_text
+from scenewright.stages.plan.world_model import WorldModel
 
 TABLE_CLASSES = ("table", "desk")
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
-
-from stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.kit.geometry.transforms import quaternion_of
 
 
 def joined_text(carrier: str, load: dict[str, tuple[str, np.ndarray]]) -> str:

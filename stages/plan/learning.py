@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from schemas.plan import Failure
-from stages.kit.simulation.urdf_split import PART_SEPARATOR
-from stages.kit.tasks.strips import Atom, GroundAction, atom_text
-from stages.plan.action import schemas_of_hand
+from scenewright.schemas.plan import Failure
+from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR
+from scenewright.stages.kit.tasks.strips import Atom, GroundAction, atom_text
+from scenewright.stages.plan.action import schemas_of_hand
 
 TAKING, PUTTING = schemas_of_hand("takes"), schemas_of_hand("puts")
 MOVED = "moved"

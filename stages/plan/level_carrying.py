@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import forward
+from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_body
+from scenewright.stages.kit.simulation.robot import Configuration, base_pose
+from scenewright.stages.plan.placements import Placement
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import inverse, transform_from_yaw
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import forward
-from stages.kit.motion.segments import Manipulation, Segment, whole_body
-from stages.kit.simulation.robot import Configuration, base_pose
-from stages.plan.placements import Placement
-from stages.plan.world_model import RobotState, WorldModel
 
 RAISE = 0.12
 """Height over the surface at which a laden tray is moved sideways [m]."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.errors import BadInput, UsageError
-from schemas.language_map import LanguageMap
-from stages.kit.open_words.embedded import EmbeddedEncoder
-from stages.kit.open_words.encoder import check_width, checked_text
-from stages.kit.open_words.finding import Finder
-from stages.plan.domain import DOMAIN
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.stages.kit.open_words.embedded import EmbeddedEncoder
+from scenewright.stages.kit.open_words.encoder import check_width, checked_text
+from scenewright.stages.kit.open_words.finding import Finder
+from scenewright.stages.plan.domain import DOMAIN
 
 LEAST_PROBABILITY = 0.5
 """A node is not taken for what a goal names when it is less likely."""

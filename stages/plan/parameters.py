@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.language_map import LanguageMap
-from schemas.plan import Plan
-from schemas.sequence import Sequence
-from stages.kit.estimates import grows_with
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.schemas.plan import Plan
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class PlanParameters(Parameters):
@@ -88,7 +87,7 @@ class PlanParameters(Parameters):
 
 def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
     """Return the files of `data/` that describe the robot, the user's own by their whole path, and what words need."""
-    from stages.kit.simulation.robot_description import FOLDER, description_files
+    from scenewright.stages.kit.simulation.robot_description import FOLDER, description_files
 
     files = [file.resolve() for file in description_files(parameters.robot)]
     names = [str(file.relative_to(FOLDER.parent) if FOLDER in file.parents else file) for file in files]

@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.base_placement import free_bases, possible_bases
-from stages.kit.motion.collision import RESTING_DEPTH
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
-from stages.kit.motion.segments import Manipulation, Segment, whole_body
-from stages.kit.simulation.robot import Configuration
-from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
-from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
-from stages.plan.rim_grasps import rim_grasps
-from stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.base_placement import free_bases, possible_bases
+from scenewright.stages.kit.motion.collision import RESTING_DEPTH
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
+from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_body
+from scenewright.stages.kit.simulation.robot import Configuration
+from scenewright.stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
+from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements
+from scenewright.stages.plan.rim_grasps import rim_grasps
+from scenewright.stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
 LIFT = 0.03

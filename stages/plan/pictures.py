@@ -6,17 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import trimesh
-
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import apply, look_at
-from stages.kit.motion.recording import Snapshot, moving_links
-from stages.kit.rendering.light_map import AreaLight
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.kit.rendering.surfaces import TriangleSoup, build_soup
-from stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
-from stages.kit.simulation.shapes import has_colors, link_shapes, paint
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import apply, look_at
+from scenewright.stages.kit.motion.recording import Snapshot, moving_links
+from scenewright.stages.kit.rendering.light_map import AreaLight
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup
+from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
+from scenewright.stages.kit.simulation.shapes import has_colors, link_shapes, paint
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 HAND, FINGER, PEDESTAL, ARM = (70, 72, 78), (40, 42, 46), (58, 66, 84), (236, 238, 240)
 """Colours of the robot."""

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.plan.regions import CELL, NEAR_LEVEL, Region
-from stages.plan.world_model import WorldModel
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.plan.regions import CELL, NEAR_LEVEL, Region
+from scenewright.stages.plan.world_model import WorldModel
 
 PUT_DOWN_HEIGHT = 0.006
 """Items are let go this far over the surface [m]."""

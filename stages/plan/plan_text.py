@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.plan import PlanFile
-from stages.plan.refinement import Step
+from scenewright.schemas.plan import PlanFile
+from scenewright.stages.plan.refinement import Step
 
 
 def plan_text(plan: PlanFile, steps: list[Step]) -> str:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import apply
 from scipy.spatial import cKDTree
-
-from stages.kit.geometry.transforms import apply
 
 ROUNDS = 25
 KEPT = 0.8

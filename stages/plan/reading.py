@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import UsageError
-from schemas.plan import Check
-from stages.kit.predicates.room import UNSEEN
-from stages.kit.simulation.urdf_split import PART_SEPARATOR
-from stages.kit.tasks.strips import Atom, GroundAction, Problem, positive_task
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan.domain import DOMAIN
-from stages.plan.formulas import Alternative, Names, alternatives, literal_text, together
-from stages.plan.given_domain import TAUGHT, GivenDomain
-from stages.plan.symbols import parse_goal, task_problem
-from stages.plan.world_model import WorldModel
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.plan import Check
+from scenewright.stages.kit.predicates.room import UNSEEN
+from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR
+from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem, positive_task
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan.domain import DOMAIN
+from scenewright.stages.plan.formulas import Alternative, Names, alternatives, literal_text, together
+from scenewright.stages.plan.given_domain import TAUGHT, GivenDomain
+from scenewright.stages.plan.symbols import parse_goal, task_problem
+from scenewright.stages.plan.world_model import WorldModel
 
 MOST_GOALS, GOAL_STATES = 6, 6000
 """Alternatives of a goal that are given geometry; states of the search that ranks them."""

@@ -6,19 +6,18 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-
-from schemas.plan import Failure, TriedPlan
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.segments import Manipulation, Segment
-from stages.kit.tasks.fast_downward import plan_with_fast_downward
-from stages.kit.tasks.strips import Atom, GroundAction, Problem, apply_action, atom_text
-from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
-from stages.plan.action import MotionRequest, action_named
-from stages.plan.domain import DOMAIN, START
-from stages.plan.driving import drive_way
-from stages.plan.learning import Lessons
-from stages.plan.pick_place import Budgets, GraspStyle
-from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
+from scenewright.schemas.plan import Failure, TriedPlan
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.segments import Manipulation, Segment
+from scenewright.stages.kit.tasks.fast_downward import plan_with_fast_downward
+from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem, apply_action, atom_text
+from scenewright.stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
+from scenewright.stages.plan.action import MotionRequest, action_named
+from scenewright.stages.plan.domain import DOMAIN, START
+from scenewright.stages.plan.driving import drive_way
+from scenewright.stages.plan.learning import Lessons
+from scenewright.stages.plan.pick_place import Budgets, GraspStyle
+from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 
 TASK_STATES = (6000, 50_000)
 """Most states of one task search, and of one for a shortest plan: tasks of rooms take some hundreds."""

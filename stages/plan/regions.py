@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from schemas.scene_parts import Joint
-from stages.kit.motion.doors import body_from_moved
-from stages.kit.simulation.shapes import joined
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.motion.doors import body_from_moved
+from scenewright.stages.kit.simulation.shapes import joined
 
 LEVEL = 0.98
 MERGE_HEIGHT = 0.006

@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.plan import Failure, TriedPlan
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.tasks.strips import Atom, GroundAction, Problem
-from stages.plan.believed_tree import TreeState
-from stages.plan.reading import Reading
-from stages.plan.refinement import Attempt, Step
-from stages.plan.symbols import symbolic_state
-from stages.plan.tree_state import graph_of_state
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.plan import Failure, TriedPlan
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem
+from scenewright.stages.plan.believed_tree import TreeState
+from scenewright.stages.plan.reading import Reading
+from scenewright.stages.plan.refinement import Attempt, Step
+from scenewright.stages.plan.symbols import symbolic_state
+from scenewright.stages.plan.tree_state import graph_of_state
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 Search = Callable[[RobotState, tuple[Problem, list[GroundAction]]], Attempt]
 """Task and motion planning from a robot's state, in the model as it is."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.motion.grasps import Grasp
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.motion.grasps import Grasp
 
 if TYPE_CHECKING:
-    from stages.plan.world_model import WorldModel
+    from scenewright.stages.plan.world_model import WorldModel
 
 DEPTH = 0.024
 """How far the tool point goes below the rim [m]."""

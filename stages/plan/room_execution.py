@@ -7,35 +7,34 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene, SceneBody
-from schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.physical_robot import PhysicalRobot
-from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
-from stages.kit.simulation.robot import Configuration
-from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
-from stages.kit.stage import Context
-from stages.plan.assumptions import Belief, match_beliefs
-from stages.plan.believed_tree import TreeState
-from stages.plan.camera_eyes import CameraEyes
-from stages.plan.conduct import Conduct, joint_pairs
-from stages.plan.correspondence import match_bodies
-from stages.plan.erring_robot import ErringRobot
-from stages.plan.execution_log import write_execution
-from stages.plan.eyes import Eyes, NoisyEyes, Room, TrueEyes
-from stages.plan.goal_checks import check_goal
-from stages.plan.parameters import PlanParameters
-from stages.plan.pick_place import Budgets
-from stages.plan.pictures import RoomPictures, picture_camera
-from stages.plan.reading import Reading
-from stages.plan.refinement import Step
-from stages.plan.replanning import Replanning, Search
-from stages.plan.trajectories import executed_rows
-from stages.plan.tree_state import after_step, graph_of_state, observed_state, start_state, tree_differences
-from stages.plan.world_model import RobotState, WorldModel, body_planes
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene, SceneBody
+from scenewright.schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
+from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
+from scenewright.stages.kit.simulation.robot import Configuration
+from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.plan.assumptions import Belief, match_beliefs
+from scenewright.stages.plan.believed_tree import TreeState
+from scenewright.stages.plan.camera_eyes import CameraEyes
+from scenewright.stages.plan.conduct import Conduct, joint_pairs
+from scenewright.stages.plan.correspondence import match_bodies
+from scenewright.stages.plan.erring_robot import ErringRobot
+from scenewright.stages.plan.execution_log import write_execution
+from scenewright.stages.plan.eyes import Eyes, NoisyEyes, Room, TrueEyes
+from scenewright.stages.plan.goal_checks import check_goal
+from scenewright.stages.plan.parameters import PlanParameters
+from scenewright.stages.plan.pick_place import Budgets
+from scenewright.stages.plan.pictures import RoomPictures, picture_camera
+from scenewright.stages.plan.reading import Reading
+from scenewright.stages.plan.refinement import Step
+from scenewright.stages.plan.replanning import Replanning, Search
+from scenewright.stages.plan.trajectories import executed_rows
+from scenewright.stages.plan.tree_state import after_step, graph_of_state, observed_state, start_state, tree_differences
+from scenewright.stages.plan.world_model import RobotState, WorldModel, body_planes
 
 RECORD_RATE = 10.0
 SETTLE_SECONDS = 1.0

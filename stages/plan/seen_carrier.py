@@ -11,12 +11,11 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.kit.geometry.box_cover import merge_cells
+from scenewright.stages.kit.geometry.boxes import minimum_rectangle
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.plan.scaled_body import add_box
 from scipy.ndimage import convolve
-
-from stages.kit.geometry.box_cover import merge_cells
-from stages.kit.geometry.boxes import minimum_rectangle
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.plan.scaled_body import add_box
 
 CELL = 0.005
 """Edge of a cell of the height map [m]."""

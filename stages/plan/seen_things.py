@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.simulation.shapes import link_shapes, surface_points
-from stages.plan.scaled_body import scaled_text, shifted_text, with_boxes
-from stages.plan.sticking_out import sticking_out
-from stages.plan.thing_fit import fit_thing
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
+from scenewright.stages.plan.scaled_body import scaled_text, shifted_text, with_boxes
+from scenewright.stages.plan.sticking_out import sticking_out
+from scenewright.stages.plan.thing_fit import fit_thing
 
 POINTS = 3000
 """On a shape that is fitted."""

@@ -8,38 +8,37 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import UsageError
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.language_map import LanguageMap
-from schemas.plan import Failure, Plan, PlanFile, PlannedAction, TriedPlan
-from schemas.sequence import Sequence
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.failures import MotionFailed, end_in_collision
-from stages.kit.simulation.robot_description import RobotDescription, load_robot
-from stages.kit.stage import Context
-from stages.kit.tasks.pddl import domain_text, problem_text
-from stages.kit.tasks.strips import Atom, Problem
-from stages.plan.assumptions import believe, parse_priors
-from stages.plan.domain import DOMAIN
-from stages.plan.given_domain import read_given_domain
-from stages.plan.goals import TABLE_CLASSES, default_goals
-from stages.plan.open_goals import has_words, named_goal
-from stages.plan.parameters import PlanParameters
-from stages.plan.pick_place import Budgets
-from stages.plan.plan_text import plan_text
-from stages.plan.reading import Reading
-from stages.plan.refinement import SearchSettings, Step, plan_and_refine
-from stages.plan.room_execution import Order, Outcome, execute, only_planned
-from stages.plan.start_pose import start_base
-from stages.plan.symbols import symbolic_state, task_problem
-from stages.plan.tasks import task_goals
-from stages.plan.trajectories import planned_rows, write_trajectory
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.schemas.plan import Failure, Plan, PlanFile, PlannedAction, TriedPlan
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.failures import MotionFailed, end_in_collision
+from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.kit.tasks.pddl import domain_text, problem_text
+from scenewright.stages.kit.tasks.strips import Atom, Problem
+from scenewright.stages.plan.assumptions import believe, parse_priors
+from scenewright.stages.plan.domain import DOMAIN
+from scenewright.stages.plan.given_domain import read_given_domain
+from scenewright.stages.plan.goals import TABLE_CLASSES, default_goals
+from scenewright.stages.plan.open_goals import has_words, named_goal
+from scenewright.stages.plan.parameters import PlanParameters
+from scenewright.stages.plan.pick_place import Budgets
+from scenewright.stages.plan.plan_text import plan_text
+from scenewright.stages.plan.reading import Reading
+from scenewright.stages.plan.refinement import SearchSettings, Step, plan_and_refine
+from scenewright.stages.plan.room_execution import Order, Outcome, execute, only_planned
+from scenewright.stages.plan.start_pose import start_base
+from scenewright.stages.plan.symbols import symbolic_state, task_problem
+from scenewright.stages.plan.tasks import task_goals
+from scenewright.stages.plan.trajectories import planned_rows, write_trajectory
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 Status = Literal["executed", "planned", "infeasible", "execution_failed"]
 START, SEARCH, EXECUTION, REPLANNING = 1, 2, 3, 4

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.motion.failures import MotionFailed
-from stages.plan.world_model import WorldModel
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.plan.world_model import WorldModel
 
 SHELL = ("floor", "wall", "ceiling")
 

@@ -6,10 +6,9 @@ Fingers that close where a handle is come to rest on it, and a palm that passes 
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.geometry.box_cover import merge_cells
+from scenewright.stages.kit.geometry.point_clouds import clusters
 from scipy.spatial import cKDTree
-
-from stages.kit.geometry.box_cover import merge_cells
-from stages.kit.geometry.point_clouds import clusters
 
 BEYOND = 0.01
 """Points seen farther than this from the surface are of nothing that is believed of the thing [m]."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_vector
-from schemas.scene_parts import SurfacePlane
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import SurfacePlane
 
 MERGE_HEIGHT = 0.01
 LEAST_AREA = 0.02

@@ -6,17 +6,16 @@ import difflib
 import re
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import UsageError
-from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.motion.doors import is_closed, is_open
-from stages.kit.tasks.strips import Atom, Problem, atom_text
-from stages.plan.action import goal_checks
-from stages.plan.affordances import LAYOUT, affordance_atoms
-from stages.plan.domain import DOMAIN, START
-from stages.plan.world_model import WorldModel
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.motion.doors import is_closed, is_open
+from scenewright.stages.kit.tasks.strips import Atom, Problem, atom_text
+from scenewright.stages.plan.action import goal_checks
+from scenewright.stages.plan.affordances import LAYOUT, affordance_atoms
+from scenewright.stages.plan.domain import DOMAIN, START
+from scenewright.stages.plan.world_model import WorldModel
 
 COMFORT = 0.9
 """Height at which the arm likes to work [m]."""

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.grasps import narrowest_width
-from stages.kit.tasks.strips import Atom, atom_text
-from stages.plan.world_model import WorldModel
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.grasps import narrowest_width
+from scenewright.stages.kit.tasks.strips import Atom, atom_text
+from scenewright.stages.plan.world_model import WorldModel
 
 TaskName = Literal["fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"]
 Goals = list[tuple[str, ...]]

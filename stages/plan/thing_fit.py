@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.measurement.pose_error import align_rigidly
+from scenewright.stages.plan.pose_fit import SURE, align_upright
 from scipy.spatial import cKDTree
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.measurement.pose_error import align_rigidly
-from stages.plan.pose_fit import SURE, align_upright
 
 FEW, MANY = 300, 800
 """Points seen that a first and a last fit go by."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.recording import Snapshot
-from stages.kit.motion.timing import sample_times, time_path
-from stages.kit.simulation.robot_description import RobotDescription
-from stages.plan.refinement import Step
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.recording import Snapshot
+from scenewright.stages.kit.motion.timing import sample_times, time_path
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.plan.refinement import Step
 
 PERIOD = 0.05
 """Between rows of the planned motion [s]."""

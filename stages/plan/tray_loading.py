@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from stages.kit.motion.grasps import narrowest_width
-from stages.plan.rim_grasps import rim_grasps
+from scenewright.stages.kit.motion.grasps import narrowest_width
+from scenewright.stages.plan.rim_grasps import rim_grasps
 
 if TYPE_CHECKING:
-    from stages.plan.world_model import WorldModel
+    from scenewright.stages.plan.world_model import WorldModel
 
 PALM_ROOM = 0.008
 """Free room wanted beside the palm [m]."""

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile
-from schemas.plan import BodyMatch, TreeDifference
-from stages.kit.motion.doors import is_closed, is_open
-from stages.kit.simulation.world import PhysicsWorld
-from stages.plan.action import action_named
-from stages.plan.believed_tree import TreeState
-from stages.plan.carriers import HAND, NOTHING, carrier
-from stages.plan.refinement import Step
-from stages.plan.updated_graph import update_graph
-from stages.plan.world_model import WorldModel
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from scenewright.schemas.plan import BodyMatch, TreeDifference
+from scenewright.stages.kit.motion.doors import is_closed, is_open
+from scenewright.stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.plan.action import action_named
+from scenewright.stages.plan.believed_tree import TreeState
+from scenewright.stages.plan.carriers import HAND, NOTHING, carrier
+from scenewright.stages.plan.refinement import Step
+from scenewright.stages.plan.updated_graph import update_graph
+from scenewright.stages.plan.world_model import WorldModel
 
 MOVED = 0.05
 """Things that moved less than this keep their place in the graph [m]."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_transform, as_vector
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
-from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
+from scenewright.schemas.base import as_transform, as_vector
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
+from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 
 
 def update_graph(

@@ -7,23 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_transform, as_vector
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Joint, SurfacePlane
-from stages.kit.geometry.transforms import apply, inverse, quaternion_of, transform_from_quaternion
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.doors import body_from_moved
-from stages.kit.motion.kinematics import ArmChain, arm_chain
-from stages.kit.simulation.robot import Configuration, Robot
-from stages.kit.simulation.robot_description import RobotDescription
-from stages.kit.simulation.shapes import joined, link_shapes, surface_points
-from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
-from stages.plan.joined_bodies import joined_text
-from stages.plan.regions import Region, find_regions, region_at
-from stages.plan.support_planes import top_planes
+from scenewright.schemas.base import as_transform, as_vector
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.kit.geometry.transforms import apply, inverse, quaternion_of, transform_from_quaternion
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.doors import body_from_moved
+from scenewright.stages.kit.motion.kinematics import ArmChain, arm_chain
+from scenewright.stages.kit.simulation.robot import Configuration, Robot
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.kit.simulation.shapes import joined, link_shapes, surface_points
+from scenewright.stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
+from scenewright.stages.plan.joined_bodies import joined_text
+from scenewright.stages.plan.regions import Region, find_regions, region_at
+from scenewright.stages.plan.support_planes import top_planes
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,14 @@ import logging
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.registration.pose_graph import Edge, squared_errors
-from stages.poses.estimation import Estimate
-from stages.poses.features import Features, match_features
-from stages.poses.frame_poses import largest_part
-from stages.poses.tracking import KeyFrame
-from stages.poses.world import laid_onto
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.registration.pose_graph import Edge, squared_errors
+from scenewright.stages.poses.estimation import Estimate
+from scenewright.stages.poses.features import Features, match_features
+from scenewright.stages.poses.frame_poses import largest_part
+from scenewright.stages.poses.tracking import KeyFrame
+from scenewright.stages.poses.world import laid_onto
 
 LEAST_TRACKS = 30
 """Fewer tracks than this adjust nothing."""

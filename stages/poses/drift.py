@@ -5,10 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-
-from schemas.trajectory import LoopClosure
-from stages.kit.registration.rigid_motion import between, distance_of
-from stages.poses.estimation import Estimate
+from scenewright.schemas.trajectory import LoopClosure
+from scenewright.stages.kit.registration.rigid_motion import between, distance_of
+from scenewright.stages.poses.estimation import Estimate
 
 LEAST_WAY = 0.5
 """Loops over less way than this say nothing of drift [m]."""

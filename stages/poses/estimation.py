@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.kit.formats.frames import FrameReader
-from stages.kit.registration.pairs import edge_of, overlap_candidates
-from stages.kit.registration.pose_graph import Edge, Solution, laid_out, optimize, parts_of
-from stages.kit.registration.pyramid import Pyramid, build_pyramid
-from stages.kit.registration.rigid_motion import between
-from stages.kit.stage import Context
-from stages.poses.features import Features, find_features
-from stages.poses.loops import Loop, PyramidCache, Verifier, place_candidates
-from stages.poses.parameters import PosesParameters
-from stages.poses.places import Ferns
-from stages.poses.tracking import Seen, Track, Tracker, TrackingLimits
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.registration.pairs import edge_of, overlap_candidates
+from scenewright.stages.kit.registration.pose_graph import Edge, Solution, laid_out, optimize, parts_of
+from scenewright.stages.kit.registration.pyramid import Pyramid, build_pyramid
+from scenewright.stages.kit.registration.rigid_motion import between
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.poses.features import Features, find_features
+from scenewright.stages.poses.loops import Loop, PyramidCache, Verifier, place_candidates
+from scenewright.stages.poses.parameters import PosesParameters
+from scenewright.stages.poses.places import Ferns
+from scenewright.stages.poses.tracking import Seen, Track, Tracker, TrackingLimits
 
 LEVELS = 3
 

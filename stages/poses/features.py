@@ -8,9 +8,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import apply, transform_from
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import apply, transform_from
 
 FEATURES = 600
 """Corners that are described per frame."""

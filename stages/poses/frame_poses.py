@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.alignment import Alignment
-from stages.kit.registration.pairs import with_systematic_error
-from stages.kit.registration.rigid_motion import between, fraction, orthonormal, skew
-from stages.poses.estimation import Estimate
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.alignment import Alignment
+from scenewright.stages.kit.registration.pairs import with_systematic_error
+from scenewright.stages.kit.registration.rigid_motion import between, fraction, orthonormal, skew
+from scenewright.stages.poses.estimation import Estimate
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.registration.alignment import Alignment
-from stages.kit.registration.pairs import Limits, agreed
-from stages.kit.registration.pyramid import Pyramid
-from stages.kit.registration.rigid_motion import angle_of, between, distance_of
-from stages.poses.features import ransac_motion
-from stages.poses.places import PlaceIndex, fern_likeness
-from stages.poses.tracking import KeyFrame
+from scenewright.stages.kit.registration.alignment import Alignment
+from scenewright.stages.kit.registration.pairs import Limits, agreed
+from scenewright.stages.kit.registration.pyramid import Pyramid
+from scenewright.stages.kit.registration.rigid_motion import angle_of, between, distance_of
+from scenewright.stages.poses.features import ransac_motion
+from scenewright.stages.poses.places import PlaceIndex, fern_likeness
+from scenewright.stages.poses.tracking import KeyFrame
 
 LEAST_FEATURES = 15
 """Feature matches that must agree before dense alignment is tried."""

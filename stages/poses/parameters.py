@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.kit.stage import Parameters, Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.stage import Parameters, Stage
 
 
 class PosesParameters(Parameters):

@@ -7,18 +7,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.sequence import Sequence
-from schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
-from stages.kit.formats.frames import FrameReader, require_depth
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.stage import Context
-from stages.poses.drift import drift_of, loop_closures, path_length
-from stages.poses.estimation import estimate
-from stages.poses.frame_poses import FramePose, frame_poses
-from stages.poses.parameters import PosesParameters
-from stages.poses.world import choose_world
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
+from scenewright.stages.kit.formats.frames import FrameReader, require_depth
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.poses.drift import drift_of, loop_closures, path_length
+from scenewright.stages.poses.estimation import estimate
+from scenewright.stages.poses.frame_poses import FramePose, frame_poses
+from scenewright.stages.poses.parameters import PosesParameters
+from scenewright.stages.poses.world import choose_world
 
 MOST_CONTRADICTED, FEWEST_LOOPS = 0.15, 10
 """A path is not to be trusted that denies more than this share of its loops, of so many at least. Of four good paths
@@ -89,7 +88,7 @@ def _dense(
 ) -> Result:
     estimated = estimate(reader, frames, camera_name, parameters, context)
     if parameters.bundle_adjustment:
-        from stages.poses.bundle_adjustment import adjust
+        from scenewright.stages.poses.bundle_adjustment import adjust
 
         with context.progress.step("bundle adjustment"):
             estimated = adjust(estimated, reader.cameras[camera_name], context.logger)
@@ -105,7 +104,7 @@ def _dense(
 def _structure(
     reader: FrameReader, frames: list[int], camera_name: str, parameters: PosesParameters, context: Context
 ) -> Result:
-    from stages.poses.structure_from_motion import reconstruct
+    from scenewright.stages.poses.structure_from_motion import reconstruct
 
     poses, parts = reconstruct(reader, frames, camera_name, parameters, context)
     return Result(poses, parts=parts)

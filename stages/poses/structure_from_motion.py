@@ -12,14 +12,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.rigid_motion import between, fraction
-from stages.kit.stage import Context
-from stages.poses.frame_poses import FramePose
-from stages.poses.parameters import PosesParameters
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.rigid_motion import between, fraction
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.poses.frame_poses import FramePose
+from scenewright.stages.poses.parameters import PosesParameters
 
 FEATURES = 1500
 """SIFT features per image, at most."""

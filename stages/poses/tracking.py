@@ -11,13 +11,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.alignment import Alignment, align
-from stages.kit.registration.pairs import Limits
-from stages.kit.registration.pyramid import Pyramid
-from stages.kit.registration.rigid_motion import angle_of, distance_of, exponential
-from stages.poses.features import Features, ransac_motion
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.alignment import Alignment, align
+from scenewright.stages.kit.registration.pairs import Limits
+from scenewright.stages.kit.registration.pyramid import Pyramid
+from scenewright.stages.kit.registration.rigid_motion import angle_of, distance_of, exponential
+from scenewright.stages.poses.features import Features, ransac_motion
 
 LEAST_DEPTH_SHARE = 0.03
 """A frame with depth on fewer of its pixels cannot be tracked."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.errors import BadInput
-from schemas.sequence import Gravity
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.surface_samples import surface_samples
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.geometry.upright_world import make_upright
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Gravity
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.surface_samples import surface_samples
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.geometry.upright_world import make_upright
 
 FLOOR_FRAMES = 40
 """Frames whose depth is looked at to find the floor."""

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.kitchen_plan import EvaluatedSet, KitchenEvaluation, KitchenEvaluationFile
-from schemas.learned_domain import LearnedDomain
-from stages.kit.predicates.goal_words import goal_phrases
-from stages.kit.stage import Context
-from stages.kit.tasks.strips import Domain
-from stages.predicates.execution import Attempt, World, attempt, oracle
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.records import memory_of
-from stages.predicates.learning.thesis_memory import ThesisMemory
-from stages.predicates.measure.accuracy import accuracies
-from stages.predicates.parameters import EvaluateParameters
-from stages.predicates.room.tasks import open_room, read_rooms, room_tasks
-from stages.predicates.tasks import Task, tasks_of
-from stages.predicates.training import Opened, in_the_kitchen
-from stages.predicates.truth import ROOM
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.kitchen_plan import EvaluatedSet, KitchenEvaluation, KitchenEvaluationFile
+from scenewright.schemas.learned_domain import LearnedDomain
+from scenewright.stages.kit.predicates.goal_words import goal_phrases
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.kit.tasks.strips import Domain
+from scenewright.stages.predicates.execution import Attempt, World, attempt, oracle
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.records import memory_of
+from scenewright.stages.predicates.learning.thesis_memory import ThesisMemory
+from scenewright.stages.predicates.measure.accuracy import accuracies
+from scenewright.stages.predicates.parameters import EvaluateParameters
+from scenewright.stages.predicates.room.tasks import open_room, read_rooms, room_tasks
+from scenewright.stages.predicates.tasks import Task, tasks_of
+from scenewright.stages.predicates.training import Opened, in_the_kitchen
+from scenewright.stages.predicates.truth import ROOM
 
 
 def run(

@@ -7,16 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.fast_downward import plan_with_fast_downward
-from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, ground
-from stages.kit.tasks.task_planner import TaskPlan, plan_task
-from stages.predicates.learning.setting import SETTINGS
-from stages.predicates.state import State
-from stages.predicates.tasks import Task, open_kitchen, true_atoms
-from stages.predicates.truth import action_of, true_domain
-from stages.predicates.world.actions import act
-from stages.predicates.world.kitchen import Kitchen
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.fast_downward import plan_with_fast_downward
+from scenewright.stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, ground
+from scenewright.stages.kit.tasks.task_planner import TaskPlan, plan_task
+from scenewright.stages.predicates.learning.setting import SETTINGS
+from scenewright.stages.predicates.state import State
+from scenewright.stages.predicates.tasks import Task, open_kitchen, true_atoms
+from scenewright.stages.predicates.truth import action_of, true_domain
+from scenewright.stages.predicates.world.actions import act
+from scenewright.stages.predicates.world.kitchen import Kitchen
 
 MOST_STEPS, MOST_FAILURES = 20, 5
 ARITY = {name: count for setting in SETTINGS.values() for name, count in setting.arity.items()}

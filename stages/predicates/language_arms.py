@@ -11,17 +11,16 @@ import json
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.base import Model
-from stages.kit.language.chat import Chat
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import say
-from stages.kit.language.reply_schema import schema_of
-from stages.kit.tasks.strips import Atom, Domain, Problem, ground
-from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, Attempt, World, action_atom
-from stages.predicates.learning.memory import Memory
-from stages.predicates.tasks import Task
-from stages.predicates.truth import truth_of
+from scenewright.schemas.base import Model
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import say
+from scenewright.stages.kit.language.reply_schema import schema_of
+from scenewright.stages.kit.tasks.strips import Atom, Domain, Problem, ground
+from scenewright.stages.predicates.execution import MOST_FAILURES, MOST_STEPS, Attempt, World, action_atom
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.tasks import Task
+from scenewright.stages.predicates.truth import truth_of
 
 Kind = Literal["objects", "scene", "preconditions"]
 REPLANS = 3

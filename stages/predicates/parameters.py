@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
-from schemas.learned_domain import LearnedDomain
-from stages.kit.known_names import check_names
-from stages.kit.language.options import LanguageParameters
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
+from scenewright.schemas.learned_domain import LearnedDomain
+from scenewright.stages.kit.known_names import check_names
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 DomainName = Literal["store_objects", "set_table", "cook_meal"]
 SetName = Literal["canonical", "more_objects", "novel_goals", "combined", "hundred_goals"]

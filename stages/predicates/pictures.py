@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
-
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Predicate
-from stages.kit.predicates.room import RoomState
-from stages.kit.predicates.vocabulary import Perceived
-from stages.predicates.state import TABLE_LEFT, TABLE_RIGHT, State
-from stages.predicates.world.kitchen import FAUCET_HEIGHT, SINK_DEPTH, SINK_WIDTH, SINK_X
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Predicate
+from scenewright.stages.kit.predicates.room import RoomState
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.predicates.state import TABLE_LEFT, TABLE_RIGHT, State
+from scenewright.stages.predicates.world.kitchen import FAUCET_HEIGHT, SINK_DEPTH, SINK_WIDTH, SINK_X
 
 Polygons = Sequence[tuple[str, Sequence[tuple[float, float]]]]
 LEFT, RIGHT, BOTTOM, TOP = -42.0, 40.0, -12.0, 30.0

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from schemas.errors import BadInput
-from schemas.kitchen_plan import KitchenPlan, KitchenPlanFile, KitchenStep
-from schemas.learned_domain import LearnedDomain
-from stages.kit.predicates.goal_words import goal_phrases
-from stages.kit.stage import Context
-from stages.predicates.execution import PLANNERS, Attempt, Live, attempt
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.records import memory_of
-from stages.predicates.parameters import PlanParameters
-from stages.predicates.pictures import animate, draw_kitchen
-from stages.predicates.tasks import Task, open_kitchen, tasks_of
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.kitchen_plan import KitchenPlan, KitchenPlanFile, KitchenStep
+from scenewright.schemas.learned_domain import LearnedDomain
+from scenewright.stages.kit.predicates.goal_words import goal_phrases
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.predicates.execution import PLANNERS, Attempt, Live, attempt
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.records import memory_of
+from scenewright.stages.predicates.parameters import PlanParameters
+from scenewright.stages.predicates.pictures import animate, draw_kitchen
+from scenewright.stages.predicates.tasks import Task, open_kitchen, tasks_of
 
 
 def run(learned: LearnedDomain, *, parameters: PlanParameters, context: Context) -> KitchenPlan:

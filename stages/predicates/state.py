@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.kit.predicates.vocabulary import Vocabulary
+from scenewright.stages.kit.predicates.vocabulary import Vocabulary
 
 TABLE_HEIGHT, TABLE_LEFT, TABLE_RIGHT = 0.0, -40.0, 25.0
 FINGER_HEIGHT, LARGEST_OPENING = 2.0, 5.0

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom, Problem, apply_action, ground
-from stages.predicates.truth import true_domain, truth_of
-from stages.predicates.world.actions import free_place
-from stages.predicates.world.catalogue import DomainSetup, kitchen_file
-from stages.predicates.world.kitchen import Kitchen
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom, Problem, apply_action, ground
+from scenewright.stages.predicates.truth import true_domain, truth_of
+from scenewright.stages.predicates.world.actions import free_place
+from scenewright.stages.predicates.world.catalogue import DomainSetup, kitchen_file
+from scenewright.stages.predicates.world.kitchen import Kitchen
 
 SETS = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
 LAYOUTS = 20

@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.learned_domain import LearnedDomain
-from stages.kit.stage import Context
-from stages.kit.tasks.pddl import domain_text
-from stages.predicates.language.saying import say
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.opening import Exchange, empty_memory, open_learner
-from stages.predicates.learning.records import document_of, memory_of
-from stages.predicates.learning.setting import KITCHEN, Setting
-from stages.predicates.learning.setting import ROOM as ROOM_SETTING
-from stages.predicates.learning.thesis_memory import ThesisMemory
-from stages.predicates.parameters import TeachParameters
-from stages.predicates.pictures import draw_learning, draw_predicates
-from stages.predicates.room.tasks import open_room, read_rooms, room_tasks
-from stages.predicates.tasks import Task, tasks_of
-from stages.predicates.teacher.opening import open_teacher
-from stages.predicates.training import Opened, in_the_kitchen, train
-from stages.predicates.truth import ROOM
-from stages.predicates.world.catalogue import kitchen_file
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.learned_domain import LearnedDomain
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.kit.tasks.pddl import domain_text
+from scenewright.stages.predicates.language.saying import say
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.opening import Exchange, empty_memory, open_learner
+from scenewright.stages.predicates.learning.records import document_of, memory_of
+from scenewright.stages.predicates.learning.setting import KITCHEN, Setting
+from scenewright.stages.predicates.learning.setting import ROOM as ROOM_SETTING
+from scenewright.stages.predicates.learning.thesis_memory import ThesisMemory
+from scenewright.stages.predicates.parameters import TeachParameters
+from scenewright.stages.predicates.pictures import draw_learning, draw_predicates
+from scenewright.stages.predicates.room.tasks import open_room, read_rooms, room_tasks
+from scenewright.stages.predicates.tasks import Task, tasks_of
+from scenewright.stages.predicates.teacher.opening import open_teacher
+from scenewright.stages.predicates.training import Opened, in_the_kitchen, train
+from scenewright.stages.predicates.truth import ROOM
+from scenewright.stages.predicates.world.catalogue import kitchen_file
 
 
 @dataclass(frozen=True)

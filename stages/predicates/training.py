@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from stages.kit.predicates.goal_words import goal_phrases
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom, Domain, Problem, ground
-from stages.kit.tasks.task_planner import plan_task
-from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, SHORTENING, Live, World, action_atom
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.ours import OursLearner
-from stages.predicates.tasks import Task, open_kitchen
-from stages.predicates.teacher.simulated import TeacherLeft
+from scenewright.stages.kit.predicates.goal_words import goal_phrases
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom, Domain, Problem, ground
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.predicates.execution import (
+    MOST_FAILURES,
+    MOST_STEPS,
+    PLANNING_LIMIT,
+    SHORTENING,
+    Live,
+    World,
+    action_atom,
+)
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.ours import OursLearner
+from scenewright.stages.predicates.tasks import Task, open_kitchen
+from scenewright.stages.predicates.teacher.simulated import TeacherLeft
 
 LEFT_FOR_THE_GOAL = 8
 """Steps of an episode that are kept for its goal; before them whatever was never tried comes first."""

@@ -8,16 +8,15 @@ from functools import cache
 from pathlib import Path
 
 from pydantic import Field
-
-from schemas.base import Model
-from schemas.outside import LARGEST_SETTINGS, file_text, file_toml
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Predicate, check, read
-from stages.kit.predicates.room import ROOM_WORDS
-from stages.kit.predicates.vocabulary import Perceived, Vocabulary
-from stages.kit.tasks.pddl import parse_domain
-from stages.kit.tasks.strips import Atom, Domain
-from stages.predicates.state import KITCHEN_WORDS
+from scenewright.schemas.base import Model
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_text, file_toml
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Predicate, check, read
+from scenewright.stages.kit.predicates.room import ROOM_WORDS
+from scenewright.stages.kit.predicates.vocabulary import Perceived, Vocabulary
+from scenewright.stages.kit.tasks.pddl import parse_domain
+from scenewright.stages.kit.tasks.strips import Atom, Domain
+from scenewright.stages.predicates.state import KITCHEN_WORDS
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 ROOM = "room"

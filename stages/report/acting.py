@@ -6,13 +6,12 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.contact_graph import SCENE_NODE
-from schemas.interactive_scene import InteractiveScene
-from schemas.plan import Check, Failure, Plan
-from stages.kit.formats.numpy_files import read_arrays
-from stages.report.images import Picture, from_figure, from_file
-from stages.report.motion_figures import motion_figure, tried_tree
+from scenewright.schemas.contact_graph import SCENE_NODE
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.plan import Check, Failure, Plan
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.report.images import Picture, from_figure, from_file
+from scenewright.stages.report.motion_figures import motion_figure, tried_tree
 
 
 @dataclass(frozen=True)

@@ -6,19 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from schemas.cad_scene import CadCandidate, CadScene, Replacement
-from schemas.contact_graph import GraphNode
-from schemas.panoptic_map import PanopticMap
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.measurement.cad_candidates import before_check, candidates_of, same_placement
-from stages.kit.measurement.shape_symmetry import rotation_angle
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.kit.rendering.surfaces import build_soup
-from stages.report.images import Picture, jpeg
-from stages.report.placed_models import ModelShelf
-from stages.report.surfaces import Model
-from stages.report.views import Bounds, View, best_azimuth, direction_of, fitted_pose, page_camera
+from scenewright.schemas.cad_scene import CadCandidate, CadScene, Replacement
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.measurement.cad_candidates import before_check, candidates_of, same_placement
+from scenewright.stages.kit.measurement.shape_symmetry import rotation_angle
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.rendering.surfaces import build_soup
+from scenewright.stages.report.images import Picture, jpeg
+from scenewright.stages.report.placed_models import ModelShelf
+from scenewright.stages.report.surfaces import Model
+from scenewright.stages.report.views import Bounds, View, best_azimuth, direction_of, fitted_pose, page_camera
 
 ELEVATION = np.radians(28.0)
 QUALITY = 72

@@ -8,11 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.evaluation import Evaluation
-from schemas.outside import LARGEST_SHOWN, file_text
-from stages.report.images import Picture, plot
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.schemas.outside import LARGEST_SHOWN, file_text
+from scenewright.stages.report.images import Picture, plot
 
 MISSING = "–"
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.segments import FrameSegment, Segments
-from schemas.sequence import Sequence
-from schemas.vocabulary import load_vocabulary
-from stages.kit.drawing.palette import entity_color, hex_color, instance_color
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.masks import PanopticReader
-from stages.report.images import Picture, jpeg
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.segments import FrameSegment, Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.drawing.palette import entity_color, hex_color, instance_color
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.masks import PanopticReader
+from scenewright.stages.report.images import Picture, jpeg
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.cad_scene import CadCandidate, CadScene, Replacement
-from stages.kit.measurement.cad_candidates import after_check, before_check
-from stages.kit.measurement.layout_pieces import layout_pieces
-from stages.kit.measurement.room_penetrations import Penetration, room_penetrations
-from stages.kit.rendering.surfaces import srgb_to_linear
-from stages.report.placed_models import ModelShelf
-from stages.report.surfaces import Model, cad_model
+from scenewright.schemas.cad_scene import CadCandidate, CadScene, Replacement
+from scenewright.stages.kit.measurement.cad_candidates import after_check, before_check
+from scenewright.stages.kit.measurement.layout_pieces import layout_pieces
+from scenewright.stages.kit.measurement.room_penetrations import Penetration, room_penetrations
+from scenewright.stages.kit.rendering.surfaces import srgb_to_linear
+from scenewright.stages.report.placed_models import ModelShelf
+from scenewright.stages.report.surfaces import Model, cad_model
 
 CONFLICT = (0.80, 0.08, 0.07)
 CALM = 0.62

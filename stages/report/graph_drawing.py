@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.errors import BadInput
-from schemas.outside import LARGEST_SHOWN, file_text
-from schemas.scene_parts import TREE_RELATIONS, Relation
-from stages.kit.drawing.palette import entity_color, hex_color
-from stages.kit.drawing.tree_layout import tree_layout
-from stages.kit.measurement.relation_evidence import evidence
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import LARGEST_SHOWN, file_text
+from scenewright.schemas.scene_parts import TREE_RELATIONS, Relation
+from scenewright.stages.kit.drawing.palette import entity_color, hex_color
+from scenewright.stages.kit.drawing.tree_layout import tree_layout
+from scenewright.stages.kit.measurement.relation_evidence import evidence
 
 ROW = 30
 LETTER = 7.1

@@ -11,9 +11,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
 
 MAXIMUM_PIXELS = 40_000_000
 LARGEST_ANIMATION = 6_000_000

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile
-from schemas.scene_parts import TREE_RELATIONS
-from stages.kit.drawing.palette import entity_color, hex_color
-from stages.kit.drawing.tree_layout import tree_layout
-from stages.kit.simulation.urdf_split import PART_SEPARATOR, owner_of_link, read_urdf
-from stages.report.graph_drawing import GAP, LETTER, ROW, DrawnEdge, DrawnNode, elbow
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.stages.kit.drawing.palette import entity_color, hex_color
+from scenewright.stages.kit.drawing.tree_layout import tree_layout
+from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR, owner_of_link, read_urdf
+from scenewright.stages.report.graph_drawing import GAP, LETTER, ROW, DrawnEdge, DrawnNode, elbow
 
 GUTTER = 60
 """Between the two trees [px]."""

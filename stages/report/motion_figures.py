@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-
-from schemas.plan import Plan, PlanFile, TriedPlan
-from stages.kit.drawing.plan_tree import REACHED, Branch, plan_tree
-from stages.kit.formats.numpy_files import read_arrays
+from scenewright.schemas.plan import Plan, PlanFile, TriedPlan
+from scenewright.stages.kit.drawing.plan_tree import REACHED, Branch, plan_tree
+from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 WIDTH, HEIGHT = 10.0, 5.4
 """[inch]"""

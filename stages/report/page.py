@@ -10,14 +10,13 @@ from typing import Any, TypeVar
 
 import jinja2
 from markupsafe import Markup
-
-from schemas.artifact import Artifact
-from schemas.evaluation import Evaluation
-from schemas.panoptic_map import PanopticMap
-from schemas.segments import Segments
-from stages.report.parameters import ReportParameters
-from stages.report.provenance import Made, made_of
-from stages.report.room import RoomViews
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.segments import Segments
+from scenewright.stages.report.parameters import ReportParameters
+from scenewright.stages.report.provenance import Made, made_of
+from scenewright.stages.report.room import RoomViews
 
 FOLDER = Path(__file__).resolve().parent
 Kind = TypeVar("Kind", bound=Artifact)

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.evaluation import Report
-from stages.kit.estimates import grows_with
-from stages.kit.stage import Optionally, Parameters, Stage
-from stages.report.section import all_roles
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.evaluation import Report
+from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.stage import Optionally, Parameters, Stage
+from scenewright.stages.report.section import all_roles
 
 
 class ReportParameters(Parameters):

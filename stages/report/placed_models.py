@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.cad_scene import CadCandidate, CadScene
-from stages.kit.formats.cad_models import posed_collision, read_model
-from stages.kit.formats.painted_models import painted_mesh
-from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.cad_scene import CadCandidate, CadScene
+from scenewright.stages.kit.formats.cad_models import posed_collision, read_model
+from scenewright.stages.kit.formats.painted_models import painted_mesh
+from scenewright.stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
 
 
 class ModelShelf:

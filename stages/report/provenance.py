@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from schemas.artifact import Artifact
-from schemas.manifest import Manifest
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.manifest import Manifest
 
 
 @dataclass(frozen=True)

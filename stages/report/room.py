@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from schemas.panoptic_map import PanopticMap
-from stages.kit.rendering.ray_casting import Rendering
-from stages.report.images import Picture, jpeg
-from stages.report.surfaces import Model, map_model
-from stages.report.views import Label, View, oblique_view, place_labels, render
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.rendering.ray_casting import Rendering
+from scenewright.stages.report.images import Picture, jpeg
+from scenewright.stages.report.surfaces import Model, map_model
+from scenewright.stages.report.views import Label, View, oblique_view, place_labels, render
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-import stages.report.sections
-from schemas.artifact import Artifact
+import scenewright.stages.report.sections
+from scenewright.schemas.artifact import Artifact
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class Section:
 @cache
 def all_sections() -> tuple[Section, ...]:
     """Return every section by its place on the page. Imports declarations only."""
-    names = [entry.name for entry in pkgutil.iter_modules(stages.report.sections.__path__)]
-    sections = [importlib.import_module(f"stages.report.sections.{name}.section").SECTION for name in names]
+    names = [entry.name for entry in pkgutil.iter_modules(scenewright.stages.report.sections.__path__)]
+    sections = [importlib.import_module(f"scenewright.stages.report.sections.{name}.section").SECTION for name in names]
     for name, section in zip(names, sections, strict=True):
         if section.name != name:
             raise RuntimeError(f"section {section.name!r} is declared in the folder {name!r}")

@@ -6,15 +6,15 @@ import importlib
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from schemas.artifact import Artifact
-from schemas.errors import BadInput
-from schemas.evaluation import Report, ReportFile
-from schemas.ground_truth import GroundTruth
-from schemas.sequence import Sequence
-from stages.kit.stage import Context
-from stages.report.page import Page, render, render_page
-from stages.report.parameters import STAGE, ReportParameters
-from stages.report.section import all_sections
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.evaluation import Report, ReportFile
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.report.page import Page, render, render_page
+from scenewright.stages.report.parameters import STAGE, ReportParameters
+from scenewright.stages.report.section import all_sections
 
 MAXIMUM_BYTES = 15_000_000
 
@@ -34,7 +34,7 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
         if section.reads and not any(page.given(role, kind) for role, kind in section.reads.items()):
             continue
         with context.progress.step(section.name):
-            values = importlib.import_module(f"stages.report.sections.{section.name}.view").view(page)
+            values = importlib.import_module(f"scenewright.stages.report.sections.{section.name}.view").view(page)
         if values is not None:
             html = render(f"sections/{section.name}/section.html.j2", {**head, **values})
             shown.append({"id": section.name, "name": section.title, "html": html})

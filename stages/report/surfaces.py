@@ -9,18 +9,17 @@ from typing import Any
 
 import numpy as np
 import trimesh
-
-from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from schemas.vocabulary import load_vocabulary
-from stages.kit.drawing.palette import LAYOUT_COLORS, UNLABELLED, entity_color
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.measurement.cad_candidates import after_check
-from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
-from stages.report.placed_models import ModelShelf
+from scenewright.schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.drawing.palette import LAYOUT_COLORS, UNLABELLED, entity_color
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.measurement.cad_candidates import after_check
+from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
+from scenewright.stages.report.placed_models import ModelShelf
 
 NAMELESS = 99_999
 """Instance of the surroundings; no node has it."""

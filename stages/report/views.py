@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import look_at
-from stages.kit.rendering.ray_casting import Rendering, SceneRenderer
-from stages.kit.rendering.surfaces import TriangleSoup
-from stages.report.surfaces import Model
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.rendering.ray_casting import Rendering, SceneRenderer
+from scenewright.stages.kit.rendering.surfaces import TriangleSoup
+from scenewright.stages.report.surfaces import Model
 
 FIELD_OF_VIEW = np.radians(32.0)
 PLAN_FIELD_OF_VIEW = np.radians(8.0)

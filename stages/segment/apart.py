@@ -15,13 +15,12 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.errors import MachineFailure
-from schemas.segments import FrameSegments
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.masks import encode_panoptic_png
-from stages.segment.choice import Backend, BackendRequest, choose_backend
-from stages.segment.one_frame import describe, segment_frame
+from scenewright.schemas.errors import MachineFailure
+from scenewright.schemas.segments import FrameSegments
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.masks import encode_panoptic_png
+from scenewright.stages.segment.choice import Backend, BackendRequest, choose_backend
+from scenewright.stages.segment.one_frame import describe, segment_frame
 
 LEAST_FRAMES_EACH = 60
 """Under these a process is not worth its start, which takes as long as some ten to twenty frames."""

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 import numpy as np
-
-from schemas.errors import BadInput, UsageError
-from schemas.sequence import Sequence
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.stage import Parameters
-from stages.segment.geometric import GeometricFrame
-from stages.segment.panoptic import PanopticFrame
-from stages.segment.parameters import SegmentParameters
-from stages.segment.registry import AUTO, BackendDeclaration, all_backends, automatic, backend_for
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.registry import AUTO, BackendDeclaration, all_backends, automatic, backend_for
 
 STREAM_WORDS = {"color": "colour", "labels": "ground-truth labels"}
 

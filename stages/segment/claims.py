@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from stages.segment.overlaps import overlap_table
-from stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.overlaps import overlap_table
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 
 @njit(cache=True)

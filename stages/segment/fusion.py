@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-
-from stages.segment.clustering import largest_cluster
-from stages.segment.geometric import relabel
-from stages.segment.overlaps import LabelPixels, overlap_table, pixels_of_labels
-from stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.clustering import largest_cluster
+from scenewright.stages.segment.geometric import relabel
+from scenewright.stages.segment.overlaps import LabelPixels, overlap_table, pixels_of_labels
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 BACKGROUND = 0
 

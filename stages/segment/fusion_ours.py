@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from stages.segment.claims import claim_small, claim_unlabelled
-from stages.segment.fusion import (
+from scenewright.stages.segment.claims import claim_small, claim_unlabelled
+from scenewright.stages.segment.fusion import (
     BACKGROUND,
     FusedFrame,
     FusionSettings,
@@ -18,9 +17,9 @@ from stages.segment.fusion import (
     parts_of_things,
     split_contained,
 )
-from stages.segment.geometric import pixels_at
-from stages.segment.overlaps import overlap_table, pixels_of_labels
-from stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.geometric import pixels_at
+from scenewright.stages.segment.overlaps import overlap_table, pixels_of_labels
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 RIM = 2
 """What a mask takes of a neighbour along its outline is this wide at most [pixels at 640 width]."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.segment.fusion import (
+from scenewright.stages.segment.fusion import (
     BACKGROUND,
     FusedFrame,
     FusionSettings,
@@ -16,9 +15,9 @@ from stages.segment.fusion import (
     parts_of_things,
     split_contained,
 )
-from stages.segment.geometric import pixels_at
-from stages.segment.overlaps import overlap_table, pixels_of_labels
-from stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.geometric import pixels_at
+from scenewright.stages.segment.overlaps import overlap_table, pixels_of_labels
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 
 def fuse(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.segment.fusion import FusedFrame, FusionSettings, describe, majority_labels
-from stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.fusion import FusedFrame, FusionSettings, describe, majority_labels
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 
 def fuse(

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numba import njit, prange
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.segment.normals import planes_of, surface_normals
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.segment.normals import planes_of, surface_normals
 
 REFERENCE_AREA = 640 * 480
 """Pixel counts among the parameters hold for images of this many pixels."""

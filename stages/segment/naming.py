@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.vocabulary import Vocabulary
-from stages.kit.labels import Label
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.schemas.vocabulary import Vocabulary
+from scenewright.stages.kit.labels import Label
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 KEPT_SHARE = 0.5
 """An instance of which others leave less than this says nothing of its own (Kirillov et al. 2019)."""

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 from numba import njit, prange
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
 
 # A row is worked on in loops without branches over arrays of their own, which add several pixels at a time; every sum
 # takes its terms in the order of the window, so that how many are added at a time changes no bit.

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.segments import FrameSegment, FrameSegments
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.segment import fusion_ours, fusion_thesis, fusion_voxblox
-from stages.segment.choice import Backend
-from stages.segment.fusion import FusedFrame, FusionRule
-from stages.segment.geometric import segment_depth
-from stages.segment.parameters import SegmentParameters
-from stages.segment.settings import fusion_settings, geometric_settings
+from scenewright.schemas.segments import FrameSegment, FrameSegments
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.segment import fusion_ours, fusion_thesis, fusion_voxblox
+from scenewright.stages.segment.choice import Backend
+from scenewright.stages.segment.fusion import FusedFrame, FusionRule
+from scenewright.stages.segment.geometric import segment_depth
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 
 FUSION: dict[str, FusionRule] = {
     "ours": fusion_ours.fuse,

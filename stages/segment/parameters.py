@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, create_model, field_validator
 from pydantic_core import PydanticCustomError
-
-from schemas.errors import UsageError
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
-from stages.kit.stage import External, Optionally, Parameters, Stage
-from stages.segment.registry import (
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.stages.segment.registry import (
     all_backends,
     backend_help,
     check_backend,

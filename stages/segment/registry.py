@@ -11,10 +11,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
-from stages.kit.declared import declared_in
-from stages.kit.library_versions import library_version
-from stages.kit.services.address import check_address
-from stages.kit.stage import Extra, Parameters
+from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.library_versions import library_version
+from scenewright.stages.kit.services.address import check_address
+from scenewright.stages.kit.stage import Extra, Parameters
 
 AUTO = "auto"
 
@@ -63,13 +63,13 @@ class BackendDeclaration:
 
     def load(self, module: str) -> Any:
         """Return a module of its folder, loaded now: `backend` has `open_backend`."""
-        return importlib.import_module(f"stages.segment.backends.{self.name.replace('-', '_')}.{module}")
+        return importlib.import_module(f"scenewright.stages.segment.backends.{self.name.replace('-', '_')}.{module}")
 
 
 @cache
 def all_backends() -> tuple[BackendDeclaration, ...]:
     """Return every declared backend in its order. Imports declarations only."""
-    return declared_in("stages.segment.backends", BackendDeclaration, "BACKEND")
+    return declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND")
 
 
 def backend_for(backend: str) -> BackendDeclaration:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stages.segment.fusion import FusionSettings
-from stages.segment.geometric import GeometricSettings
-from stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.fusion import FusionSettings
+from scenewright.stages.segment.geometric import GeometricSettings
+from scenewright.stages.segment.parameters import SegmentParameters
 
 
 def geometric_settings(parameters: SegmentParameters) -> GeometricSettings:

@@ -6,17 +6,16 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.segments import FrameSegments, Segments, SegmentsFile
-from schemas.sequence import Sequence
-from schemas.vocabulary import UNNAMED, load_vocabulary
-from stages.kit.formats.frames import FrameReader, require_depth
-from stages.kit.formats.masks import write_panoptic_zip
-from stages.kit.stage import Context
-from stages.segment.apart import segmented_apart, segmented_here, worker_count
-from stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
-from stages.segment.parameters import SegmentParameters
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.segments import FrameSegments, Segments, SegmentsFile
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.stages.kit.formats.frames import FrameReader, require_depth
+from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.segment.apart import segmented_apart, segmented_here, worker_count
+from scenewright.stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
+from scenewright.stages.segment.parameters import SegmentParameters
 
 
 def run(

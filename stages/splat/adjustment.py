@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.pairs import Limits, agreed, edge_of, overlap_candidates
-from stages.kit.registration.pose_graph import SWITCH, Edge, optimize
-from stages.kit.registration.pyramid import Pyramid, build_pyramid
-from stages.kit.registration.rigid_motion import adjoint, angle_of, between, distance_of
-from stages.splat.views import PosedView
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.pairs import Limits, agreed, edge_of, overlap_candidates
+from scenewright.stages.kit.registration.pose_graph import SWITCH, Edge, optimize
+from scenewright.stages.kit.registration.pyramid import Pyramid, build_pyramid
+from scenewright.stages.kit.registration.rigid_motion import adjoint, angle_of, between, distance_of
+from scenewright.stages.splat.views import PosedView
 
 WIDTH, LEVELS, FARTHEST = 160, 3, 6.0
 """Of the pictures that are aligned [px], resolutions, and the farthest depth [m]."""

@@ -6,12 +6,11 @@ import json
 from pathlib import Path
 
 from pydantic import Field, ValidationError, field_validator
-
-from schemas.base import Model
-from schemas.errors import BadInput, ScenewrightError, first_problem
-from schemas.outside import LARGEST_SETTINGS, file_toml
-from schemas.scene_parts import Box
-from stages.kit.open_words.encoder import checked_text
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, ScenewrightError, first_problem
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.open_words.encoder import checked_text
 
 HINT = "docs/SPLATS.md shows a queries.toml"
 

@@ -6,24 +6,23 @@ import time
 from collections import deque
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat, SplatFile, SplatView
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.rendering.splatting.rasterizer import Rasterizer
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.splat.building import LAST, Arrival, arrivals, carried_poses, placed_poses, train
+from scenewright.stages.splat.checkpoints import read_checkpoint, write_checkpoint
+from scenewright.stages.splat.methods.method import Method
+from scenewright.stages.splat.parameters import BuildParameters
+from scenewright.stages.splat.ply import write_gaussians
+from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.triangulation import with_points
+from scenewright.stages.splat.views import evenly, held_out, posed_frames, read_view
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from schemas.sequence import Sequence
-from schemas.splat import Splat, SplatFile, SplatView
-from schemas.trajectory import Trajectory
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.rendering.splatting.rasterizer import Rasterizer
-from stages.kit.stage import Context
-from stages.splat.building import LAST, Arrival, arrivals, carried_poses, placed_poses, train
-from stages.splat.checkpoints import read_checkpoint, write_checkpoint
-from stages.splat.methods.method import Method
-from stages.splat.parameters import BuildParameters
-from stages.splat.ply import write_gaussians
-from stages.splat.training import Trainer
-from stages.splat.triangulation import with_points
-from stages.splat.views import evenly, held_out, posed_frames, read_view
 
 CHECKPOINT_EVERY = 60.0
 """Of a training that may be killed [s]."""
@@ -117,7 +116,7 @@ def run(
 
 def method_of(name: str) -> Method:
     """Return a method by its name."""
-    from stages.splat.methods import ours, thesis
+    from scenewright.stages.splat.methods import ours, thesis
 
     return {"ours": ours.METHOD, "thesis": thesis.METHOD}[name]
 
@@ -125,10 +124,10 @@ def method_of(name: str) -> Method:
 def rasterizer_of(device: str) -> Rasterizer:
     """Return what draws on a device. Raises MissingDependency for `cuda` without gsplat."""
     if device == "cuda":
-        from stages.kit.rendering.splatting.gpu import GpuRasterizer
+        from scenewright.stages.kit.rendering.splatting.gpu import GpuRasterizer
 
         return GpuRasterizer()
-    from stages.kit.rendering.splatting.compiled import CompiledRasterizer
+    from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
 
     return CompiledRasterizer()
 

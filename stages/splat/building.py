@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.rigid_motion import fraction
-from stages.splat.training import Trainer
-from stages.splat.views import PosedView
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.rigid_motion import fraction
+from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.views import PosedView
 
 LAST = 100
 """Steps over which the loss is told."""

@@ -9,13 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.numpy_files import read_all_arrays
-from stages.kit.registration.pose_graph import Edge
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.splat.building import Arrival
-from stages.splat.training import Learned, Trainer, TrainerState
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.numpy_files import read_all_arrays
+from scenewright.stages.kit.registration.pose_graph import Edge
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.splat.building import Arrival
+from scenewright.stages.splat.training import Learned, Trainer, TrainerState
 
 FILE = "checkpoint.npz"
 FACTS = ("steps", "rounds", "was_reset")

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
 
 SPLIT, SHRINK = 2, 1.6
 """A Gaussian that is split becomes so many, each so much smaller."""

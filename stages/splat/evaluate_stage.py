@@ -6,19 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.evaluation import Evaluation, MetricsFile
-from schemas.language_map import LanguageMap
-from stages.kit.drawing.plots import plot_histograms
-from stages.kit.geometry.boxes import points_in_box
-from stages.kit.measurement.tables import Table, write_table
-from stages.kit.open_words.encoder import check_width
-from stages.kit.open_words.finding import Finder
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.stage import Context
-from stages.splat.asked_figures import REJECTED, calibration_error, recall_at_rejection
-from stages.splat.asked_file import read_asked
-from stages.splat.parameters import EvaluateParameters
+from scenewright.schemas.evaluation import Evaluation, MetricsFile
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.stages.kit.drawing.plots import plot_histograms
+from scenewright.stages.kit.geometry.boxes import points_in_box
+from scenewright.stages.kit.measurement.tables import Table, write_table
+from scenewright.stages.kit.open_words.encoder import check_width
+from scenewright.stages.kit.open_words.finding import Finder
+from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.splat.asked_figures import REJECTED, calibration_error, recall_at_rejection
+from scenewright.stages.splat.asked_file import read_asked
+from scenewright.stages.splat.parameters import EvaluateParameters
 
 MARGIN = 0.02
 """A place is at a thing when it lies within its box grown by this on every side [m]."""

@@ -5,22 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.boxes import minimum_box
-from stages.kit.geometry.transforms import inverse
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.open_words.vectors import of_regions, write_vectors
-from stages.kit.stage import Context
-from stages.splat.language.looks import Sight, looks
-from stages.splat.parameters import LabelParameters
-from stages.splat.views import evenly, posed_frames
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.boxes import minimum_box
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.vectors import of_regions, write_vectors
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.splat.language.looks import Sight, looks
+from scenewright.stages.splat.parameters import LabelParameters
+from scenewright.stages.splat.views import evenly, posed_frames
 
 
 def run(

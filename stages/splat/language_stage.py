@@ -7,34 +7,33 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-from schemas.errors import BadInput
-from schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Box
-from schemas.sequence import Sequence
-from schemas.splat import Splat
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.boxes import minimum_box
-from stages.kit.geometry.transforms import inverse
-from stages.kit.open_words.answering import members_of
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.open_words.vectors import Vectors, write_vectors
-from stages.kit.rendering.splatting.rasterizer import View
-from stages.kit.stage import Context
-from stages.splat.build_stage import rasterizer_of
-from stages.splat.language.entities import NONE, entity_of, nearest_entities
-from stages.splat.language.field import LanguageField
-from stages.splat.language.learning import learn, lesson_of
-from stages.splat.language.looks import Sight, looks
-from stages.splat.language.pieces import pieces
-from stages.splat.language.pyramid import pyramid
-from stages.splat.parameters import LanguageParameters
-from stages.splat.ply import read_gaussians
-from stages.splat.strays import no_strays
-from stages.splat.views import evenly, posed_frames
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.boxes import minimum_box
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.open_words.answering import members_of
+from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.vectors import Vectors, write_vectors
+from scenewright.stages.kit.rendering.splatting.rasterizer import View
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.splat.build_stage import rasterizer_of
+from scenewright.stages.splat.language.entities import NONE, entity_of, nearest_entities
+from scenewright.stages.splat.language.field import LanguageField
+from scenewright.stages.splat.language.learning import learn, lesson_of
+from scenewright.stages.splat.language.looks import Sight, looks
+from scenewright.stages.splat.language.pieces import pieces
+from scenewright.stages.splat.language.pyramid import pyramid
+from scenewright.stages.splat.parameters import LanguageParameters
+from scenewright.stages.splat.ply import read_gaussians
+from scenewright.stages.splat.strays import no_strays
+from scenewright.stages.splat.views import evenly, posed_frames
 
 SIZES = tuple(round(float(size), 4) for size in np.geomspace(0.08, 1.5, 8))
 """At which every Gaussian is asked for, up to the thesis's largest [m]."""

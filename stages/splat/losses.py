@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.kit.rendering.splatting.rasterizer import Picture
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture
 
 WINDOW, SIGMA = 11, 1.5
 """Of the structural similarity (Wang et al. 2004)."""

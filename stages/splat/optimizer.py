@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-
-from stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
+from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
 
 FIRST, SECOND, EPSILON = 0.9, 0.999, 1e-15
 """Decay of the moments, and what keeps the division finite: those of Kerbl et al. (2023)."""

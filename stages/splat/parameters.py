@@ -6,17 +6,16 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.contact_graph import ContactGraph
-from schemas.evaluation import Evaluation
-from schemas.language_map import Answers, LanguageMap
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence
-from schemas.splat import Splat, SplatViews
-from schemas.trajectory import Trajectory
-from stages.kit.open_words.encoder import checked_text
-from stages.kit.open_words.options import EXTRAS, WEIGHTS, EncoderParameters, encoder_files
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.schemas.language_map import Answers, LanguageMap
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat, SplatViews
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.open_words.encoder import checked_text
+from scenewright.stages.kit.open_words.options import EXTRAS, WEIGHTS, EncoderParameters, encoder_files
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 QUERIES = External("queries.toml: texts that are true of something there, with its boxes, and texts that are not")
 LIBRARIES = ("numpy", "numba", "scipy", "opencv-python-headless", "pillow")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
 
 HIGHER = 15
 """Coefficients of a colour above degree 0, always written: viewers expect them."""

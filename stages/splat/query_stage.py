@@ -5,17 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraph, ContactGraphFile
-from schemas.errors import BadInput
-from schemas.language_map import Answer, Answers, AnswersFile, LanguageMap
-from stages.kit.formats.map_files import write_arrays
-from stages.kit.open_words.encoder import check_width, checked_text
-from stages.kit.open_words.finding import Finder, Found
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.open_words.relations import split_relation
-from stages.kit.stage import Context
-from stages.splat.parameters import QueryParameters
+from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.language_map import Answer, Answers, AnswersFile, LanguageMap
+from scenewright.stages.kit.formats.map_files import write_arrays
+from scenewright.stages.kit.open_words.encoder import check_width, checked_text
+from scenewright.stages.kit.open_words.finding import Finder, Found
+from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.relations import split_relation
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.splat.parameters import QueryParameters
 
 
 def run(

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 from PIL import Image
-
-from schemas.errors import BadInput
-from schemas.sequence import Sequence
-from schemas.splat import Splat, SplatViews, SplatViewsFile, ViewFigures
-from stages.kit.formats.frames import FrameReader
-from stages.kit.rendering.splatting.rasterizer import Picture, View
-from stages.kit.stage import Context
-from stages.splat.build_stage import rasterizer_of
-from stages.splat.losses import signal_to_noise, structural_similarity
-from stages.splat.parameters import RenderParameters
-from stages.splat.ply import read_gaussians
-from stages.splat.turntable import opened, turn, write_turn
-from stages.splat.views import PosedView, evenly, posed_frames, read_view
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat, SplatViews, SplatViewsFile, ViewFigures
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, View
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.splat.build_stage import rasterizer_of
+from scenewright.stages.splat.losses import signal_to_noise, structural_similarity
+from scenewright.stages.splat.parameters import RenderParameters
+from scenewright.stages.splat.ply import read_gaussians
+from scenewright.stages.splat.turntable import opened, turn, write_turn
+from scenewright.stages.splat.views import PosedView, evenly, posed_frames, read_view
 
 FULL_RED = 0.2
 """Difference of depth that is drawn in full red (behind) or blue (in front) [m]."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scenewright.stages.kit.geometry.cameras import back_project, project
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.harmonics import LEVEL_0
+from scenewright.stages.splat.views import PosedView
 from scipy.ndimage import distance_transform_edt
-
-from stages.kit.geometry.cameras import back_project, project
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.harmonics import LEVEL_0
-from stages.splat.views import PosedView
 
 DEPTH_ERROR = 0.08
 """Farther apart, over the depth, what is shown and what was measured are two things."""

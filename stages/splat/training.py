@@ -5,21 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.pose_graph import Edge
+from scenewright.stages.kit.registration.rigid_motion import inverses
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.rasterizer import Drawn, Rasterizer, View
+from scenewright.stages.splat.adjustment import Adjustment
+from scenewright.stages.splat.density import Pull, grown, useless
+from scenewright.stages.splat.losses import loss_of
+from scenewright.stages.splat.methods.method import Method
+from scenewright.stages.splat.optimizer import RowAdam
+from scenewright.stages.splat.seeding import Seeds, seen_through
+from scenewright.stages.splat.views import PosedView
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.pose_graph import Edge
-from stages.kit.registration.rigid_motion import inverses
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.rasterizer import Drawn, Rasterizer, View
-from stages.splat.adjustment import Adjustment
-from stages.splat.density import Pull, grown, useless
-from stages.splat.losses import loss_of
-from stages.splat.methods.method import Method
-from stages.splat.optimizer import RowAdam
-from stages.splat.seeding import Seeds, seen_through
-from stages.splat.views import PosedView
 
 MOMENTS = (0.9, 0.999)
 

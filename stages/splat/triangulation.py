@@ -12,9 +12,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from stages.kit.geometry.transforms import apply
-from stages.splat.views import PosedView
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.splat.views import PosedView
 
 FEATURES = 2000
 """Of a picture, at most."""

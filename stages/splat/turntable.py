@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import inverse, look_at
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.rasterizer import Rasterizer, View
-from stages.splat.strays import no_strays
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import inverse, look_at
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.rasterizer import Rasterizer, View
+from scenewright.stages.splat.strays import no_strays
 
 SIZE = (480, 360)
 """Of a picture [px]."""

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.cameras import scaled
-from stages.kit.geometry.transforms import inverse
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.transforms import inverse
 
 DARK = 0.02
 """Mean brightness, of 1, below which a picture shows nothing."""

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.evaluation import MetricsFile
-from schemas.suture_needle import SutureNeedle, SutureThread
-from schemas.suture_scene import StereoRigRecord, SutureScene, SutureSceneFile, SutureView
-from schemas.suture_trial import SutureEvaluation, SutureTrial
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.stage import Context
-from stages.suture.evaluation import needle_figures, trial_figures
-from stages.suture.evaluation.judgement import Estimate, NeedleTruth, judged
-from stages.suture.evaluation.thread_figures import ThreadError, thread_error, thread_metrics, thread_rows
-from stages.suture.needle.records import as_estimate
-from stages.suture.parameters import EvaluateParameters
-from stages.suture.rig import NeedlePose
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.evaluation import MetricsFile
+from scenewright.schemas.suture_needle import SutureNeedle, SutureThread
+from scenewright.schemas.suture_scene import StereoRigRecord, SutureScene, SutureSceneFile, SutureView
+from scenewright.schemas.suture_trial import SutureEvaluation, SutureTrial
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.suture.evaluation import needle_figures, trial_figures
+from scenewright.stages.suture.evaluation.judgement import Estimate, NeedleTruth, judged
+from scenewright.stages.suture.evaluation.thread_figures import ThreadError, thread_error, thread_metrics, thread_rows
+from scenewright.stages.suture.needle.records import as_estimate
+from scenewright.stages.suture.parameters import EvaluateParameters
+from scenewright.stages.suture.rig import NeedlePose
 
 ROUNDING = 1e-9
 """Of a baseline [m]."""
@@ -33,7 +32,7 @@ def run(
     context: Context,
 ) -> SutureEvaluation:
     """Write metrics.json, table.md and the plots of whatever is given."""
-    from stages.suture.evaluation import plots
+    from scenewright.stages.suture.evaluation import plots
 
     figures: dict[str, float | None] = {}
     parts: list[str] = []

@@ -16,19 +16,18 @@ from typing import Any, TextIO
 import cv2
 import numpy as np
 from pydantic import ValidationError
-
-from schemas.errors import BadInput, first_problem
-from schemas.outside import file_content, file_json
-from schemas.suture_scene import RigFile
-from stages.kit.formats.image_headers import image_size
-from stages.suture.masks import EyeMasks, MaskMaker
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.needle.radius import as_if_usual, in_metres
-from stages.suture.needle.records import as_estimate_record
-from stages.suture.needle.starts import FARTHEST, NEAREST
-from stages.suture.pairs import SQUARE, Pair
-from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import file_content, file_json
+from scenewright.schemas.suture_scene import RigFile
+from scenewright.stages.kit.formats.image_headers import image_size
+from scenewright.stages.suture.masks import EyeMasks, MaskMaker
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from scenewright.stages.suture.needle.radius import as_if_usual, in_metres
+from scenewright.stages.suture.needle.records import as_estimate_record
+from scenewright.stages.suture.needle.starts import FARTHEST, NEAREST
+from scenewright.stages.suture.pairs import SQUARE, Pair
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 LARGEST_PICTURE = 64 * 2**20
 RIG_HINT = (

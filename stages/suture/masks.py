@@ -10,22 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
-from schemas.sequence import Sequence
-from schemas.suture_needle import MaskSource
-from schemas.suture_scene import SutureScene
-from stages.suture.needle.observation import NeedleObservation, violet
-from stages.suture.options import CHECKPOINT, MaskOptions
-from stages.suture.pairs import Pair
-from stages.suture.rig import StereoRig
-from stages.suture.truth_files import SIDES, eyes_of_truth, read_label_image
-from stages.suture.world.corruption import spoiled_drivers, spoiled_mask, spoiled_thread
-from stages.suture.world.render import Eye
-from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.suture_needle import MaskSource
+from scenewright.schemas.suture_scene import SutureScene
+from scenewright.stages.suture.needle.observation import NeedleObservation, violet
+from scenewright.stages.suture.options import CHECKPOINT, MaskOptions
+from scenewright.stages.suture.pairs import Pair
+from scenewright.stages.suture.rig import StereoRig
+from scenewright.stages.suture.truth_files import SIDES, eyes_of_truth, read_label_image
+from scenewright.stages.suture.world.corruption import spoiled_drivers, spoiled_mask, spoiled_thread
+from scenewright.stages.suture.world.render import Eye
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
 
 if TYPE_CHECKING:
-    from stages.suture.segmentation.infer import Masks
+    from scenewright.stages.suture.segmentation.infer import Masks
 
 SEED_OF_MASKS = 5
 BUNDLED = Path(__file__).resolve().parents[2] / "data" / CHECKPOINT
@@ -189,7 +188,7 @@ def learned_masks(left: Masks, right: Masks) -> EyeMasks:
 def open_segmenter(checkpoint: Path | None) -> Any:
     """Return the segmenter of a checkpoint, or of the one in data/. Raises MissingDependency without one."""
     try:
-        infer = importlib.import_module("stages.suture.segmentation.infer")
+        infer = importlib.import_module("scenewright.stages.suture.segmentation.infer")
     except ImportError as error:
         raise MissingDependency(f"the learned segmenter cannot be loaded: {error}", hint=OTHER_MASKS) from None
     path = checkpoint if checkpoint is not None else BUNDLED

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.suture.needle.filter import STEP_SHIFT, STEP_TURN
 from scipy.spatial.transform import Rotation
-
-from stages.suture.needle.filter import STEP_SHIFT, STEP_TURN
 
 
 def reported_motion(motion: np.ndarray, centre: np.ndarray, random: np.random.Generator) -> np.ndarray:

@@ -9,25 +9,24 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.disparity import Disparity
-from schemas.errors import BadInput
-from schemas.sequence import Sequence
-from schemas.suture_needle import NeedleFrame, SutureNeedle, SutureNeedleFile
-from schemas.suture_scene import SutureScene, SutureView
-from stages.kit.formats.disparity_file import DisparityReader
-from stages.kit.stage import Context
-from stages.suture.masks import EyeMasks, MaskMaker, open_masks
-from stages.suture.motion_reports import motions_to_last
-from stages.suture.needle.drawing import draw_eyes, estimate_text
-from stages.suture.needle.estimators import ESTIMATORS
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.needle.radius import as_if_usual, in_metres
-from stages.suture.needle.radius_fit import Radius, fitted_radius, together, with_radius_unknown
-from stages.suture.needle.records import as_estimate_record
-from stages.suture.pairs import Pair, StereoPairs
-from stages.suture.parameters import NeedleParameters
-from stages.suture.rig import NeedlePose, StereoRig
+from scenewright.schemas.disparity import Disparity
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.suture_needle import NeedleFrame, SutureNeedle, SutureNeedleFile
+from scenewright.schemas.suture_scene import SutureScene, SutureView
+from scenewright.stages.kit.formats.disparity_file import DisparityReader
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.suture.masks import EyeMasks, MaskMaker, open_masks
+from scenewright.stages.suture.motion_reports import motions_to_last
+from scenewright.stages.suture.needle.drawing import draw_eyes, estimate_text
+from scenewright.stages.suture.needle.estimators import ESTIMATORS
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.needle.radius import as_if_usual, in_metres
+from scenewright.stages.suture.needle.radius_fit import Radius, fitted_radius, together, with_radius_unknown
+from scenewright.stages.suture.needle.records import as_estimate_record
+from scenewright.stages.suture.pairs import Pair, StereoPairs
+from scenewright.stages.suture.parameters import NeedleParameters
+from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 RADIUS_FRAMES = 20
 """From so many frames a radius is fitted."""

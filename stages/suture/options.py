@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from stages.kit.stage import Parameters
+from scenewright.stages.kit.stage import Parameters
 
 CHECKPOINT = "stitch/segmentation.safetensors"
 """Of the segmenter that is shipped, below data/."""

@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence
-from schemas.suture_scene import StereoRigRecord
-from stages.kit.formats.foxglove import nanoseconds
-from stages.kit.formats.frames import FrameReader
-from stages.suture.rig import StereoRig
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.suture_scene import StereoRigRecord
+from scenewright.stages.kit.formats.foxglove import nanoseconds
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.suture.rig import StereoRig
 
 SMALLEST_BASELINE = 1e-4
 """Eyes nearer than this [m] are one."""

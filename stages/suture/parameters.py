@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.disparity import Disparity
-from schemas.errors import UsageError
-from schemas.sequence import Sequence
-from schemas.suture_needle import SutureNeedle, SutureThread
-from schemas.suture_scene import SutureScene
-from schemas.suture_trial import SutureEvaluation, SutureTrial
-from stages.kit.stage import External, Optionally, Parameters, Stage
-from stages.suture.options import ARM_NAMES, CHECKPOINT, HolderName, MaskOptions, PlaceName
+from scenewright.schemas.disparity import Disparity
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.suture_needle import SutureNeedle, SutureThread
+from scenewright.schemas.suture_scene import SutureScene
+from scenewright.schemas.suture_trial import SutureEvaluation, SutureTrial
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.stages.suture.options import ARM_NAMES, CHECKPOINT, HolderName, MaskOptions, PlaceName
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 NEED_DISPARITY = ("thesis",)

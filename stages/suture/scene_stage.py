@@ -6,22 +6,21 @@ from collections.abc import Iterator
 
 import cv2
 import numpy as np
-
-from schemas.base import as_transform, as_vector
-from schemas.scene_parts import Camera
-from schemas.sequence import Gravity, SequenceCamera, SequenceFile
-from schemas.suture_scene import StereoRigRecord, SutureScene, SutureSceneFile, SutureView
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.stage import Context
-from stages.suture.motion_reports import reported_motion
-from stages.suture.parameters import SceneParameters
-from stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, StereoRig
-from stages.suture.truth_files import BODIES, write_truth
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.sampling import seen_scene
-from stages.suture.world.scene import NeedleScene, moved_scene, random_motions
+from scenewright.schemas.base import as_transform, as_vector
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Gravity, SequenceCamera, SequenceFile
+from scenewright.schemas.suture_scene import StereoRigRecord, SutureScene, SutureSceneFile, SutureView
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.suture.motion_reports import reported_motion
+from scenewright.stages.suture.parameters import SceneParameters
+from scenewright.stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, StereoRig
+from scenewright.stages.suture.truth_files import BODIES, write_truth
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.sampling import seen_scene
+from scenewright.stages.suture.world.scene import NeedleScene, moved_scene, random_motions
 
 RIGS: dict[str, StereoRig] = {"two_cameras": TWO_CAMERAS, "endoscope": ENDOSCOPE}
 SEED_OF_MOTION = 6

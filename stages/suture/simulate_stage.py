@@ -7,21 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.suture_trial import SutureEvent, SuturePerception, SutureRun, SutureTrial, SutureTrialFile
-from stages.kit.stage import Context
-from stages.suture.motion.constants import THROWS
-from stages.suture.parameters import SimulateParameters
-from stages.suture.trials.machine import run_trial
-from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
-from stages.suture.trials.policies import POLICIES
-from stages.suture.trials.recording import Recorder
-from stages.suture.trials.records import run_of
-from stages.suture.trials.settings import World
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.suture_trial import SutureEvent, SuturePerception, SutureRun, SutureTrial, SutureTrialFile
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.suture.motion.constants import THROWS
+from scenewright.stages.suture.parameters import SimulateParameters
+from scenewright.stages.suture.trials.machine import run_trial
+from scenewright.stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from scenewright.stages.suture.trials.policies import POLICIES
+from scenewright.stages.suture.trials.recording import Recorder
+from scenewright.stages.suture.trials.records import run_of
+from scenewright.stages.suture.trials.settings import World
 
 if TYPE_CHECKING:
-    from stages.suture.trials.sight import LookingEyes
+    from scenewright.stages.suture.trials.sight import LookingEyes
 
 PANELS_SHOWN = 18
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
@@ -58,7 +57,7 @@ def run(perception: Path | None, *, parameters: SimulateParameters, context: Con
     recorder.write(context.output / "frames.npz")
     np.savez_compressed(context.output / "motions.npz", allow_pickle=False, **recorder.motions())
     with context.progress.step("strip"):
-        from stages.suture.trials.drawing import draw_strip
+        from scenewright.stages.suture.trials.drawing import draw_strip
 
         draw_strip(context.output / "strip.png", recorder.arrays(), most=PANELS_SHOWN)
     summary: dict[str, object] = {
@@ -86,7 +85,7 @@ def _model(arm: str, given: Path | None) -> PerceptionModel:
 def _eyes(model: PerceptionModel, seed: int, sight: str) -> LookingEyes | None:
     if sight == "model":
         return None
-    from stages.suture.trials.sight import LookingEyes
+    from scenewright.stages.suture.trials.sight import LookingEyes
 
     return LookingEyes(model, seed, sight == "pictures")
 
@@ -96,8 +95,8 @@ def _perception(arm: str, model: PerceptionModel, sight: str) -> SuturePerceptio
     if sight == "model":
         provenance = " ".join(model.provenance.split())
         return SuturePerception(arm=arm, model=model.name, measured=model.measured, provenance=provenance)
-    from stages.suture.needle.estimators import ESTIMATORS
-    from stages.suture.trials.sight import SIGHTS
+    from scenewright.stages.suture.needle.estimators import ESTIMATORS
+    from scenewright.stages.suture.trials.sight import SIGHTS
 
     whose = ESTIMATORS[model.name].whose
     return SuturePerception(arm=arm, model=sight, measured=True, provenance=f"{whose}: {SIGHTS[sight]}")

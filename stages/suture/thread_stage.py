@@ -9,18 +9,17 @@ from typing import Any
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
-from schemas.sequence import Sequence
-from schemas.suture_needle import SutureNeedle, SutureThread, SutureThreadFile, ThreadFrame
-from stages.kit.stage import Context
-from stages.suture.masks import EyeMasks, open_masks
-from stages.suture.needle.drawing import VIOLET, WHITE
-from stages.suture.needle.radius import swage_of
-from stages.suture.needle.records import as_estimate
-from stages.suture.pairs import Pair, StereoPairs
-from stages.suture.parameters import ThreadParameters
-from stages.suture.rig import StereoRig
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.suture_needle import SutureNeedle, SutureThread, SutureThreadFile, ThreadFrame
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.suture.masks import EyeMasks, open_masks
+from scenewright.stages.suture.needle.drawing import VIOLET, WHITE
+from scenewright.stages.suture.needle.radius import swage_of
+from scenewright.stages.suture.needle.records import as_estimate
+from scenewright.stages.suture.pairs import Pair, StereoPairs
+from scenewright.stages.suture.parameters import ThreadParameters
+from scenewright.stages.suture.rig import StereoRig
 
 WIDTH = 720
 """Of each eye's picture [px]."""
@@ -98,7 +97,7 @@ def run(
 def _reconstruction() -> Any:
     """Return the function that makes a curve of two masks. Raises MissingDependency without its module."""
     try:
-        return importlib.import_module("stages.suture.thread.reconstruct").reconstruct_thread
+        return importlib.import_module("scenewright.stages.suture.thread.reconstruct").reconstruct_thread
     except ImportError as error:
         raise MissingDependency(f"threads cannot be reconstructed: {error}", hint="scenewright doctor") from None
 

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.suture.world.render import Eye, StereoView
-from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.suture.world.render import Eye, StereoView
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
 
 BODIES = {"needle": NEEDLE, "thread": THREAD, "left_driver": LEFT_DRIVER, "right_driver": RIGHT_DRIVER}
 SIDES = ("left", "right")

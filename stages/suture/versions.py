@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stages.kit.library_versions import library_version
-from stages.suture.options import MaskOptions
+from scenewright.stages.kit.library_versions import library_version
+from scenewright.stages.suture.options import MaskOptions
 
 
 def versions(parameters: MaskOptions) -> dict[str, str]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.rendering.light_map import AreaLight
-from stages.kit.rendering.patterns import Material
-from stages.synthesize.arrangement import Arrangement
-from stages.synthesize.placement import PlacedObject
-from stages.synthesize.recipes import Shell
-from stages.synthesize.shell import Room
+from scenewright.stages.kit.rendering.light_map import AreaLight
+from scenewright.stages.kit.rendering.patterns import Material
+from scenewright.stages.synthesize.arrangement import Arrangement
+from scenewright.stages.synthesize.placement import PlacedObject
+from scenewright.stages.synthesize.recipes import Shell
+from scenewright.stages.synthesize.shell import Room
 
 GLOSS = {
     "fridge": 0.30,

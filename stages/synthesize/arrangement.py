@@ -8,17 +8,16 @@ from itertools import count
 
 import numpy as np
 import trimesh
-
-from schemas.cad_library import CadModel
-from schemas.errors import BadInput
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.synthesize.collision import CollisionWorld, PlacedShape, box_shape
-from stages.synthesize.furniture import Catalogue, Furnishing, main_joint
-from stages.synthesize.less_common import across_two, beside_its_like, from_ceiling, leaning
-from stages.synthesize.placement import Hanging, PlacedObject, Pose
-from stages.synthesize.recipes import CLUTTER_FACTOR, Place, Recipe
-from stages.synthesize.shell import Room, build_room
-from stages.synthesize.support import sample_stand
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.synthesize.collision import CollisionWorld, PlacedShape, box_shape
+from scenewright.stages.synthesize.furniture import Catalogue, Furnishing, main_joint
+from scenewright.stages.synthesize.less_common import across_two, beside_its_like, from_ceiling, leaning
+from scenewright.stages.synthesize.placement import Hanging, PlacedObject, Pose
+from scenewright.stages.synthesize.recipes import CLUTTER_FACTOR, Place, Recipe
+from scenewright.stages.synthesize.shell import Room, build_room
+from scenewright.stages.synthesize.support import sample_stand
 
 ATTEMPTS = 160
 """Poses tried for one object."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import fcl
 import numpy as np
 import trimesh
-
-from stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.geometry.transforms import apply
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,21 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.synthesize.free_space import FreeSpace
+from scenewright.stages.synthesize.walk import (
+    CLEARANCE,
+    GAZE_SMOOTHING,
+    RATE,
+    STEP,
+    Walk,
+    draw_tremor,
+    resample,
+    smooth_path,
+)
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse.csgraph import dijkstra
-
-from schemas.errors import BadInput
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.free_space import FreeSpace
-from stages.synthesize.walk import CLEARANCE, GAZE_SMOOTHING, RATE, STEP, Walk, draw_tremor, resample, smooth_path
 
 Shape = Literal["line", "loop", "eight"]
 HEIGHTS = (1.5, 0.9)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scipy.ndimage import map_coordinates
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
-
-from schemas.errors import BadInput
-from stages.kit.rendering.ray_casting import SceneRenderer
 
 CELL = 0.05
 """[m]"""

@@ -8,20 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_vector
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.scene_parts import Joint, SurfacePlane
-from stages.kit.formats.cad_models import (
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.kit.formats.cad_models import (
     load_collision_parts,
     model_folder,
     part_transforms,
     posed_collision,
     posed_mesh,
 )
-from stages.kit.geometry.ray_scenes import Triangles, triangles_of
-from stages.kit.geometry.transforms import apply
-from stages.synthesize.collision import ConvexShape, convex_shape
+from scenewright.stages.kit.geometry.ray_scenes import Triangles, triangles_of
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.synthesize.collision import ConvexShape, convex_shape
 
 SWEEP_STEPS = 9
 CONTACT_BAND = 1.5e-3

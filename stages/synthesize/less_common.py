@@ -5,13 +5,12 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-
-from stages.kit.geometry.boxes import box_from_bounds, clip_polygon, convex_hull, footprint, polygon_area
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.synthesize.furniture import Furnishing, plane_in_world
-from stages.synthesize.placement import Further, PlacedObject, Pose
-from stages.synthesize.recipes import Place
-from stages.synthesize.shell import Room
+from scenewright.stages.kit.geometry.boxes import box_from_bounds, clip_polygon, convex_hull, footprint, polygon_area
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.synthesize.furniture import Furnishing, plane_in_world
+from scenewright.stages.synthesize.placement import Further, PlacedObject, Pose
+from scenewright.stages.synthesize.recipes import Place
+from scenewright.stages.synthesize.shell import Room
 
 CEILING_GAP = 1e-3
 """Between a canopy and the ceiling [m]."""

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.cad_library import Affordances
-from stages.kit.geometry.transforms import transform_from
-from stages.synthesize.arrangement import TOUCH, Arrangement
-from stages.synthesize.collision import CollisionWorld
-from stages.synthesize.furniture import Catalogue, same_plane
-from stages.synthesize.placement import PlacedObject
+from scenewright.schemas.cad_library import Affordances
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.synthesize.arrangement import TOUCH, Arrangement
+from scenewright.stages.synthesize.collision import CollisionWorld
+from scenewright.stages.synthesize.furniture import Catalogue, same_plane
+from scenewright.stages.synthesize.placement import PlacedObject
 
 OPENED = (0.35, 1.0)
 """Share of its range by which a joint is opened."""

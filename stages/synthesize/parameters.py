@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.cad_library import CadLibrary
-from schemas.errors import UsageError
-from schemas.ground_truth import GroundTruth
-from stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
-from stages.kit.stage import Parameters, Stage
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
+from scenewright.stages.kit.stage import Parameters, Stage
 
 
 class SynthesizeParameters(Parameters):

@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 import trimesh
-
-from stages.synthesize.furniture import Furnishing
+from scenewright.stages.synthesize.furniture import Furnishing
 
 Hanging = Literal["supports", "contains", "carries_on_wall", "hangs_from"]
 

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, ValidationError
-
-from schemas.base import Model
-from schemas.errors import BadInput, UsageError, first_problem
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, UsageError, first_problem
 
 RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "recipes"
 CLUTTER_FACTOR = {"none": 0.0, "low": 0.5, "medium": 1.0, "high": 2.0}

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 GRID = 0.01
 """[m]"""

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_vector
-from schemas.scene_parts import SurfacePlane
-from stages.synthesize.recipes import Shell
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.synthesize.recipes import Shell
 
 THICKNESS = 0.05
 """Of every slab, outside the room [m]."""

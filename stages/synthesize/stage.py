@@ -6,32 +6,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import LabelEntry
+from scenewright.stages.kit.formats.frames import CAMERA_FRAME, FrameWriter
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
+from scenewright.stages.kit.rendering.light_map import SoftLight
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layout_materials, object_material
+from scenewright.stages.synthesize.arrangement import Arrangement, arrange, world_meshes
+from scenewright.stages.synthesize.drive import plan_drive
+from scenewright.stages.synthesize.free_space import find_free_space
+from scenewright.stages.synthesize.furniture import Catalogue
+from scenewright.stages.synthesize.opening import TwoStates, open_some
+from scenewright.stages.synthesize.parameters import SynthesizeParameters
+from scenewright.stages.synthesize.recipes import Recipe, load_recipe, rescaled
+from scenewright.stages.synthesize.seen_surface import SeenSurface
+from scenewright.stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true_mesh, true_objects
+from scenewright.stages.synthesize.viewpoints import blocked_floor, choose_views
+from scenewright.stages.synthesize.walk import Walk, frame_times, plan_walk
 from scipy.spatial.transform import Rotation
-
-from schemas.cad_library import CadLibrary
-from schemas.ground_truth import GroundTruth, GroundTruthFile
-from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry
-from stages.kit.formats.frames import CAMERA_FRAME, FrameWriter
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
-from stages.kit.rendering.light_map import SoftLight
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.kit.stage import Context
-from stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layout_materials, object_material
-from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
-from stages.synthesize.drive import plan_drive
-from stages.synthesize.free_space import find_free_space
-from stages.synthesize.furniture import Catalogue
-from stages.synthesize.opening import TwoStates, open_some
-from stages.synthesize.parameters import SynthesizeParameters
-from stages.synthesize.recipes import Recipe, load_recipe, rescaled
-from stages.synthesize.seen_surface import SeenSurface
-from stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true_mesh, true_objects
-from stages.synthesize.viewpoints import blocked_floor, choose_views
-from stages.synthesize.walk import Walk, frame_times, plan_walk
 
 CAMERAS = {CAMERA_FRAME: 0.0, "camera_left": 60.0, "camera_right": -60.0}
 """By name: how far each is turned to the left of the one ahead, about the vertical [deg]."""

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import open3d as o3d
-
-from schemas.scene_parts import SurfacePlane
-from stages.kit.geometry.transforms import apply, transform_from_yaw
-from stages.synthesize.furniture import Furnishing
-from stages.synthesize.recipes import Place
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
+from scenewright.stages.synthesize.furniture import Furnishing
+from scenewright.stages.synthesize.recipes import Place
 
 if TYPE_CHECKING:
-    from stages.synthesize.placement import PlacedObject
+    from scenewright.stages.synthesize.placement import PlacedObject
 
 CONTACT_TOLERANCE = 1e-3
 """A contact point that hangs further than this over the surface is not supported [m]."""

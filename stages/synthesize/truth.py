@@ -6,14 +6,13 @@ from typing import Any, Literal
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_transform
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.ground_truth import TrueObject
-from schemas.scene_parts import Box, Relation, SurfacePlane
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.scene_bundle import BundleBody
-from stages.kit.geometry.boxes import (
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.ground_truth import TrueObject
+from scenewright.schemas.scene_parts import Box, Relation, SurfacePlane
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.scene_bundle import BundleBody
+from scenewright.stages.kit.geometry.boxes import (
     box_at_yaw,
     box_from_bounds,
     boxes_overlap_volume,
@@ -24,10 +23,10 @@ from stages.kit.geometry.boxes import (
     minimum_box,
     polygon_area,
 )
-from stages.synthesize.arrangement import Arrangement, world_meshes
-from stages.synthesize.furniture import plane_in_world
-from stages.synthesize.placement import Further, Hanging, PlacedObject
-from stages.synthesize.shell import Layout
+from scenewright.stages.synthesize.arrangement import Arrangement, world_meshes
+from scenewright.stages.synthesize.furniture import plane_in_world
+from scenewright.stages.synthesize.placement import Further, Hanging, PlacedObject
+from scenewright.stages.synthesize.shell import Layout
 
 LEAST_SHARED_VOLUME = 1e-6
 """Boxes that share less than a cubic centimetre only touch [m^3]."""

@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import project
-from stages.kit.geometry.transforms import apply, inverse, look_at
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.arrangement import Arrangement, world_meshes
-from stages.synthesize.free_space import CELL, FreeSpace, find_free_space
-from stages.synthesize.placement import PlacedObject
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import project
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.synthesize.arrangement import Arrangement, world_meshes
+from scenewright.stages.synthesize.free_space import CELL, FreeSpace, find_free_space
+from scenewright.stages.synthesize.placement import PlacedObject
 
 EYE_HEIGHT = 1.5
 """[m]"""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.transforms import look_at, transform_from
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.synthesize.free_space import FreeSpace
+from scenewright.stages.synthesize.viewpoints import View
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse.csgraph import dijkstra
-
-from schemas.errors import BadInput
-from stages.kit.geometry.transforms import look_at, transform_from
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.free_space import FreeSpace
-from stages.synthesize.viewpoints import View
 
 STEP = 0.02
 """Spacing of path samples [m]."""

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.tableware_detections import TablewareDetections
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.tableware_detections import TablewareDetections
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 DISHES_FILE = External("dishes.toml: what your dishes and your gripper measure [m] (docs/TIDY.md)")
 

@@ -6,21 +6,20 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.tableware_detections import TablewareDetections, TablewareDetectionsFile, TablewareOutline
-from schemas.tableware_dishes import TablewareDishes
-from stages.kit.stage import Context
-from stages.tableware.detect_parameters import DetectParameters
-from stages.tableware.dishes_file import read_dishes, setting_of
-from stages.tableware.vision.detections_file import to_file
-from stages.tableware.vision.image_files import TableImage, read_image
-from stages.tableware.vision.overlay import draw_outlines, draw_sight
-from stages.tableware.vision.photographs import find_outlines
-from stages.tableware.vision.seeing import Sizes, see
-from stages.tableware.world.items import DishSizes
-from stages.tableware.world.overhead import OverheadCamera
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.tableware_detections import TablewareDetections, TablewareDetectionsFile, TablewareOutline
+from scenewright.schemas.tableware_dishes import TablewareDishes
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.tableware.detect_parameters import DetectParameters
+from scenewright.stages.tableware.dishes_file import read_dishes, setting_of
+from scenewright.stages.tableware.vision.detections_file import to_file
+from scenewright.stages.tableware.vision.image_files import TableImage, read_image
+from scenewright.stages.tableware.vision.overlay import draw_outlines, draw_sight
+from scenewright.stages.tableware.vision.photographs import find_outlines
+from scenewright.stages.tableware.vision.seeing import Sizes, see
+from scenewright.stages.tableware.world.items import DishSizes
+from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 
 def run(

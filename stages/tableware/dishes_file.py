@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import ValidationError
-
-from schemas.errors import BadInput, first_problem
-from schemas.outside import LARGEST_SETTINGS, file_toml
-from schemas.tableware_dishes import DishSize, TablewareDishes, UtensilSize
-from stages.tableware.vision.detections import Detection
-from stages.tableware.world.items import DISHES, STANDARD, DishSizes, Kind, Measures, dish_measures
-from stages.tableware.world.setting import Gripper, Setting
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
+from scenewright.schemas.tableware_dishes import DishSize, TablewareDishes, UtensilSize
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.world.items import DISHES, STANDARD, DishSizes, Kind, Measures, dish_measures
+from scenewright.stages.tableware.world.setting import Gripper, Setting
 
 HINT = "docs/TIDY.md shows a dishes.toml"
 ALIKE = 0.005

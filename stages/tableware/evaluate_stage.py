@@ -6,20 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareEvaluationFile
-from stages.kit.measurement.bootstrap import bootstrap_interval
-from stages.kit.stage import Context
-from stages.tableware.options import TierName
-from stages.tableware.parameters import EvaluateParameters
-from stages.tableware.planning.choice import chances_of, declared_policy, time_model
-from stages.tableware.planning.policy import Policy
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.sight import Eyes
-from stages.tableware.simulation.fast import FastWorld
-from stages.tableware.simulation.trial import Trial, World, run_in, truth
-from stages.tableware.world.items import Table
-from stages.tableware.world.scenes import make_table
+from scenewright.schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareEvaluationFile
+from scenewright.stages.kit.measurement.bootstrap import bootstrap_interval
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.tableware.options import TierName
+from scenewright.stages.tableware.parameters import EvaluateParameters
+from scenewright.stages.tableware.planning.choice import chances_of, declared_policy, time_model
+from scenewright.stages.tableware.planning.policy import Policy
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.sight import Eyes
+from scenewright.stages.tableware.simulation.fast import FastWorld
+from scenewright.stages.tableware.simulation.trial import Trial, World, run_in, truth
+from scenewright.stages.tableware.world.items import Table
+from scenewright.stages.tableware.world.scenes import make_table
 
 BASELINE = "random"
 """The policy against which ratios are taken."""

@@ -6,7 +6,7 @@ import importlib
 import pkgutil
 from types import ModuleType
 
-from schemas.errors import UsageError
+from scenewright.schemas.errors import UsageError
 
 
 def names_in(package: ModuleType) -> tuple[str, ...]:

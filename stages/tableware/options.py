@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
-
-from stages.kit.stage import Parameters
-from stages.tableware import policies
-from stages.tableware.found_by_place import names_in
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.tableware import policies
+from scenewright.stages.tableware.found_by_place import names_in
 
 TierName = Literal["tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3"]
 if TYPE_CHECKING:

@@ -6,17 +6,23 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
-
-from schemas.errors import UsageError
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewarePlan
-from schemas.tableware_scene import TablewareScene
-from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
-from stages.kit.stage import Optionally, Parameters, Stage
-from stages.tableware import policies
-from stages.tableware.detect_parameters import DETECT, DISHES_FILE
-from stages.tableware.found_by_place import names_in
-from stages.tableware.options import ARM_FILES, PHYSICS_TIMES, THESIS_TIMES, ActionTimes, PolicyName, TierName
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.tableware_detections import TablewareDetections
+from scenewright.schemas.tableware_plan import TablewarePlan
+from scenewright.schemas.tableware_scene import TablewareScene
+from scenewright.schemas.tableware_trial import TablewareEvaluation, TablewareTrial
+from scenewright.stages.kit.stage import Optionally, Parameters, Stage
+from scenewright.stages.tableware import policies
+from scenewright.stages.tableware.detect_parameters import DETECT, DISHES_FILE
+from scenewright.stages.tableware.found_by_place import names_in
+from scenewright.stages.tableware.options import (
+    ARM_FILES,
+    PHYSICS_TIMES,
+    THESIS_TIMES,
+    ActionTimes,
+    PolicyName,
+    TierName,
+)
 
 
 class SceneParameters(Parameters):

@@ -6,32 +6,31 @@ from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image
-
-from schemas.errors import BadInput
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewarePlan, TablewarePlanFile, TablewareStep
-from schemas.tableware_scene import TablewareScene
-from stages.kit.stage import Context
-from stages.tableware.dishes_file import estimated_setting, file_of, setting_of
-from stages.tableware.parameters import PlanParameters
-from stages.tableware.planning.choice import as_times, chances_of, declared_policy, make_policy, time_model
-from stages.tableware.planning.reasons import impossible_pairs
-from stages.tableware.planning.records import as_record
-from stages.tableware.planning.refusals import Accepted, accept, statement
-from stages.tableware.planning.rules import Rules
-from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
-from stages.tableware.ros2_plan import write_plan_bag
-from stages.tableware.scene_files import read_image
-from stages.tableware.sight import look, setting_seen, understood
-from stages.tableware.simulation.fast import FastWorld, run_trial
-from stages.tableware.simulation.trial import Done, Trial, run_in
-from stages.tableware.table_pictures import Panel, draw_strip
-from stages.tableware.vision.detections_file import from_file
-from stages.tableware.vision.overlay import draw_sight
-from stages.tableware.vision.seeing import Sizes
-from stages.tableware.world.items import Table
-from stages.tableware.world.records import as_records, as_table
-from stages.tableware.world.setting import Setting
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.tableware_detections import TablewareDetections
+from scenewright.schemas.tableware_plan import TablewarePlan, TablewarePlanFile, TablewareStep
+from scenewright.schemas.tableware_scene import TablewareScene
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.tableware.dishes_file import estimated_setting, file_of, setting_of
+from scenewright.stages.tableware.parameters import PlanParameters
+from scenewright.stages.tableware.planning.choice import as_times, chances_of, declared_policy, make_policy, time_model
+from scenewright.stages.tableware.planning.reasons import impossible_pairs
+from scenewright.stages.tableware.planning.records import as_record
+from scenewright.stages.tableware.planning.refusals import Accepted, accept, statement
+from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.planning.time_model import EXACT, Chances, TimeModel
+from scenewright.stages.tableware.ros2_plan import write_plan_bag
+from scenewright.stages.tableware.scene_files import read_image
+from scenewright.stages.tableware.sight import look, setting_seen, understood
+from scenewright.stages.tableware.simulation.fast import FastWorld, run_trial
+from scenewright.stages.tableware.simulation.trial import Done, Trial, run_in
+from scenewright.stages.tableware.table_pictures import Panel, draw_strip
+from scenewright.stages.tableware.vision.detections_file import from_file
+from scenewright.stages.tableware.vision.overlay import draw_sight
+from scenewright.stages.tableware.vision.seeing import Sizes
+from scenewright.stages.tableware.world.items import Table
+from scenewright.stages.tableware.world.records import as_records, as_table
+from scenewright.stages.tableware.world.setting import Setting
 
 ESTIMATED = (
     "sizes are estimated: nothing is stacked, side by side go only kinds whose dishes measure alike, and forks and "

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.tableware_plan import (
+from scenewright.schemas.tableware_plan import (
     ActionFields,
     GraspFields,
     PullFields,
@@ -23,7 +22,7 @@ from schemas.tableware_plan import (
     StackGraspFields,
     TablewarePlanFile,
 )
-from stages.kit.ros2_bag import BagWriter, ros2_header, ros2_types
+from scenewright.stages.kit.ros2_bag import BagWriter, ros2_header, ros2_types
 
 FRAME = "table"
 POSE_ARRAY, STRING = "geometry_msgs/msg/PoseArray", "std_msgs/msg/String"

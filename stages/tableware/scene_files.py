@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from PIL import Image
-
-from schemas.errors import BadInput
-from schemas.tableware_scene import TablewareScene
-from stages.kit.formats.numpy_files import read_arrays
-from stages.tableware.world.overhead import OverheadCamera
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.tableware_scene import TablewareScene
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 
 def read_image(scene: TablewareScene) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:

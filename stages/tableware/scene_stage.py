@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-
-from schemas.base import as_transform
-from schemas.tableware_scene import TablewareScene, TablewareSceneFile
-from stages.kit.stage import Context
-from stages.tableware.dishes_file import read_dishes, setting_of
-from stages.tableware.parameters import SceneParameters
-from stages.tableware.world.overhead import overhead_camera, render_overhead
-from stages.tableware.world.records import as_records
-from stages.tableware.world.scenes import make_table
-from stages.tableware.world.shape_files import write_shapes
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.tableware_scene import TablewareScene, TablewareSceneFile
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.tableware.dishes_file import read_dishes, setting_of
+from scenewright.stages.tableware.parameters import SceneParameters
+from scenewright.stages.tableware.world.overhead import overhead_camera, render_overhead
+from scenewright.stages.tableware.world.records import as_records
+from scenewright.stages.tableware.world.scenes import make_table
+from scenewright.stages.tableware.world.shape_files import write_shapes
 
 
 def run(dishes: Path | None, *, parameters: SceneParameters, context: Context) -> TablewareScene:

@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
-
-from stages.tableware.planning.policy import STANDARD_SETTING
-from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
-from stages.tableware.planning.rules import Rules
-from stages.tableware.simulation.trial import World
-from stages.tableware.vision.detections import Detection, as_table
-from stages.tableware.vision.seeing import OBLIQUE_VIEW, Sight, see
-from stages.tableware.world.items import Table
-from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
-from stages.tableware.world.setting import Setting
+from scenewright.stages.tableware.planning.policy import STANDARD_SETTING
+from scenewright.stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
+from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.simulation.trial import World
+from scenewright.stages.tableware.vision.detections import Detection, as_table
+from scenewright.stages.tableware.vision.seeing import OBLIQUE_VIEW, Sight, see
+from scenewright.stages.tableware.world.items import Table
+from scenewright.stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
+from scenewright.stages.tableware.world.setting import Setting
 
 SAME_PLACE = 0.025
 """What is seen no farther than this [m] from where an item of its sort is, is that item: a grasp there meets it."""

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from schemas.errors import BadInput
-from schemas.tableware_plan import TablewarePlan
-from schemas.tableware_scene import TablewareScene
-from schemas.tableware_trial import TablewareTrial, TablewareTrialFile, TrialCounts, TrialStep
-from stages.kit.stage import Context
-from stages.tableware.dishes_file import setting_of
-from stages.tableware.parameters import SimulateParameters
-from stages.tableware.plan_stage import panels
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.choice import chances_of, make_policy
-from stages.tableware.planning.records import as_action, as_record
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.sight import Eyes, named_as
-from stages.tableware.simulation.trial import Done, Trial, World, do_in, run_in, truth
-from stages.tableware.simulators import SIMULATORS
-from stages.tableware.table_pictures import draw_strip
-from stages.tableware.world.items import STANDARD, DishSizes, Table
-from stages.tableware.world.records import as_records, as_table
-from stages.tableware.world.shape_files import write_shapes
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.tableware_plan import TablewarePlan
+from scenewright.schemas.tableware_scene import TablewareScene
+from scenewright.schemas.tableware_trial import TablewareTrial, TablewareTrialFile, TrialCounts, TrialStep
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.tableware.dishes_file import setting_of
+from scenewright.stages.tableware.parameters import SimulateParameters
+from scenewright.stages.tableware.plan_stage import panels
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.choice import chances_of, make_policy
+from scenewright.stages.tableware.planning.records import as_action, as_record
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.sight import Eyes, named_as
+from scenewright.stages.tableware.simulation.trial import Done, Trial, World, do_in, run_in, truth
+from scenewright.stages.tableware.simulators import SIMULATORS
+from scenewright.stages.tableware.table_pictures import draw_strip
+from scenewright.stages.tableware.world.items import STANDARD, DishSizes, Table
+from scenewright.stages.tableware.world.records import as_records, as_table
+from scenewright.stages.tableware.world.shape_files import write_shapes
 
 
 def run(

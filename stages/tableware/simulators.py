@@ -9,22 +9,21 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
-from schemas.tableware_plan import TimesOfActions
-from stages.tableware.parameters import SimulateParameters
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.choice import as_times, chances_of, time_model
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.simulation.arm_times import arm_times
-from stages.tableware.simulation.fast import FastWorld
-from stages.tableware.simulation.trial import Done, World
-from stages.tableware.table_pictures import write_animation
-from stages.tableware.world.items import Table
-from stages.tableware.world.setting import Gripper, Setting
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.tableware_plan import TimesOfActions
+from scenewright.stages.tableware.parameters import SimulateParameters
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.choice import as_times, chances_of, time_model
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.simulation.arm_times import arm_times
+from scenewright.stages.tableware.simulation.fast import FastWorld
+from scenewright.stages.tableware.simulation.trial import Done, World
+from scenewright.stages.tableware.table_pictures import write_animation
+from scenewright.stages.tableware.world.items import Table
+from scenewright.stages.tableware.world.setting import Gripper, Setting
 
 ANIMATION_WIDTH = 560
-SIMULATION = "stages.tableware.simulation"
+SIMULATION = "scenewright.stages.tableware.simulation"
 """Its modules of physics are loaded only when they are asked for."""
 Again = Callable[[Table, Done, int], Action]
 """Decides in the policy's place after actions that changed nothing (trial.run_in)."""

@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
-
-from stages.tableware.actions.grasp import Grasp
-from stages.tableware.actions.pull import Pull
-from stages.tableware.actions.stack import Stack
-from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.world.items import TABLE_SIDES, Item, Kind, Table
-from stages.tableware.world.setting import Gripper
+from scenewright.stages.tableware.actions.grasp import Grasp
+from scenewright.stages.tableware.actions.pull import Pull
+from scenewright.stages.tableware.actions.stack import Stack
+from scenewright.stages.tableware.planning.action import Action, Primitive
+from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Kind, Table
+from scenewright.stages.tableware.world.setting import Gripper
 
 SUPERSAMPLING = 2
 MARGIN = 0.03

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.boxes import box_volume, points_in_box, upright_box
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.truth.support_annotation import SupportAnnotation
 from scipy.spatial import cKDTree
-
-from schemas.errors import BadInput
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.boxes import box_volume, points_in_box, upright_box
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
-from stages.truth.support_annotation import SupportAnnotation
 
 SPACING = 0.01
 """Edge of the cubes of which each holds one point [m]."""

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph, GraphNode
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.formats.ply_files import write_ply
-from stages.kit.geometry.boxes import is_round
-from stages.kit.stage import Context
-from stages.truth.parameters import EditedParameters
-from stages.truth.stage import SPACING, colored
-from stages.truth.surface import surface_points
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph, GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.formats.ply_files import write_ply
+from scenewright.stages.kit.geometry.boxes import is_round
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.truth.parameters import EditedParameters
+from scenewright.stages.truth.stage import SPACING, colored
+from scenewright.stages.truth.surface import surface_points
 
 HINT = "give the graph that was built from this map, and the scene that was made of that"
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.mesh_files import read_mesh
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.mesh_files import read_mesh
 
 HINT = "give SceneNN's <scene>.ply, not a mesh of colours alone"
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence
-from stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 WORDS = "annotations/scenenn.toml"
 """Which annotated words are which class (below data/)."""

@@ -11,27 +11,26 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
-from schemas.sequence import Sequence
-from schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.ply_files import ColoredMesh, write_ply
-from stages.kit.formats.scenenn_annotation import (
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
+from scenewright.stages.kit.formats.scenenn_annotation import (
     AnnotatedLabel,
     class_by_last_word,
     class_by_substring,
     read_annotation,
 )
-from stages.kit.geometry.boxes import is_round, minimum_box
-from stages.kit.geometry.transforms import apply
-from stages.kit.stage import Context
-from stages.truth.labelled_mesh import LabelledMesh, read_labelled_mesh
-from stages.truth.parameters import WORDS, SceneNNParameters
-from stages.truth.surface import surface_points
+from scenewright.stages.kit.geometry.boxes import is_round, minimum_box
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.truth.labelled_mesh import LabelledMesh, read_labelled_mesh
+from scenewright.stages.truth.parameters import WORDS, SceneNNParameters
+from scenewright.stages.truth.surface import surface_points
 
 SPACING = 0.01
 """Grid of the points that are measured on [m], that of every ground truth."""

@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
-
-from schemas.base import Model, Name
-from schemas.contact_graph import SCENE_NODE
-from schemas.errors import BadInput
-from schemas.hand_written import Point, UprightBox
-from schemas.vocabulary import load_vocabulary
+from scenewright.schemas.base import Model, Name
+from scenewright.schemas.contact_graph import SCENE_NODE
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.hand_written import Point, UprightBox
+from scenewright.schemas.vocabulary import load_vocabulary
 
 LARGEST_FILE = 4 * 2**20
 """Bytes. A scene has a few dozen things."""

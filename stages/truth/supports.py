@@ -10,22 +10,21 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Box, Relation
-from schemas.sequence import Sequence
-from schemas.vocabulary import load_vocabulary
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.ply_files import ColoredMesh, write_ply
-from stages.kit.geometry.boxes import is_round, minimum_box, upright_box
-from stages.kit.stage import Context
-from stages.truth.annotated_points import SPACING, instances_of, seen_points
-from stages.truth.parameters import SupportsParameters
-from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
+from scenewright.stages.kit.geometry.boxes import is_round, minimum_box, upright_box
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.truth.annotated_points import SPACING, instances_of, seen_points
+from scenewright.stages.truth.parameters import SupportsParameters
+from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 NOT_SEEN = Box(center=(0.0, 0.0, 0.0), size=(SPACING, SPACING, SPACING))
 """Stands in for the box of a node of which no point was seen; such nodes are optional."""

@@ -8,19 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.cad_library import CadModel
-from schemas.cad_scene import SURROUNDINGS, CadScene, Replacement, SeenMotion
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.errors import BadInput
-from schemas.scene_parts import Box
-from stages.kit.formats.cad_models import read_model
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.mobility import NAMELESS, STANDS, Mobility, mobility
-from stages.kit.formats.scene_bundle import BundleBody
-from stages.kit.formats.scene_supports import resting_height
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.urdf.steadiness import stands_steadily
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene, Replacement, SeenMotion
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.formats.cad_models import read_model
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.mobility import NAMELESS, STANDS, Mobility, mobility
+from scenewright.stages.kit.formats.scene_bundle import BundleBody
+from scenewright.stages.kit.formats.scene_supports import resting_height
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.urdf.steadiness import stands_steadily
 
 
 def scene_bodies(

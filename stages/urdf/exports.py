@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.interactive_scene import InteractiveSceneFile
-from stages.kit.declared import declared_in
-from stages.kit.formats.written_scene import WrittenScene
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.formats.written_scene import WrittenScene
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class SceneExporter:
 
 def scene_exporters() -> tuple[SceneExporter, ...]:
     """Return every declared exporter in the order of writing."""
-    return declared_in("stages.urdf.exporters", SceneExporter, "EXPORTER")
+    return declared_in("scenewright.stages.urdf.exporters", SceneExporter, "EXPORTER")
 
 
 def write_exports(root: Path, scene: InteractiveSceneFile) -> None:

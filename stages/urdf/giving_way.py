@@ -13,18 +13,17 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.scene_bundle import BundleBody
+from scenewright.stages.kit.formats.written_scene import WrittenScene
+from scenewright.stages.kit.geometry.boxes import box_volume, minimum_rectangle
+from scenewright.stages.kit.geometry.convex_solids import Solid, convex_solid, penetration
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.simulation.shapes import link_shapes
+from scenewright.stages.kit.simulation.urdf_split import owner_of_link, read_urdf, with_absolute_meshes
+from scenewright.stages.urdf.convex_cutting import outside_box
 from scipy.spatial import ConvexHull, QhullError
-
-from schemas.interactive_scene import InteractiveSceneFile
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.scene_bundle import BundleBody
-from stages.kit.formats.written_scene import WrittenScene
-from stages.kit.geometry.boxes import box_volume, minimum_rectangle
-from stages.kit.geometry.convex_solids import Solid, convex_solid, penetration
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.simulation.shapes import link_shapes
-from stages.kit.simulation.urdf_split import owner_of_link, read_urdf, with_absolute_meshes
-from stages.urdf.convex_cutting import outside_box
 
 DEPTH = 0.003
 """Things that lie no deeper in each other are left alone [m]: the settle test lets 5 mm pass, and Bullet pads every

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.world import LoadedBody, PhysicsWorld
-from stages.urdf.scene_penetration import link_depth
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.world import LoadedBody, PhysicsWorld
+from scenewright.stages.urdf.scene_penetration import link_depth
 
 STEPS = 100
 """Positions that the range is divided into."""

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.stages.urdf.settle_report import MOVED_LIMIT, TURNED_LIMIT, BodyMotion
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput, MissingDependency
-from schemas.interactive_scene import InteractiveSceneFile
-from stages.urdf.settle_report import MOVED_LIMIT, TURNED_LIMIT, BodyMotion
 
 MJCF_FILE, KEY_FRAME = "scene.mjcf.xml", "reconstructed"
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pydantic import Field
-
-from schemas.cad_scene import CadScene
-from schemas.interactive_scene import InteractiveScene
-from stages.kit.estimates import grows_with
-from stages.kit.stage import Parameters, Stage
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.stage import Parameters, Stage
 
 
 class UrdfParameters(Parameters):

@@ -6,10 +6,10 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import BadInput
-from stages.kit.simulation.engine import engine, native_output_to_stderr
-from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
-from stages.urdf.scene_penetration import link_padding
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
+from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from scenewright.stages.urdf.scene_penetration import link_padding
 
 JOINED = ("fixed", "revolute", "continuous", "prismatic")
 """Joints whose two links may touch by design: a door its frame, a drawer its rails."""

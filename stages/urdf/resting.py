@@ -12,13 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.base import as_vector
+from scenewright.stages.kit.formats.scene_bundle import BundleBody
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.settle_report import free_bodies
 from scipy.spatial.transform import Rotation
-
-from schemas.base import as_vector
-from stages.kit.formats.scene_bundle import BundleBody
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.simulation.world import load_scene
-from stages.urdf.settle_report import free_bodies
 
 SECONDS = 3.0
 PADDING, SMALLEST_MOVE, SMALLEST_TURN = 0.002, 0.0005, np.radians(0.5)

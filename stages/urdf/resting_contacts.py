@@ -6,10 +6,9 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.world import load_scene
-from stages.urdf.scene_penetration import link_padding
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.scene_penetration import link_padding
 
 REACH = 0.002
 """Links that are closer than this [m] touch."""

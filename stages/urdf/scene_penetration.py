@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import combinations
 
-from schemas.vocabulary import load_vocabulary
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.world import LoadedBody, PhysicsWorld
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.world import LoadedBody, PhysicsWorld
 
 
 @dataclass(frozen=True)

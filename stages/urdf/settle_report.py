@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from scenewright.schemas.interactive_scene import SettledBody, SettleFile
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene
+from scenewright.stages.urdf.joint_sweep import JointRange, sweep_joints
+from scenewright.stages.urdf.scene_penetration import Overlap, resting_overlaps
 from scipy.spatial.transform import Rotation
-
-from schemas.interactive_scene import SettledBody, SettleFile
-from schemas.vocabulary import load_vocabulary
-from stages.kit.geometry.transforms import quaternion_of
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.world import PhysicsWorld, load_scene
-from stages.urdf.joint_sweep import JointRange, sweep_joints
-from stages.urdf.scene_penetration import Overlap, resting_overlaps
 
 Verdict = Literal["ok", "unsettled", "penetrating", "nothing_movable"]
 """Outcome of a scene that was let go."""

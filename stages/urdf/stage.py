@@ -7,19 +7,19 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from schemas.cad_scene import CadScene
-from schemas.errors import UsageError
-from schemas.interactive_scene import InteractiveScene
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.stage import Context
-from stages.urdf.bodies import scene_bodies
-from stages.urdf.exports import write_exports
-from stages.urdf.giving_way import given_way
-from stages.urdf.parameters import UrdfParameters
-from stages.urdf.resting import rested_bodies
-from stages.urdf.settle_report import SettleReport, settle_file, settle_report
-from stages.urdf.wedged import wedged_furniture
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.urdf.bodies import scene_bodies
+from scenewright.stages.urdf.exports import write_exports
+from scenewright.stages.urdf.giving_way import given_way
+from scenewright.stages.urdf.parameters import UrdfParameters
+from scenewright.stages.urdf.resting import rested_bodies
+from scenewright.stages.urdf.settle_report import SettleReport, settle_file, settle_report
+from scenewright.stages.urdf.wedged import wedged_furniture
 
 
 def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) -> InteractiveScene:

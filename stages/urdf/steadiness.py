@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scenewright.stages.kit.formats.scene_supports import FOOT_THICKNESS, furniture_pieces
+from scenewright.stages.kit.geometry.solids import hull_or_box, mass_properties
 from shapely.geometry import MultiPoint, Point, Polygon
-
-from stages.kit.formats.scene_supports import FOOT_THICKNESS, furniture_pieces
-from stages.kit.geometry.solids import hull_or_box, mass_properties
 
 LEAST_TILT = math.radians(5.0)
 """A floor may slope by this much [rad] before it tips over. Of the fronts seen in the recorded living room, and of what

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from schemas.vocabulary import load_vocabulary
-from stages.kit.simulation.world import load_scene
-from stages.urdf.scene_penetration import Overlap, resting_overlaps
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.scene_penetration import Overlap, resting_overlaps
 
 DEPTH = 0.005
 """Overlaps up to this are noise, which the bodies leave by themselves [m]."""

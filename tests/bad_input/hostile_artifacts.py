@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from stages.engine.digests import content_digest
+from scenewright.stages.engine.digests import content_digest
 
 NOTHING = content_digest(())
 """Digest of an artifact without files."""

@@ -16,10 +16,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
-
-from schemas.errors import BadInput
-from stages.kit.formats.masks import PanopticReader, decode_panoptic_png, encode_panoptic_png, write_panoptic_zip
-from stages.kit.formats.numpy_files import read_array, read_arrays
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.masks import (
+    PanopticReader,
+    decode_panoptic_png,
+    encode_panoptic_png,
+    write_panoptic_zip,
+)
+from scenewright.stages.kit.formats.numpy_files import read_array, read_arrays
 
 FILES = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

@@ -8,15 +8,15 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import MOST_INPUTS
+from scenewright.stages.engine import collection, store, verification
+from scenewright.stages.engine.collection import survey
+from scenewright.stages.engine.reading import open_artifact, read_manifest
+from scenewright.stages.engine.verification import verify
 
-from cli.main import run
-from schemas.artifact import Artifact
-from schemas.errors import BadInput
-from schemas.manifest import MOST_INPUTS
-from stages.engine import collection, store, verification
-from stages.engine.collection import survey
-from stages.engine.reading import open_artifact, read_manifest
-from stages.engine.verification import verify
 from tests.bad_input.hostile_artifacts import artifact, chain, cycle, ladder, reads
 
 ODD_INPUTS = {

@@ -19,15 +19,15 @@ import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.messages.container import MessageLog
+from scenewright.stages.ingest.messages.mcap_container import open_mcap
+from scenewright.stages.ingest.messages.mcap_log import McapLog
+from scenewright.stages.ingest.messages.mcap_records import MAGIC
+from scenewright.stages.ingest.messages.opening import open_message_log
+from scenewright.stages.ingest.messages.rosbag1_container import open_rosbag1
+from scenewright.stages.ingest.messages.rosbag2_container import open_rosbag2
 
-from schemas.errors import BadInput
-from stages.ingest.messages.container import MessageLog
-from stages.ingest.messages.mcap_container import open_mcap
-from stages.ingest.messages.mcap_log import McapLog
-from stages.ingest.messages.mcap_records import MAGIC
-from stages.ingest.messages.opening import open_message_log
-from stages.ingest.messages.rosbag1_container import open_rosbag1
-from stages.ingest.messages.rosbag2_container import open_rosbag2
 from tests.unit.ingest.container_logs import (
     CompressionMode,
     CompressionType,
@@ -317,7 +317,7 @@ def test_mcap_records_that_claim_more_than_there_is(tmp_path: Path) -> None:
 
 
 def test_mcap_metadata_is_bounded_as_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stages.ingest.messages.mcap_structure.MOST_DEFINITIONS", 10_000)
+    monkeypatch.setattr("scenewright.stages.ingest.messages.mcap_structure.MOST_DEFINITIONS", 10_000)
     metadata = mcap_record(Opcode.METADATA, struct.pack("<I", 1) + b"n" + struct.pack("<I", 0))
     path = _write(tmp_path / "log.mcap", mcap_file(mcap_channel(1, "/x"), *[metadata] * 100, mcap_message(1, 5, b"m")))
     messages, damage = _salvaged(path)
@@ -746,7 +746,7 @@ def test_bag2_whose_messages_are_damaged_or_bombs(tmp_path: Path, monkeypatch: p
     with sqlite3.connect(folder / "bag.db3") as database:
         database.execute("UPDATE messages SET data = ? WHERE id = 3", (zstandard.compress(bytes(10**8)),))
         database.execute("UPDATE messages SET data = x'0011' WHERE id = 5")
-    monkeypatch.setattr("stages.ingest.messages.rosbag2_container.LARGEST_MESSAGE", 1 << 20)
+    monkeypatch.setattr("scenewright.stages.ingest.messages.rosbag2_container.LARGEST_MESSAGE", 1 << 20)
     with _at_most(20e6):
         messages, damage = _salvaged(folder)
     assert messages == [m for k, m in enumerate(MESSAGES) if k not in (2, 4)]
@@ -770,7 +770,7 @@ def test_bag2_packed_parts_that_are_cut_or_bombs(
         assert set(_salvaged(folder)[0]) <= set(MESSAGES)
     except BadInput as error:
         assert "no part of the bag" in str(error)
-    monkeypatch.setattr("stages.ingest.messages.rosbag2_container.ALWAYS_ACCEPTED", 1 << 20)
+    monkeypatch.setattr("scenewright.stages.ingest.messages.rosbag2_container.ALWAYS_ACCEPTED", 1 << 20)
     content = b"SQLite format 3\0" if storage == StoragePlugin.SQLITE3 else MAGIC
     bomb = zstandard.ZstdCompressor(write_content_size=False).compress(content + bytes(10**8))
     part.write_bytes(bomb)

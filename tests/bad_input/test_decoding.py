@@ -14,11 +14,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.ingest.messages.container import Channel
-from stages.ingest.messages.decoding import decoder_for, why_unreadable
-from stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels, role_of, why_other
-from stages.ingest.messages.records import (
+from scenewright.stages.ingest.messages.container import Channel
+from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
+from scenewright.stages.ingest.messages.pixels import (
+    color_pixels,
+    depth_pixels,
+    depth_unit,
+    label_pixels,
+    role_of,
+    why_other,
+)
+from scenewright.stages.ingest.messages.records import (
     CalibrationRecord,
     ImageRecord,
     ImuRecord,
@@ -28,8 +34,9 @@ from stages.ingest.messages.records import (
     TransformRecord,
     Undecodable,
 )
-from stages.ingest.source import Unusable
-from stages.kit.geometry.transforms import is_rigid
+from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.geometry.transforms import is_rigid
+
 from tests.unit.ingest.ros_writing import ROS1, ROS2, channel, header, serialized, xyz
 from tests.unit.ingest.rvl_writing import compressed_depth
 from tests.unit.ingest.test_decoding_definitions import IDL

@@ -9,17 +9,16 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from schemas.base import Model
-from schemas.cad_library import LibraryFile
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput, UsageError
-from schemas.kinds import KINDS
-from schemas.manifest import Manifest
-from schemas.panoptic_map import EntitiesFile
-from stages.engine.pipelines import read_pipeline
-from stages.kit.configuration import read_config
-from stages.kit.formats.cad_models import read_model
+from scenewright.schemas.base import Model
+from scenewright.schemas.cad_library import LibraryFile
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import Manifest
+from scenewright.schemas.panoptic_map import EntitiesFile
+from scenewright.stages.engine.pipelines import read_pipeline
+from scenewright.stages.kit.configuration import read_config
+from scenewright.stages.kit.formats.cad_models import read_model
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 MODELS: dict[str, type[Model]] = {

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.folders.depth_arrays import depth_array
+from scenewright.stages.ingest.folders.files import images_by_number, images_by_stem, natural_key
+from scenewright.stages.ingest.layouts.colmap.model import read_model
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Unusable
 
-from schemas.errors import BadInput
-from stages.ingest.detection import open_log
-from stages.ingest.folders.depth_arrays import depth_array
-from stages.ingest.folders.files import images_by_number, images_by_stem, natural_key
-from stages.ingest.layouts.colmap.model import read_model
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Unusable
 from tests.unit.ingest.depth_array_writing import write_colmap_array, write_pfm
 from tests.unit.ingest.folder_writers import (
     write_colmap,

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.folders.calibration_files import read_calibration
+from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
+from scenewright.stages.ingest.folders.pose_files import read_pose_list
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp
+from scenewright.stages.ingest.layouts.colmap.model import read_model
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import LogSource, Unusable
 
-from schemas.errors import BadInput, UsageError
-from stages.ingest.detection import open_log
-from stages.ingest.folders.calibration_files import read_calibration
-from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
-from stages.ingest.folders.pose_files import read_pose_list
-from stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp
-from stages.ingest.layouts.colmap.model import read_model
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import LogSource, Unusable
 from tests.unit.ingest.folder_writers import (
     write_colmap,
     write_image_folder,

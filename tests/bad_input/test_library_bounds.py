@@ -18,21 +18,21 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.cad_library import ImportFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.formats import mesh_files
+from scenewright.stages.kit.formats.xml_files import parse_xml
+from scenewright.stages.kit.geometry.solids import box
+from scenewright.stages.library.importing import collada_file, limits, mesh_reading, mjcf_models, pictures, pieces
+from scenewright.stages.library.importing.assembly import MOST_SECTIONS_CLOSED, _unique_names
+from scenewright.stages.library.importing.discovery import find_models
+from scenewright.stages.library.importing.mapping import read_mapping
+from scenewright.stages.library.importing.mesh_reading import read_mesh_file
+from scenewright.stages.library.importing.source_folder import SourceFolder
+from scenewright.stages.library.importing.source_model import SourceModel, Surface, painted_faces
+from scenewright.stages.library.surfaces import Sections, surface_planes
 
-from schemas.cad_library import ImportFile
-from schemas.errors import BadInput
-from schemas.scene_parts import Joint
-from stages.kit.formats import mesh_files
-from stages.kit.formats.xml_files import parse_xml
-from stages.kit.geometry.solids import box
-from stages.library.importing import collada_file, limits, mesh_reading, mjcf_models, pictures, pieces
-from stages.library.importing.assembly import MOST_SECTIONS_CLOSED, _unique_names
-from stages.library.importing.discovery import find_models
-from stages.library.importing.mapping import read_mapping
-from stages.library.importing.mesh_reading import read_mesh_file
-from stages.library.importing.source_folder import SourceFolder
-from stages.library.importing.source_model import SourceModel, Surface, painted_faces
-from stages.library.surfaces import Sections, surface_planes
 from tests.bad_input.test_meshes import glb
 from tests.unit.library.test_addition import add, obj_box, write
 
@@ -456,8 +456,8 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
     code = """
 import resource, sys
 from pathlib import Path
-from stages.library.importing.discovery import find_models
-from stages.library.importing.source_folder import SourceFolder
+from scenewright.stages.library.importing.discovery import find_models
+from scenewright.stages.library.importing.source_folder import SourceFolder
 resource.setrlimit(resource.RLIMIT_DATA, (350 << 20, 350 << 20))
 for model in find_models(SourceFolder(Path(sys.argv[1]))):
     print(model.source, getattr(model, "reason", "read"))

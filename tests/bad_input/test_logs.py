@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.opcode import Opcode
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
-from schemas.errors import BadInput
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
-from stages.kit.formats.frames import FrameReader, FrameWriter
-from stages.kit.geometry.transforms import transform_from_yaw
 from tests.real_data import real_data
 from tests.unit.ingest.container_logs import mcap_records
 from tests.unit.ingest.foxglove_logs import (

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.errors import BadInput
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.formats.mesh_files import read_mesh
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.formats.mesh_files import read_mesh
 
 TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))

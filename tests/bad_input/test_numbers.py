@@ -11,18 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import Field
-
-from cli.main import run
-from schemas.base import LARGEST_INT32, LARGEST_SEED, Model, Seed
-from schemas.errors import BadInput, UsageError
-from schemas.scene_parts import Camera
-from stages.engine.discovery import all_stages
-from stages.engine.json_schemas import json_schemas
-from stages.engine.machine_faults import is_machines
-from stages.ingest.messages.records import CalibrationRecord
-from stages.ingest.stereo import _pinhole
-from stages.kit.configuration import parameters_for
-from stages.kit.geometry.point_clouds import sample_large_triangles
+from scenewright.cli.main import run
+from scenewright.schemas.base import LARGEST_INT32, LARGEST_SEED, Model, Seed
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.engine.json_schemas import json_schemas
+from scenewright.stages.engine.machine_faults import is_machines
+from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.ingest.stereo import _pinhole
+from scenewright.stages.kit.configuration import parameters_for
+from scenewright.stages.kit.geometry.point_clouds import sample_large_triangles
 
 
 class Inner(Model):
@@ -146,6 +145,6 @@ def test_a_bug_that_looks_like_the_machine(monkeypatch: pytest.MonkeyPatch, capf
     def diagnose() -> None:
         os.stat("/nowhere/that/anybody/named")
 
-    monkeypatch.setattr("stages.engine.diagnosis.diagnose", diagnose)
+    monkeypatch.setattr("scenewright.stages.engine.diagnosis.diagnose", diagnose)
     assert run(["doctor"]) == 1
     assert "internal error: FileNotFoundError" in capfd.readouterr().err

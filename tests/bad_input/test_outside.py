@@ -9,15 +9,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-from schemas.base import Model
-from schemas.errors import BadInput, UsageError
-from schemas.outside import DEEPEST, check_integers, file_content, file_json, file_text, file_toml, json_of, opened
-from schemas.plain_text import LONGEST_LINE, cleaned, one_line
-from stages.engine.batch.spec import read_spec
-from stages.engine.pipelines import pipeline_path
-from stages.kit.configuration import read_config
-from stages.kit.language.transcripts import TranscriptFile, read_transcript
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.outside import (
+    DEEPEST,
+    check_integers,
+    file_content,
+    file_json,
+    file_text,
+    file_toml,
+    json_of,
+    opened,
+)
+from scenewright.schemas.plain_text import LONGEST_LINE, cleaned, one_line
+from scenewright.stages.engine.batch.spec import read_spec
+from scenewright.stages.engine.pipelines import pipeline_path
+from scenewright.stages.kit.configuration import read_config
+from scenewright.stages.kit.language.transcripts import TranscriptFile, read_transcript
 
 
 def odd_file(folder: Path, what: str) -> Path:

@@ -13,12 +13,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenewright.cli.main import run
+from scenewright.stages.engine.runner import run_stage
+from scenewright.stages.ingest.parameters import STAGE as INGEST
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.run_lengths import encode_rle
 
-from cli.main import run
-from stages.engine.runner import run_stage
-from stages.ingest.parameters import STAGE as INGEST
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.run_lengths import encode_rle
 from tests.unit.segment.test_stage import NAMES, write_sequence
 
 CLASSES = {str(10 * k): name for k, name in NAMES.items()}

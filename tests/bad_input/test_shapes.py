@@ -8,17 +8,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput
-from schemas.panoptic_map import EntitiesFile, PanopticMap
-from schemas.sequence import SequenceFile
-from stages.cad.free_space import load_free_space
-from stages.kit.drawing.tree_layout import tree_layout
-from stages.kit.formats.numpy_files import read_arrays
-from stages.report.graph_drawing import marks_from_evaluation
-from stages.report.kinematic_tree import corresponding_trees
-from stages.report.stage import _write
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import EntitiesFile, PanopticMap
+from scenewright.schemas.sequence import SequenceFile
+from scenewright.stages.cad.free_space import load_free_space
+from scenewright.stages.kit.drawing.tree_layout import tree_layout
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.report.graph_drawing import marks_from_evaluation
+from scenewright.stages.report.kinematic_tree import corresponding_trees
+from scenewright.stages.report.stage import _write
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.formats.urdf_check import check_urdf, require_sound
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.formats.xml_files import parse_xml
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.motion.convex_pieces import ConvexPiece
+from scenewright.stages.kit.simulation.urdf_split import read_urdf
 
-from schemas.errors import BadInput
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.formats.urdf_check import check_urdf, require_sound
-from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.formats.xml_files import parse_xml
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.motion.convex_pieces import ConvexPiece
-from stages.kit.simulation.urdf_split import read_urdf
 from tests.unit.urdf.test_urdf_file import HINGE, INERTIA, joint, robot
 
 LINK = f'<link name="%s">{INERTIA}</link>'
@@ -158,7 +158,7 @@ def body(name: str, parent: str | None) -> BundleBody:
 
 @pytest.mark.parametrize("name", ["..", ".", "../up", "/etc/x", "a b", "", "-x", "world", "a\nb", "a/b"])
 def test_bodies_named_like_paths(tmp_path: Path, name: str) -> None:
-    from schemas.contact_graph import ContactGraphFile
+    from scenewright.schemas.contact_graph import ContactGraphFile
 
     (tmp_path / "scene").mkdir()
     with pytest.raises(BadInput, match="not usable in URDF"):
@@ -167,7 +167,7 @@ def test_bodies_named_like_paths(tmp_path: Path, name: str) -> None:
 
 
 def test_a_tower_of_two_thousand_bodies_and_a_circle_of_as_many(tmp_path: Path) -> None:
-    from stages.kit.formats.scene_bundle import _parents_first
+    from scenewright.stages.kit.formats.scene_bundle import _parents_first
 
     tower = [body(f"b{k}", f"b{k + 1}" if k < 1999 else None) for k in range(2000)]
     assert [b.name for b in _parents_first(tower)] == [f"b{k}" for k in reversed(range(2000))]

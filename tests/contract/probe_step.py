@@ -8,9 +8,8 @@ from importlib import import_module
 from pathlib import Path
 
 from pydantic import Field
-
-from schemas.trajectory import Trajectory
-from stages.kit.stage import Context, External, Optionally, Parameters, Stage
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.stage import Context, External, Optionally, Parameters, Stage
 
 
 class ProbeParameters(Parameters):
@@ -68,4 +67,4 @@ class _ProbePackage:
     run = staticmethod(run)
 
 
-sys.modules.setdefault("stages.probe.stage", _ProbePackage)  # type: ignore[arg-type]
+sys.modules.setdefault("scenewright.stages.probe.stage", _ProbePackage)  # type: ignore[arg-type]

@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from stages.kit.declared import declared_in
-from stages.segment.registry import BackendDeclaration, all_backends
+from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.segment.registry import BackendDeclaration, all_backends
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -24,7 +23,7 @@ def with_plugin(package: str, folder: Path, code: str) -> str:
 
 def help_of(command: str) -> str:
     """Code that prints the help of a command."""
-    return f"from cli.main import run; run([{command!r}, '--help'])\n"
+    return f"from scenewright.cli.main import run; run([{command!r}, '--help'])\n"
 
 
 def write(folder: Path, **modules: str) -> Path:
@@ -40,8 +39,8 @@ def test_a_backend(tmp_path: Path) -> None:
         tmp_path / "two_spots",
         __init__="""
 from pydantic import Field
-from stages.kit.stage import Extra, Parameters
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.kit.stage import Extra, Parameters
+from scenewright.stages.segment.registry import BackendDeclaration
 class SpotParameters(Parameters):
     spot_size: int = Field(3, ge=1, description="Diameter of a spot [pixels]")
 BACKEND = BackendDeclaration(
@@ -51,7 +50,7 @@ BACKEND = BackendDeclaration(
 )
 """,
         backend="""
-from stages.segment.backends.two_spots import SpotParameters
+from scenewright.stages.segment.backends.two_spots import SpotParameters
 class Spots:
     name, label, streams = "two-spots", "", ("depth",)
 def open_backend(request):
@@ -61,18 +60,18 @@ def open_backend(request):
 """,
     )
     printed = with_plugin(
-        "stages.segment.backends",
+        "scenewright.stages.segment.backends",
         tmp_path,
         help_of("segment")
         + """
-import stages.engine.diagnosis as diagnosis
+import scenewright.stages.engine.diagnosis as diagnosis
 diagnosis.CORE, diagnosis.EXTRAS = {}, {}
 print([check.remedy for check in diagnosis.diagnose() if check.name == "spotlib"])
-from schemas.errors import UsageError
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.registry import versions
-from stages.kit.configuration import parameters_for
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.parameters import STAGE, SegmentParameters
+from scenewright.stages.segment.registry import versions
+from scenewright.stages.kit.configuration import parameters_for
 for name in ("two-spots", "auto"):
     parameters = SegmentParameters(backend=name, spot_size=5)
     print(choose_backend(BackendRequest(parameters)).label, versions(parameters))
@@ -96,11 +95,11 @@ def test_a_log_layout(tmp_path: Path) -> None:
     write(
         tmp_path / "crumbs",
         __init__="""
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 LAYOUT = LogLayout("crumbs", order=5, recognised_by="crumbs.txt", reader=f"{__name__}.reader")
 """,
         reader="""
-from stages.ingest.source import LogSource
+from scenewright.stages.ingest.source import LogSource
 def matches(path):
     return "folder with crumbs.txt" if (path / "crumbs.txt").is_file() else None
 def open_source(path, parameters, rule):
@@ -112,14 +111,14 @@ def open_source(path, parameters, rule):
         folder.mkdir()
     (log / "crumbs.txt").write_text("")
     printed = with_plugin(
-        "stages.ingest.layouts",
+        "scenewright.stages.ingest.layouts",
         tmp_path,
         help_of("ingest")
         + f"""
 from pathlib import Path
-from schemas.errors import BadInput
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
 for name in ("auto", "crumbs"):
     print(open_log(Path({str(log)!r}), IngestParameters(format=name)).rule)
 try:
@@ -138,7 +137,7 @@ def test_an_export_format(tmp_path: Path) -> None:
     write(
         tmp_path / "pebbles",
         __init__="""
-from stages.export.registry import SequenceFormat
+from scenewright.stages.export.registry import SequenceFormat
 FORMAT = SequenceFormat("pebbles", order=99, layout="pebbles", summary="a line a frame", streams=("pose",), log="p.txt")
 """,
         writer="""
@@ -150,7 +149,7 @@ def write(job):
 """,
     )
     printed = with_plugin(
-        "stages.export.formats",
+        "scenewright.stages.export.formats",
         tmp_path,
         help_of("export")
         + f"""
@@ -169,20 +168,20 @@ def test_a_scene_exporter(tmp_path: Path) -> None:
     write(
         tmp_path / "exporters",
         names="""
-from stages.urdf.exports import SceneExporter
+from scenewright.stages.urdf.exports import SceneExporter
 def _write(path, scene):
     path.write_text(" ".join(link.name for link in scene.urdf.links))
 EXPORTER = SceneExporter("names", order=99, file="names.txt", write=_write)
 """,
     )
     printed = with_plugin(
-        "stages.urdf.exporters",
+        "scenewright.stages.urdf.exporters",
         tmp_path / "exporters",
         f"""
 from pathlib import Path
-from schemas.contact_graph import ContactGraphFile
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.urdf.exports import scene_exporters, write_exports
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.urdf.exports import scene_exporters, write_exports
 root = Path({str(tmp_path)!r}) / "scene"
 root.mkdir()
 write_exports(root, write_scene_bundle(root, [], ContactGraphFile(nodes=(), links=())))
@@ -198,11 +197,11 @@ def test_an_action_of_the_planner(tmp_path: Path) -> None:
         tmp_path / "actions",
         wipe="""
 import numpy as np
-from schemas.plan import Check
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.tasks.strips import Schema
-from stages.plan.action import PlanAction
-from stages.kit.motion.segments import Manipulation, Segment
+from scenewright.schemas.plan import Check
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.tasks.strips import Schema
+from scenewright.stages.plan.action import PlanAction
+from scenewright.stages.kit.motion.segments import Manipulation, Segment
 class Wipe(PlanAction):
     name, order, predicates = "wipe", 90, {"wiped": ("support",)}
     goals = {"wiped": lambda goal: Check(condition=goal.literal, holds=True, detail="shines")}
@@ -215,22 +214,22 @@ ACTION = Wipe()
 """,
     )
     printed = with_plugin(
-        "stages.plan.actions",
+        "scenewright.stages.plan.actions",
         tmp_path / "actions",
         """
 from types import SimpleNamespace
 import numpy as np
-from schemas.plan import BodyMatch
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.tasks.strips import Problem, ground
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan import refinement
-from stages.plan.conduct import Conduct
-from stages.plan.domain import DOMAIN
-from stages.plan.goal_checks import check_goal
-from stages.plan.pick_place import Budgets
-from stages.plan.symbols import parse_goal
-from stages.plan.world_model import RobotState
+from scenewright.schemas.plan import BodyMatch
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.tasks.strips import Problem, ground
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan import refinement
+from scenewright.stages.plan.conduct import Conduct
+from scenewright.stages.plan.domain import DOMAIN
+from scenewright.stages.plan.goal_checks import check_goal
+from scenewright.stages.plan.pick_place import Budgets
+from scenewright.stages.plan.symbols import parse_goal
+from scenewright.stages.plan.world_model import RobotState
 OBJECTS = {"start": "spot", "table": "surface"}
 at_start = frozenset({("near", "start"), ("hand_empty",), ("reachable", "table")})
 problem = Problem("scene", OBJECTS, at_start, parse_goal(("wiped(table)",), OBJECTS)[0])
@@ -255,17 +254,17 @@ for step in refinement.refine_plan(model, state, actions, Budgets(1, 1, 1, 1), r
 
 
 def test_what_declares_nothing_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import stages.segment.backends as package
+    import scenewright.stages.segment.backends as package
 
     write(tmp_path / "silent", __init__="")
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
     with pytest.raises(RuntimeError, match=r"backends\.silent declares no BACKEND"):
-        declared_in("stages.segment.backends", BackendDeclaration, "BACKEND")
-    (tmp_path / "silent" / "__init__.py").write_text("from stages.segment.backends.onnx import BACKEND")
-    sys.modules.pop("stages.segment.backends.silent")
+        declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND")
+    (tmp_path / "silent" / "__init__.py").write_text("from scenewright.stages.segment.backends.onnx import BACKEND")
+    sys.modules.pop("scenewright.stages.segment.backends.silent")
     with pytest.raises(RuntimeError, match="'onnx' is declared twice"):
-        declared_in("stages.segment.backends", BackendDeclaration, "BACKEND")
-    sys.modules.pop("stages.segment.backends.silent")
+        declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND")
+    sys.modules.pop("scenewright.stages.segment.backends.silent")
 
 
 def test_a_backend_needs_no_weights_to_be_automatic() -> None:

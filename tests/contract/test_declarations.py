@@ -9,12 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from schemas.kinds import KINDS
-from stages.engine.discovery import all_stages
-from stages.engine.json_schemas import json_schemas
-from stages.engine.keys import artifact_key
-from stages.kit.stage import Stage
+from scenewright.schemas.kinds import KINDS
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.engine.json_schemas import json_schemas
+from scenewright.stages.engine.keys import artifact_key
+from scenewright.stages.kit.stage import Stage
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 STAGES = sorted(all_stages().values(), key=lambda stage: stage.name)
@@ -50,7 +49,10 @@ def test_every_parameter_is_documented_and_has_a_default(stage: Stage) -> None:
 @each_step
 def test_help_names_every_option(stage: Stage) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "cli", *stage.name.split(), "--help"], cwd=REPOSITORY, capture_output=True, text=True
+        [sys.executable, "-m", "scenewright", *stage.name.split(), "--help"],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
     for name in [*stage.parameters.model_fields, *stage.reads, "out", "seed", "config", "dry_run", "json"]:
@@ -61,8 +63,8 @@ def test_help_names_every_option(stage: Stage) -> None:
 def test_key_is_the_same_in_another_process(stage: Stage) -> None:
     here = artifact_key(stage, stage.parameters(), {"a": "b"}, 3, "cpu")
     there = python(
-        "from stages.engine.discovery import all_stages as s\n"
-        "from stages.engine.keys import artifact_key as k\n"
+        "from scenewright.stages.engine.discovery import all_stages as s\n"
+        "from scenewright.stages.engine.keys import artifact_key as k\n"
         f"stage = s()[{stage.name!r}]; print(k(stage, stage.parameters(), {{'a': 'b'}}, 3, 'cpu'))"
     )
     assert here == there
@@ -71,7 +73,7 @@ def test_key_is_the_same_in_another_process(stage: Stage) -> None:
 def test_help_loads_no_heavy_library() -> None:
     loaded = json.loads(
         python(
-            "import sys, json, cli.application as a; a.build_application();"
+            "import sys, json, scenewright.cli.application as a; a.build_application();"
             f"print(json.dumps([m for m in {HEAVY!r} if m in sys.modules]))"
         )
     )

@@ -10,9 +10,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-
-from cli.application import build_application
-from stages.engine.pipelines import pipeline_path, read_pipeline
+from scenewright.cli.application import build_application
+from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -84,7 +83,7 @@ def test_modules_that_are_run_or_imported_exist(page: Path) -> None:
     modules = re.findall(rf"python -m ((?:{tops})[\w.]*)", code) + re.findall(
         rf"^from ((?:{tops})[\w.]*) import", code, re.MULTILINE
     )
-    ours = [module for module in modules if not OF_EXAMPLES.match(module)]
+    ours = [module for module in modules if not OF_EXAMPLES.match(module.removeprefix("scenewright."))]
     assert [module for module in ours if importlib.util.find_spec(module) is None] == []
 
 
@@ -98,7 +97,7 @@ def test_make_targets_that_are_named_exist(page: Path) -> None:
 def test_commands_that_are_named_exist_and_have_these_options(page: Path) -> None:
     wrong = []
     code = re.sub(r"(?:^|\s)#.*", "", in_code(page.read_text()), flags=re.MULTILINE)
-    call = r"(?:(?:^|[;&|$] ?|\.venv/bin/)scenewright|python -m cli) ((?:[a-z][\w-]*|--)[^\n|;&]*)"
+    call = r"(?:(?:^|[;&|$] ?|\.venv/bin/)scenewright|python -m scenewright) ((?:[a-z][\w-]*|--)[^\n|;&]*)"
     for line in re.findall(call, code, re.MULTILINE):
         words = line.split()
         name = " ".join(words[:2]) if " ".join(words[:2]) in options() else words[0]

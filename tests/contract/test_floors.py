@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
+import tempfile
 from functools import cache
+from pathlib import Path
 
 import grimp
 import networkx
 import pytest
+from scenewright.stages.engine.discovery import all_stages
 
-from stages.engine.discovery import all_stages
+from tests.wheel_layout import link_packages
+
+PACKAGES = ("scenewright", "benchmarks")
 
 HEAVY = {"open3d", "torch", "cv2", "pybullet", "trimesh", "numba", "matplotlib", "scipy"}
 SHARED_WITH_SYSTEMS_TO_COME = ("language", "motion", "rendering", "tasks")
@@ -17,13 +24,25 @@ language models, plan with symbols, move arms and render too."""
 
 
 @cache
-def graph() -> grimp.ImportGraph:
-    return grimp.build_graph("cli", "stages", "schemas", "benchmarks", include_external_packages=True, cache_dir=None)
+def graph(external: bool = True) -> grimp.ImportGraph:
+    """The graph of the packages as the wheel has them: grimp finds packages by their folders."""
+    imported = {name: sys.modules.pop(name) for name in PACKAGES if name in sys.modules}
+    with tempfile.TemporaryDirectory() as folder:
+        link_packages(Path(folder))
+        sys.path.insert(0, folder)
+        try:
+            return grimp.build_graph(*PACKAGES, include_external_packages=external, cache_dir=None)
+        finally:
+            sys.path.remove(folder)
+            sys.modules.update(imported)
+            importlib.invalidate_caches()
 
 
 def floor(module: str) -> str:
-    """`cli`, `schemas`, `benchmarks`, `engine`, `kit`, or the folder of a step."""
-    top, *below = module.split(".")
+    """`cli`, `schemas`, `benchmarks`, `engine`, `kit`, `scenewright` (the Python API), or the folder of a step."""
+    top, *below = module.removeprefix("scenewright.").split(".")
+    if top == "__main__":
+        return "cli"
     return below[0] if top == "stages" and below else top
 
 
@@ -50,7 +69,7 @@ def allowed(source: str) -> set[str]:
 
 def test_every_folder_of_stages_is_the_engine_the_kit_or_a_step() -> None:
     assert {floor(module) for module in ours()} - {"stages"} == {
-        *("cli", "schemas", "benchmarks", "engine", "kit"),
+        *("cli", "schemas", "benchmarks", "engine", "kit", "scenewright"),
         *steps(),
     }
 
@@ -78,7 +97,7 @@ def test_only_benchmarks_may_import_the_command_line() -> None:
 
 def test_declarations_import_nothing_heavy() -> None:
     for folder in steps():
-        assert not HEAVY & graph().find_modules_directly_imported_by(f"stages.{folder}.parameters"), folder
+        assert not HEAVY & graph().find_modules_directly_imported_by(f"scenewright.stages.{folder}.parameters"), folder
 
 
 def test_the_kit_holds_what_two_or_more_share() -> None:
@@ -86,7 +105,7 @@ def test_the_kit_holds_what_two_or_more_share() -> None:
     lonely = {}
     for module in ours():
         parts = module.split(".")
-        if floor(module) != "kit" or graph().find_children(module) or parts[2] in SHARED_WITH_SYSTEMS_TO_COME:
+        if floor(module) != "kit" or graph().find_children(module) or parts[3] in SHARED_WITH_SYSTEMS_TO_COME:
             continue
         users = {floor(user) for user in _users_of(module)} - {"kit"}
         if len(users) < 2:
@@ -108,7 +127,7 @@ def _users_of(module: str) -> set[str]:
 
 
 def test_modules_import_each_other_in_no_circle() -> None:
-    plain = grimp.build_graph("cli", "stages", "schemas", "benchmarks", cache_dir=None)
+    plain = graph(external=False)
     edges = networkx.DiGraph(
         (module, imported) for module in plain.modules for imported in plain.find_modules_directly_imported_by(module)
     )
@@ -134,8 +153,8 @@ CORES = (
 @pytest.mark.parametrize("core", CORES)
 def test_cores_that_others_will_drive_need_no_stage(core: str) -> None:
     """An agent that maps while it acts takes the mapper without the step around it."""
-    module = f"stages.{core}"
-    assert graph().find_shortest_chain(module, f"stages.{floor(module)}.stage") is None
+    module = f"scenewright.stages.{core}"
+    assert graph().find_shortest_chain(module, f"scenewright.stages.{floor(module)}.stage") is None
 
 
 @pytest.mark.parametrize(
@@ -144,15 +163,20 @@ def test_cores_that_others_will_drive_need_no_stage(core: str) -> None:
 )
 def test_a_baseline_reaches_nothing_of_ours(baseline: str) -> None:
     """Whoever improves our method cannot change the one that it is compared with."""
-    folder = floor(f"stages.{baseline}")
-    reached = graph().find_upstream_modules(f"stages.{baseline}")
-    assert not reached & {f"stages.{folder}.ours", f"stages.{folder}.fusion_ours", *OURS_ALONE}
+    folder = floor(f"scenewright.stages.{baseline}")
+    reached = graph().find_upstream_modules(f"scenewright.stages.{baseline}")
+    assert not reached & {f"scenewright.stages.{folder}.ours", f"scenewright.stages.{folder}.fusion_ours", *OURS_ALONE}
 
 
 OURS_ALONE = {
-    *("stages.graph.corrected_support", "stages.graph.shared_support", "stages.graph.beside", "stages.graph.hanging"),
-    *("stages.fuse.partition", "stages.fuse.class_scores"),
-    *("stages.cad.apart", "stages.cad.fitting", "stages.cad.scoring"),
-    *("stages.segment.claims",),
+    *(
+        "scenewright.stages.graph.corrected_support",
+        "scenewright.stages.graph.shared_support",
+        "scenewright.stages.graph.beside",
+        "scenewright.stages.graph.hanging",
+    ),
+    *("scenewright.stages.fuse.partition", "scenewright.stages.fuse.class_scores"),
+    *("scenewright.stages.cad.apart", "scenewright.stages.cad.fitting", "scenewright.stages.cad.scoring"),
+    *("scenewright.stages.segment.claims",),
 }
 """What only our methods are made of."""

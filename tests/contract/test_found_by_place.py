@@ -18,8 +18,8 @@ TESTS = ("contract/__init__.py", "contract/test_floors.py", "golden/__init__.py"
 NEW_FILES = {
     "schemas/novelty.py": """
 from typing import ClassVar
-from schemas.artifact import Artifact, Document
-from schemas.base import Model
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model
 
 class NoveltyFile(Model):
     text: str
@@ -32,9 +32,9 @@ class Novelty(Artifact):
     "stages/brandnew/__init__.py": "",
     "stages/brandnew/parameters.py": """
 from pydantic import Field
-from schemas.novelty import Novelty
-from stages.kit.estimates import Estimate
-from stages.kit.stage import Parameters, Stage
+from scenewright.schemas.novelty import Novelty
+from scenewright.stages.kit.estimates import Estimate
+from scenewright.stages.kit.stage import Parameters, Stage
 
 class BrandnewParameters(Parameters):
     text: str = Field("hello", description="What it says")
@@ -44,7 +44,7 @@ STAGE = Stage("brandnew", 1, "Something new", BrandnewParameters, {}, Novelty,
 """,
     "stages/brandnew/stage.py": """
 import numpy as np
-from schemas.novelty import Novelty, NoveltyFile
+from scenewright.schemas.novelty import Novelty, NoveltyFile
 
 def run(*, parameters, context):
     NoveltyFile(text=parameters.text).write(context.output / "novelty.json")
@@ -57,14 +57,14 @@ def draw_novelty(novelty, canvas):
 """,
     "stages/report/sections/novelty/__init__.py": "",
     "stages/report/sections/novelty/section.py": """
-from schemas.novelty import Novelty
-from stages.report.section import Section
+from scenewright.schemas.novelty import Novelty
+from scenewright.stages.report.section import Section
 
 SECTION = Section("novelty", "A novelty", order=1, reads={"novelty": Novelty}, became={"novelty": "a novelty"},
                   alone="All new")
 """,
     "stages/report/sections/novelty/view.py": """
-from schemas.novelty import Novelty
+from scenewright.schemas.novelty import Novelty
 
 def view(page):
     return {"text": page.given("novelty", Novelty).info.text}
@@ -82,7 +82,7 @@ def files_of_the_tutorial() -> dict[str, str]:
 
 IN_PYTHON = """
 import json
-from cli.viewing.view import viewer_of
+from scenewright.cli.viewing.view import viewer_of
 from scenewright import load, payload
 found = load("tests/golden/v1/novelty")
 print(json.dumps([found.info.text, payload(found, "numbers.npz")["one"].tolist(), viewer_of(type(found)).__name__]))
@@ -96,14 +96,14 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     unneeded = shutil.ignore_patterns("*.nb[ic]", "json")
     for name in ("cli", "stages", "schemas", "scenewright", "benchmarks"):
         shutil.copytree(REPOSITORY / name, root / name, ignore=unneeded)
-    for name in ("pyproject.toml", "tests/__init__.py", *(f"tests/{test}" for test in TESTS)):
+    for name in ("pyproject.toml", "tests/__init__.py", "tests/wheel_layout.py", *(f"tests/{test}" for test in TESTS)):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(REPOSITORY / name, root / name)
     (root / "data").symlink_to(REPOSITORY / "data")
     for name, text in (NEW_FILES | files_of_the_tutorial()).items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
-    python(root, "-m", "cli", "brandnew", "--text", "as <new> as can be", "--out", "tests/golden/v1/novelty")
+    python(root, "-m", "scenewright", "brandnew", "--text", "as <new> as can be", "--out", "tests/golden/v1/novelty")
     return root
 
 
@@ -121,28 +121,28 @@ def test_the_step_of_the_tutorial(tree: Path) -> None:
     commands = [line.removeprefix("scenewright ") for line in text.split("```")[1].split("\n") if line.strip()]
     assert len(commands) == 4
     for command in commands:
-        python(tree, "-m", "cli", *command.split())
-    again = json.loads(python(tree, "-m", "cli", *commands[1].split(), "--json"))
+        python(tree, "-m", "scenewright", *command.split())
+    again = json.loads(python(tree, "-m", "scenewright", *commands[1].split(), "--json"))
     assert again["status"] == "up to date"
     if importlib.util.find_spec("pandas"):
         assert "floor" not in python(tree, "-c", text.split("```python\n")[1].split("```")[0])
 
 
 def test_the_command_is_there_with_its_estimate(tree: Path) -> None:
-    assert "Something new" in python(tree, "-m", "cli", "--help")
-    told = json.loads(python(tree, "-m", "cli", "brandnew", "--out", "elsewhere", "--dry-run", "--json"))
+    assert "Something new" in python(tree, "-m", "scenewright", "--help")
+    told = json.loads(python(tree, "-m", "scenewright", "brandnew", "--out", "elsewhere", "--dry-run", "--json"))
     assert told["estimate"]["disk_bytes"] == 3_000_000
 
 
 def test_the_kind_has_a_json_schema_opens_and_is_drawn(tree: Path) -> None:
-    python(tree, "-m", "cli", "schemas", "--out", "json")
+    python(tree, "-m", "scenewright", "schemas", "--out", "json")
     assert json.loads((tree / "json" / "novelty.v1.novelty.schema.json").read_text())["title"] == "NoveltyFile"
     assert json.loads(python(tree, "-c", IN_PYTHON)) == ["as <new> as can be", [1.0, 1.0, 1.0], "draw_novelty"]
 
 
 def test_the_report_reads_it_and_shows_its_section(tree: Path) -> None:
-    assert "--novelty" in python(tree, "-m", "cli", "report", "--help")
-    python(tree, "-m", "cli", "report", "--novelty", "tests/golden/v1/novelty", "--out", "report")
+    assert "--novelty" in python(tree, "-m", "scenewright", "report", "--help")
+    python(tree, "-m", "scenewright", "report", "--novelty", "tests/golden/v1/novelty", "--out", "report")
     document = json.loads((tree / "report" / "report.json").read_text())
     assert document["sections"] == ["novelty", "cost", "made"] and document["title"] == "All new"
     page = (tree / "report" / "report.html").read_text()
@@ -154,6 +154,6 @@ def test_import_contracts_and_golden_artifacts_cover_it(tree: Path) -> None:
     words = ("-m", "pytest", "-p", "no:cacheprovider", "-p", "no:xdist", "tests/contract/test_floors.py")
     only = "declarations_import or only_points_down or engine_the_kit_or_a_step or novelty"
     assert "4 passed" in python(tree, *words, "tests/golden", "-k", only)
-    (tree / "stages" / "brandnew" / "more.py").write_text("import stages.fuse.mapping\n")
-    with pytest.raises(AssertionError, match=r"stages\.brandnew\.more imports stages\.fuse\.mapping"):
+    (tree / "stages" / "brandnew" / "more.py").write_text("import scenewright.stages.fuse.mapping\n")
+    with pytest.raises(AssertionError, match=r"stages\.brandnew\.more imports \S+fuse\.mapping"):
         python(tree, *words, "-k", "only_points_down")

@@ -7,17 +7,16 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
-
-import schemas.artifact as artifact_module
-from schemas.artifact import Artifact, Document
-from schemas.base import Model
-from schemas.errors import BadInput, UsageError
-from schemas.manifest import MANIFEST_NAME, Manifest
-from schemas.migrations import MIGRATIONS, migration
-from stages.engine.digests import content_digest, record_files
-from stages.engine.migration import migrate
-from stages.engine.reading import open_artifact
-from stages.engine.verification import verify
+import scenewright.schemas.artifact as artifact_module
+from scenewright.schemas.artifact import Artifact, Document
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.schemas.migrations import MIGRATIONS, migration
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.migration import migrate
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.engine.verification import verify
 
 
 class Third(Model):

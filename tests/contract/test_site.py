@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.kinds import KINDS
+from scenewright.stages.engine.discovery import all_stages
 
 from docs.reference import pages
-from schemas.kinds import KINDS
-from stages.engine.discovery import all_stages
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -14,13 +14,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.errors import BadInput, MachineFailure, UsageError
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.schemas.vocabulary import VOCABULARY_FILE
+from scenewright.stages.engine import store
+from scenewright.stages.engine.runner import RunResult, run_stage
+from scenewright.stages.engine.verification import verify
 
-from schemas.errors import BadInput, MachineFailure, UsageError
-from schemas.manifest import MANIFEST_NAME, Manifest
-from schemas.vocabulary import VOCABULARY_FILE
-from stages.engine import store
-from stages.engine.runner import RunResult, run_stage
-from stages.engine.verification import verify
 from tests.contract.probe_step import PROBE, ProbeParameters
 
 FORK = multiprocessing.get_context("fork")

@@ -34,7 +34,7 @@ Imported = tuple[str, str | None]
 
 @dataclass(frozen=True)
 class Definition:
-    """A name of a module: `stages.fuse.mapping`, `PanopticMapper`."""
+    """A name of a module: `scenewright.stages.fuse.mapping`, `PanopticMapper`."""
 
     module: str
     name: str

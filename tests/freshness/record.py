@@ -11,8 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from stages.engine.discovery import all_stages
-from stages.kit.stage import Stage
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.kit.stage import Stage
+
 from tests.freshness.program import Program
 from tests.freshness.records import REPOSITORY, Record, changed_modules, code_of, read_record
 from tests.freshness.same_bytes import Evidence, Refused

@@ -7,7 +7,8 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from stages.kit.stage import Stage
+from scenewright.stages.kit.stage import Stage
+
 from tests.freshness.program import Code, Definition, Program
 
 FOLDER = Path(__file__).resolve().parent / "steps"
@@ -47,7 +48,7 @@ def read_record(step: str) -> Record | None:
 def code_of(program: Program, stage: Stage) -> Code:
     """Return the code of a step: what `run` and the class of its parameters reach. Raises KeyError without them."""
     declared = stage.parameters
-    run = Definition(f"stages.{stage.folder}.{stage.module}", "run")
+    run = Definition(f"scenewright.stages.{stage.folder}.{stage.module}", "run")
     return program.code_of([run, Definition(declared.__module__, declared.__name__)])
 
 

@@ -10,7 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from stages.kit.stage import Stage
+from scenewright.stages.kit.stage import Stage
+
 from tests.freshness.program import Program
 from tests.freshness.records import REPOSITORY, Record, code_of, path_of
 from tests.freshness.runs import RUNS, Run
@@ -85,7 +86,7 @@ class Evidence:
         # numba's own caches do not notice that a callee in another file changed.
         settings = {"OMP_NUM_THREADS": "1", "NUMBA_CACHE_DIR": str(self._folder / f"numba_{code.name}")}
         done = subprocess.run(
-            [sys.executable, "-m", "cli", *run.step.split(), *words, "--out", str(out), "--quiet"],
+            [sys.executable, "-m", "scenewright", *run.step.split(), *words, "--out", str(out), "--quiet"],
             cwd=code,
             env={**os.environ, **settings},
             capture_output=True,

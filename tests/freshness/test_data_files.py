@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.kit.stage import Stage
 
-from stages.engine.discovery import all_stages
-from stages.kit.stage import Stage
 from tests.freshness.program import Program
 from tests.freshness.records import REPOSITORY, code_of
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.stages.kit.stage import Parameters, Stage
 
-from stages.kit.stage import Parameters, Stage
 from tests.freshness.program import Code, Definition, Program
 from tests.freshness.records import Record, changed_modules, complaint
 
@@ -18,16 +18,16 @@ from __future__ import annotations
 import importlib
 import math as m
 from typing import TYPE_CHECKING
-from stages.bake.oven import heat
-from stages.kit import clock
+from scenewright.stages.bake.oven import heat
+from scenewright.stages.kit import clock
 if TYPE_CHECKING:
-    from stages.bake.unused import Cake
-PART = "stages.bake.parts"
+    from scenewright.stages.bake.unused import Cake
+PART = "scenewright.stages.bake.parts"
 
 def run(dough, *, parameters, context):
     """Bake."""
     context.logger.info("baking")
-    from stages.bake.late import crust
+    from scenewright.stages.bake.late import crust
     made = m.floor(2.5) + heat(dough) + crust(clock.MINUTES)
     return importlib.import_module(f"{PART}.{parameters.part}").finish(made)
 ''',
@@ -63,7 +63,7 @@ def code(tmp_path: Path, **changes: tuple[str, str]) -> Code:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text.replace(before, after) if before else text)
     assert not changes
-    return Program(tmp_path).code_of([Definition("stages.bake.stage", "run")])
+    return Program(tmp_path).code_of([Definition("scenewright.stages.bake.stage", "run")])
 
 
 @pytest.fixture
@@ -91,7 +91,9 @@ def test_constants_lines_and_late_imports_count(
     changed = code(tmp_path / "changed", **{file: (before, after)})
     assert changed.digest != original.digest
     (name,) = (
-        m for m in changed_modules(original.modules, changed.modules) if m != "stages.kit.clock" or file != "stage"
+        m
+        for m in changed_modules(original.modules, changed.modules)
+        if m != "scenewright.stages.kit.clock" or file != "stage"
     )
     assert name.endswith(file)
 
@@ -102,7 +104,7 @@ def test_constants_lines_and_late_imports_count(
         ("stage", '"""Bake."""', '"""Bake it."""'),
         ("stage", '"baking"', '"we bake"'),
         ("stage", "made", "cake"),
-        ("stage", "from stages.kit import clock", "import stages.kit.clock as clock"),
+        ("stage", "from scenewright.stages.kit import clock", "import scenewright.stages.kit.clock as clock"),
         ("oven", "# hot", "# very hot"),
         ("oven", "SPARE = 3", "SPARE = 4"),
         ("oven", "piece", "slice_of_it"),
@@ -120,12 +122,12 @@ def test_words_names_and_what_is_not_reached_do_not(
 
 
 def test_moving_a_definition_changes_nothing(tmp_path: Path, original: Code) -> None:
-    code(tmp_path, oven=("DEGREES = 200\n", "from stages.kit.heat import DEGREES\n"))
+    code(tmp_path, oven=("DEGREES = 200\n", "from scenewright.stages.kit.heat import DEGREES\n"))
     (tmp_path / "stages/kit/heat.py").write_text("DEGREES = 200\n")
     (tmp_path / "stages/bake/oven.py").rename(tmp_path / "stages/bake/furnace.py")
     stage = tmp_path / "stages/bake/stage.py"
     stage.write_text(stage.read_text().replace("bake.oven", "bake.furnace"))
-    assert Program(tmp_path).code_of([Definition("stages.bake.stage", "run")]).digest == original.digest
+    assert Program(tmp_path).code_of([Definition("scenewright.stages.bake.stage", "run")]).digest == original.digest
 
 
 def test_what_cannot_be_followed_is_all_of_the_folder(tmp_path: Path) -> None:
@@ -143,7 +145,13 @@ def test_the_complaint_names_the_step_the_module_and_both_commands(tmp_path: Pat
     assert complaint(stage, record, original) is None
     said = complaint(stage, record, code(tmp_path, oven=("200", "220")))
     assert said is not None
-    for words in ("bake: its code changed", "stages.bake.oven", "Raise `version`", "record bake`", "--same-bytes"):
+    for words in (
+        "bake: its code changed",
+        "scenewright.stages.bake.oven",
+        "Raise `version`",
+        "record bake`",
+        "--same-bytes",
+    ):
         assert words in said
     raised = Record("bake", 1, original.digest, "", original.modules)
     assert "not recorded yet" in str(complaint(stage, raised, original))
@@ -156,7 +164,9 @@ def test_who_hands_a_package_to_a_finder_reaches_all_of_it(tmp_path: Path) -> No
     for name, sugar in (("a", "50"), ("b", "60")):
         code(tmp_path / name, stage=found, icing=("50", sugar))
         stage = tmp_path / name / "stages/bake/stage.py"
-        stage.write_text(stage.read_text().replace("def run", "from stages.kit.finding import every\n\ndef run"))
+        stage.write_text(
+            stage.read_text().replace("def run", "from scenewright.stages.kit.finding import every\n\ndef run")
+        )
         (tmp_path / name / "stages/kit/finding.py").write_text(f"import importlib\n\n{finder}")
-        codes.append(Program(tmp_path / name).code_of([Definition("stages.bake.stage", "run")]))
-    assert codes[0].digest != codes[1].digest and "stages.bake.unused" not in codes[0].modules
+        codes.append(Program(tmp_path / name).code_of([Definition("scenewright.stages.bake.stage", "run")]))
+    assert codes[0].digest != codes[1].digest and "scenewright.stages.bake.unused" not in codes[0].modules

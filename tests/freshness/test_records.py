@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from scenewright.stages.engine.discovery import all_stages
 
-from stages.engine.discovery import all_stages
 from tests.freshness.program import Program
 from tests.freshness.records import FOLDER, REPOSITORY, code_of, complaint, path_of, read_record
 from tests.freshness.runs import RUNS

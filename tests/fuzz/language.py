@@ -6,18 +6,19 @@ import contextlib
 import json
 from collections.abc import Callable
 
-from schemas.errors import BadInput
-from stages.kit.language.actions import ActionLanguage, ActionType, NumberRange, check_calls
-from stages.kit.language.backend import RawReply, Request, Usage
-from stages.kit.language.chat import read_reply
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import say
-from stages.kit.language.openai_compatible import OpenAICompatibleBackend
-from stages.kit.language.plan_schema import plan_schema
-from stages.kit.language.reply_schema import DoesNotFollow
-from stages.kit.language.reply_text import Unreadable
-from stages.kit.language.transcripts import exchange_of, read_transcript
-from stages.kit.services.connection import Answer, Connection, GivenUp, TryAgain
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.language.actions import ActionLanguage, ActionType, NumberRange, check_calls
+from scenewright.stages.kit.language.backend import RawReply, Request, Usage
+from scenewright.stages.kit.language.chat import read_reply
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import say
+from scenewright.stages.kit.language.openai_compatible import OpenAICompatibleBackend
+from scenewright.stages.kit.language.plan_schema import plan_schema
+from scenewright.stages.kit.language.reply_schema import DoesNotFollow
+from scenewright.stages.kit.language.reply_text import Unreadable
+from scenewright.stages.kit.language.transcripts import exchange_of, read_transcript
+from scenewright.stages.kit.services.connection import Answer, Connection, GivenUp, TryAgain
+
 from tests.fuzz.harness import Harness, as_file
 
 LANGUAGE = ActionLanguage(

@@ -9,13 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.folders.calibration_files import read_calibration
+from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Unusable
 
-from schemas.errors import BadInput, UsageError
-from stages.ingest.detection import open_log
-from stages.ingest.folders.calibration_files import read_calibration
-from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Unusable
 from tests.fuzz.harness import Harness, as_file, chosen, scratch
 from tests.unit.ingest.folder_writers import (
     write_colmap,

@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import CompressionType
 from rosbags.rosbag2 import StoragePlugin
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.messages.compressed_depth import decode_compressed_depth
+from scenewright.stages.ingest.messages.container import Channel
+from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
+from scenewright.stages.ingest.messages.opening import open_message_log
+from scenewright.stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels, role_of
+from scenewright.stages.ingest.messages.records import ImageRecord, Undecodable
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
 
-from schemas.errors import BadInput, UsageError
-from stages.ingest.detection import open_log
-from stages.ingest.messages.compressed_depth import decode_compressed_depth
-from stages.ingest.messages.container import Channel
-from stages.ingest.messages.decoding import decoder_for, why_unreadable
-from stages.ingest.messages.opening import open_message_log
-from stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels, role_of
-from stages.ingest.messages.records import ImageRecord, Undecodable
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Unusable
-from stages.kit.formats.frames import FrameReader, FrameWriter
 from tests.fuzz.harness import Harness, as_file, chosen, edited, scratch, script
 from tests.unit.ingest.container_logs import some_messages, write_bag1, write_bag2, write_mcap
 from tests.unit.ingest.message_logs import FIRST, SECOND, record_room, recorder

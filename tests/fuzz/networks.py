@@ -7,13 +7,12 @@ import contextlib
 import json
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.kit.formats.frames import Frame
-from stages.kit.formats.masks import encode_panoptic_png
-from stages.kit.labels import LABEL_FILES, LABELS_FOLDER, read_label_file
-from stages.kit.services.segmentation_protocol import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.formats.masks import encode_panoptic_png
+from scenewright.stages.kit.labels import LABEL_FILES, LABELS_FOLDER, read_label_file
+from scenewright.stages.kit.services.segmentation_protocol import (
     Category,
     Reply,
     ReplySegment,
@@ -26,7 +25,8 @@ from stages.kit.services.segmentation_protocol import (
     parse_reply,
     parse_request,
 )
-from stages.segment.backends.onnx.sidecar import read_sidecar
+from scenewright.stages.segment.backends.onnx.sidecar import read_sidecar
+
 from tests.fuzz.harness import Harness, as_file
 
 CATEGORIES = {3: Category(id=3, name="chair"), 7: Category(id=7, name="wall", isthing=0)}

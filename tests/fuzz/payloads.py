@@ -10,21 +10,20 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.base import Model
-from schemas.errors import BadInput, UsageError
-from schemas.kinds import KINDS
-from schemas.manifest import MANIFEST_NAME, Manifest
-from stages.engine import store
-from stages.engine.pipelines import read_pipeline
-from stages.engine.reading import check_hashes, open_artifact
-from stages.engine.verification import verify
-from stages.kit.configuration import read_config
-from stages.kit.formats.masks import PanopticReader, write_panoptic_zip
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.formats.ply_files import ColoredMesh, read_ply, write_ply
-from stages.kit.formats.trajectories import (
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.stages.engine import store
+from scenewright.stages.engine.pipelines import read_pipeline
+from scenewright.stages.engine.reading import check_hashes, open_artifact
+from scenewright.stages.engine.verification import verify
+from scenewright.stages.kit.configuration import read_config
+from scenewright.stages.kit.formats.masks import PanopticReader, write_panoptic_zip
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, read_ply, write_ply
+from scenewright.stages.kit.formats.trajectories import (
     number_rows,
     read_matrix,
     read_open3d_log,
@@ -32,8 +31,9 @@ from stages.kit.formats.trajectories import (
     write_open3d_log,
     write_tum,
 )
-from stages.kit.formats.urdf_check import check_urdf
-from stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+
 from tests.fuzz.harness import Harness, as_file, chosen, scratch
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"

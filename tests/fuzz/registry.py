@@ -55,14 +55,14 @@ MODULES = {
 }
 NAMES = tuple(name for names in MODULES.values() for name in names)
 INSTRUMENTED = [
-    "stages.ingest",
-    "stages.kit.labels",
-    "stages.segment.backends.onnx",
-    "stages.segment.backends.service",
-    "stages.kit.formats",
-    "stages.kit.language",
-    "stages.kit.services",
-    "stages.engine",
+    "scenewright.stages.ingest",
+    "scenewright.stages.kit.labels",
+    "scenewright.stages.segment.backends.onnx",
+    "scenewright.stages.segment.backends.service",
+    "scenewright.stages.kit.formats",
+    "scenewright.stages.kit.language",
+    "scenewright.stages.kit.services",
+    "scenewright.stages.engine",
     "schemas",
 ]
 """Packages of ours whose branches a fuzzer watches."""

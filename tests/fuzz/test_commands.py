@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from scenewright.stages.engine.verification import verify
 
-from stages.engine.verification import verify
 from tests.fuzz.commands import base
 from tests.fuzz.commands.case import Case, Edit, read_case
 from tests.fuzz.commands.edits import apply

@@ -8,10 +8,10 @@ import shutil
 import sys
 from pathlib import Path
 
-from schemas.kinds import KINDS
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.digests import content_digest, record_files
-from stages.engine.reading import open_artifact
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.reading import open_artifact
 
 FOLDER = Path(__file__).resolve().parent
 LARGEST = 60_000

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from schemas.kinds import KINDS
-from stages.engine.migration import migrate
-from stages.engine.reading import open_artifact
-from stages.engine.verification import verify
+from scenewright.schemas.kinds import KINDS
+from scenewright.stages.engine.migration import migrate
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.engine.verification import verify
 
 FOLDER = Path(__file__).resolve().parent
 GOLDEN = sorted(path.parent for path in FOLDER.glob("v*/*/manifest.json"))

@@ -6,8 +6,9 @@ import signal
 import sys
 from pathlib import Path
 
-from stages.engine.batch.expansion import read_batch
-from stages.engine.batch.session import run_batch
+from scenewright.stages.engine.batch.expansion import read_batch
+from scenewright.stages.engine.batch.session import run_batch
+
 from tests.unit.batch.batches import program_command
 
 

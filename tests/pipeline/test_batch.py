@@ -18,15 +18,22 @@ import cv2
 import numpy as np
 import psutil
 import pytest
+from scenewright.cli.batch_command import batch as batch_command
+from scenewright.schemas.errors import MachineFailure, UsageError
+from scenewright.stages.engine.batch.expansion import Batch, read_batch
+from scenewright.stages.engine.batch.folder_lock import folder_lock
+from scenewright.stages.engine.batch.local_executor import processors
+from scenewright.stages.engine.batch.results import RESULTS_NAME, latest_by_job, read_results
+from scenewright.stages.engine.batch.session import (
+    BatchEnd,
+    collect_tasks,
+    plan_batch,
+    run_batch,
+    run_task,
+    write_array,
+)
+from scenewright.stages.engine.reading import read_manifest
 
-from cli.batch_command import batch as batch_command
-from schemas.errors import MachineFailure, UsageError
-from stages.engine.batch.expansion import Batch, read_batch
-from stages.engine.batch.folder_lock import folder_lock
-from stages.engine.batch.local_executor import processors
-from stages.engine.batch.results import RESULTS_NAME, latest_by_job, read_results
-from stages.engine.batch.session import BatchEnd, collect_tasks, plan_batch, run_batch, run_task, write_array
-from stages.engine.reading import read_manifest
 from tests.contract.test_command_line import REPOSITORY, scenewright
 from tests.unit.batch.batches import batch_of, lines_of, program_command, write_batch
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenewright.stages.engine.batch.ray_executor import RayExecutor
+from scenewright.stages.engine.batch.results import RESULTS_NAME, latest_by_job, read_results
+from scenewright.stages.engine.batch.session import run_batch
+from scenewright.stages.engine.batch.spec import RayOptions
+from scenewright.stages.engine.batch.storage import stored_digest
 
-from stages.engine.batch.ray_executor import RayExecutor
-from stages.engine.batch.results import RESULTS_NAME, latest_by_job, read_results
-from stages.engine.batch.session import run_batch
-from stages.engine.batch.spec import RayOptions
-from stages.engine.batch.storage import stored_digest
 from tests.unit.batch.batches import batch_of, program_command
 
 ray = pytest.importorskip("ray", reason="the extra `cluster` is not installed")

@@ -8,13 +8,18 @@ import subprocess
 from pathlib import Path
 
 import pytest
-
-from schemas.errors import BadInput, MissingDependency, UsageError
-from stages.engine.batch import read_batch, worst_exit_code
-from stages.engine.chain import StepReport, run_pipeline
-from stages.engine.given_inputs import check_given_inputs
-from stages.engine.make_rules import makefile_for
-from stages.engine.pipelines import PIPELINES_FOLDER, pipeline_path, read_pipeline, resolve_variables, step_arguments
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.stages.engine.batch import read_batch, worst_exit_code
+from scenewright.stages.engine.chain import StepReport, run_pipeline
+from scenewright.stages.engine.given_inputs import check_given_inputs
+from scenewright.stages.engine.make_rules import makefile_for
+from scenewright.stages.engine.pipelines import (
+    PIPELINES_FOLDER,
+    pipeline_path,
+    read_pipeline,
+    resolve_variables,
+    step_arguments,
+)
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 NAMES = sorted(path.stem for path in PIPELINES_FOLDER.glob("*.toml"))
@@ -48,7 +53,7 @@ def test_make_runs_the_same_commands_in_the_same_order(name: str, tmp_path: Path
         text=True,
         check=True,
     )
-    commands = [shlex.split(line)[3:] for line in done.stdout.splitlines() if line.startswith("python -m cli")]
+    commands = [shlex.split(line)[3:] for line in done.stdout.splitlines() if line.startswith("python -m scenewright")]
     assert commands == expected
 
 

@@ -14,11 +14,11 @@ import time
 from pathlib import Path
 
 import pytest
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.engine.verification import verify
 
-from stages.engine.digests import content_digest, record_files
-from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
-from stages.engine.reading import open_artifact
-from stages.engine.verification import verify
 from tests.contract.test_command_line import scenewright
 from tests.reliability.kill_chain import SIGNALS, run_trial
 
@@ -172,7 +172,7 @@ def test_kill_leaves_the_previous_artifact(run_folder: Path, tmp_path: Path, nam
     shutil.copytree(run_folder / name, out)
     took = manifest(out).provenance.seconds
     process = subprocess.Popen(
-        [sys.executable, "-m", "cli", *arguments_of(name, run_folder, out), "--force", "--quiet"],
+        [sys.executable, "-m", "scenewright", *arguments_of(name, run_folder, out), "--force", "--quiet"],
         cwd=REPOSITORY,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

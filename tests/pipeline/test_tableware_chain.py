@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run
+from scenewright.schemas.tableware_plan import FIELD_OF, TablewarePlanFile
+from scenewright.schemas.tableware_scene import TablewareSceneFile
+from scenewright.schemas.tableware_trial import TablewareTrialFile
 
-from cli.main import run
-from schemas.tableware_plan import FIELD_OF, TablewarePlanFile
-from schemas.tableware_scene import TablewareSceneFile
-from schemas.tableware_trial import TablewareTrialFile
 from tests.unit.viewing.artifacts import seal
 
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.path_query import Effort, Query
+from scenewright.stages.kit.motion.path_search import find_path
+from scenewright.stages.kit.motion.rrt_connect import SearchSpace
 
 from benchmarks.experiments.planning_motion.queries import CHAIN, QuerySet, drawer_set, free_set, shelf_set
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.path_query import Effort, Query
-from stages.kit.motion.path_search import find_path
-from stages.kit.motion.rrt_connect import SearchSpace
 from tests.quality.bands import Band, outside
 
 QUERIES = 12

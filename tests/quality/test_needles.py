@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.suture.evaluation.judgement import judged
+from scenewright.stages.suture.masks import spoiled_masks
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.world.corruption import noisy_disparity
+from scenewright.stages.suture.world.sampling import seen_scene
 
-from stages.suture.evaluation.judgement import judged
-from stages.suture.masks import spoiled_masks
-from stages.suture.needle.estimate import estimate
-from stages.suture.world.corruption import noisy_disparity
-from stages.suture.world.sampling import seen_scene
 from tests.quality.bands import Band, outside
 
 VIEWS = 24

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from stages.pack.environment import PackingWorld
-from stages.pack.hard_suites import hard_instance
-from stages.pack.loop import Budget, run_loop
-from stages.pack.motion import MotionPlanner
-from stages.pack.own_proposer import OwnProposer
+from scenewright.stages.pack.environment import PackingWorld
+from scenewright.stages.pack.hard_suites import hard_instance
+from scenewright.stages.pack.loop import Budget, run_loop
+from scenewright.stages.pack.motion import MotionPlanner
+from scenewright.stages.pack.own_proposer import OwnProposer
+
 from tests.quality.bands import Band, outside
 
 CELLS = ("fill", "unreachable", "obstacles", "mixed_heights", "boxes_8")

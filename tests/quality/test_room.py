@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from cli.main import run
+from scenewright.cli.main import run
+
 from tests.quality.bands import Band, outside
 
 SIZE = ("--frames", "30", "--width", "240", "--height", "180")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scenewright.cli.main import run
+from scenewright.schemas.tableware_detections import TablewareDetectionsFile
+from scenewright.schemas.tableware_scene import TablewareSceneFile
+from scenewright.schemas.tableware_trial import TablewareEvaluationFile
 
-from cli.main import run
-from schemas.tableware_detections import TablewareDetectionsFile
-from schemas.tableware_scene import TablewareSceneFile
-from schemas.tableware_trial import TablewareEvaluationFile
 from tests.quality.bands import Band, outside
 
 TABLES = 6

@@ -26,7 +26,7 @@ from tests.reliability.running import REPOSITORY
 CODES = (0, 2, 3, 4, 5, 6, 130)
 SECONDS = 20
 LARGEST = 4 * 2**30
-START = [sys.executable, "-c", "from cli.main import main; main()"]
+START = [sys.executable, "-c", "from scenewright.cli.main import main; main()"]
 FULL = ("", ">&-", "> /dev/full", ">&- 2>&-", "<&- >&- 2>&-")
 STREAMS = (*FULL[1:], "2>&-", "2> /dev/full", "| head -c1")
 

@@ -24,10 +24,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from schemas.manifest import MANIFEST_NAME, Manifest
-from stages.engine.digests import content_digest, record_files
-from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
-from stages.engine.reading import open_artifact
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
+from scenewright.stages.engine.reading import open_artifact
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SMALL = {"frames": "16", "width": "160", "height": "120", "voxel_size": "0.05", "seed": "3"}
@@ -40,8 +40,9 @@ COMMIT_SECONDS = 0.06
 """About what hashing, flushing and exchanging takes in this chain."""
 PHASES = ("before work", "during work", "committing", "after")
 WITHOUT_EXCHANGE = (
-    "from stages.engine import interruption; interruption.install(); from cli.main import main; "
-    "import stages.engine.store as store; store.exchange = lambda first, second: False; main()"
+    "from scenewright.stages.engine import interruption; interruption.install(); "
+    "from scenewright.cli.main import main; "
+    "import scenewright.stages.engine.store as store; store.exchange = lambda first, second: False; main()"
 )
 """The command line on a file system that cannot exchange two folders in one step."""
 
@@ -71,7 +72,7 @@ class Trial:
 
 def scenewright(words: list[str], *, atomic: bool = True) -> subprocess.Popen[str]:
     """Start a command line in a process of its own."""
-    start = [sys.executable, "-m", "cli"] if atomic else [sys.executable, "-c", WITHOUT_EXCHANGE]
+    start = [sys.executable, "-m", "scenewright"] if atomic else [sys.executable, "-c", WITHOUT_EXCHANGE]
     return subprocess.Popen([*start, *words], cwd=REPOSITORY, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 

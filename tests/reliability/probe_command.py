@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 
-import cli.application
-from cli.main import main
-from stages.engine import runner
+import scenewright.cli.application
+from scenewright.cli.main import main
+from scenewright.stages.engine import runner
+
 from tests.contract.probe_step import PROBE
 
 _import_module = importlib.import_module
@@ -17,10 +18,10 @@ class _Importer:
 
     @staticmethod
     def import_module(name: str) -> object:
-        return _import_module("tests.contract.probe_step" if name == "stages.probe.stage" else name)
+        return _import_module("tests.contract.probe_step" if name == "scenewright.stages.probe.stage" else name)
 
 
 if __name__ == "__main__":
     runner.importlib = _Importer  # type: ignore[attr-defined]
-    cli.application.all_stages = lambda: {"probe": PROBE}  # type: ignore[attr-defined]
+    scenewright.cli.application.all_stages = lambda: {"probe": PROBE}  # type: ignore[attr-defined]
     main()

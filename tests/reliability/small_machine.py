@@ -19,7 +19,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+
 from tests.reliability.kill_chain import REPOSITORY, STEPS, arguments_of
 
 GIBIBYTE = 2**30
@@ -43,7 +44,7 @@ class Shortage:
 def run_limited(name: str, runs: Path, out: Path, limit: Callable[[], None] | None) -> tuple[int, str]:
     """Run one step; returns its exit code and its line of error, or the end of what it said."""
     done = subprocess.run(
-        [sys.executable, "-m", "cli", *arguments_of(name, runs, out), "--quiet"],
+        [sys.executable, "-m", "scenewright", *arguments_of(name, runs, out), "--quiet"],
         cwd=REPOSITORY,
         capture_output=True,
         text=True,

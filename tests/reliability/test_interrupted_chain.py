@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 
 import pytest
+from scenewright.stages.engine import interruption, store
 
-from stages.engine import interruption, store
 from tests.reliability.running import REPOSITORY
 
 PIPELINE = """
@@ -40,7 +40,7 @@ def is_running(process: int) -> bool:
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_the_step_ends_with_its_chain(tmp_path: Path, number: signal.Signals) -> None:
     (tmp_path / "p.toml").write_text(PIPELINE)
-    command = [sys.executable, "-m", "cli", "run", str(tmp_path / "p.toml"), "--out", str(tmp_path / "run")]
+    command = [sys.executable, "-m", "scenewright", "run", str(tmp_path / "p.toml"), "--out", str(tmp_path / "run")]
     chain = subprocess.Popen(command, cwd=REPOSITORY, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     deadline = time.monotonic() + 60
     while not list((tmp_path / "run").glob(".cad_library.partial-*")) and time.monotonic() < deadline:

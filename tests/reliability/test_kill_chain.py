@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.stages.engine.runner import run_stage
 
-from schemas.manifest import MANIFEST_NAME, Manifest
-from stages.engine.runner import run_stage
 from tests.contract.probe_step import PROBE, ProbeParameters
 from tests.reliability.kill_chain import (
     SIGNALS,

@@ -16,13 +16,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.errors import BadInput, MachineFailure, ScenewrightError, UsageError
+from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
+from scenewright.stages.engine import interruption, runner, store
+from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.engine.runner import RunResult, run_stage
+from scenewright.stages.engine.verification import verify
 
-from schemas.errors import BadInput, MachineFailure, ScenewrightError, UsageError
-from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
-from stages.engine import interruption, runner, store
-from stages.engine.reading import open_artifact
-from stages.engine.runner import RunResult, run_stage
-from stages.engine.verification import verify
 from tests.contract.probe_step import PROBE, ProbeParameters
 from tests.reliability.running import REPOSITORY, file_size_limit, memory_limit, only_error, run_probe, small_disk
 
@@ -615,7 +615,7 @@ def test_an_interruption_lost_in_a_finalizer_prints_nothing() -> None:
     """The interpreter prints what a finalizer raises; of a repeated interruption nothing, of anything else all."""
     script = (
         "import os, signal\n"
-        "from stages.engine import interruption\n"
+        "from scenewright.stages.engine import interruption\n"
         "interruption.install()\n"
         "class Fails:\n"
         "    def __del__(self):\n"
@@ -640,7 +640,7 @@ def test_an_interruption_lost_in_a_finalizer_prints_nothing() -> None:
 def test_a_reader_that_leaves(tmp_path: Path) -> None:
     """`| head -1`, and a pager that is closed while a step still talks: no traceback, code 130 at most."""
     make(tmp_path / "a")
-    line = f"{sys.executable} -m cli inspect {tmp_path}/a"
+    line = f"{sys.executable} -m scenewright inspect {tmp_path}/a"
     done = subprocess.run(["bash", "-c", f"{line} | head -1"], cwd=REPOSITORY, capture_output=True, text=True)
     assert done.stdout.startswith("kind") and done.stderr == ""
     read, write = os.pipe()

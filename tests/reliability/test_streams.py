@@ -11,15 +11,15 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import _check_surroundings
+from scenewright.cli.streams import ReaderLeft, Stream
+from scenewright.schemas.errors import MachineFailure
+from scenewright.stages.engine import hub_cache, model_cache, runner
 
-from cli.main import _check_surroundings
-from cli.streams import ReaderLeft, Stream
-from schemas.errors import MachineFailure
-from stages.engine import hub_cache, model_cache, runner
 from tests.bad_input.hostile_artifacts import artifact
 from tests.reliability.running import REPOSITORY
 
-START = f"{shlex.quote(sys.executable)} -m cli"
+START = f"{shlex.quote(sys.executable)} -m scenewright"
 NOISE = "pybullet build time"
 
 
@@ -61,7 +61,7 @@ def test_streams_that_take_nothing(tmp_path: Path, words: str, code: int, said: 
 
 def test_a_folder_that_is_gone(tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
-    start = f"{shlex.quote(sys.executable)} -c 'from cli.main import main; main()'"
+    start = f"{shlex.quote(sys.executable)} -c 'from scenewright.cli.main import main; main()'"
     code, lines = in_shell(f"cd gone && rmdir ../gone && {start} gc", tmp_path)
     assert code == 6 and len(lines) == 1 and lines[0].startswith("error: the current folder: ")
 
@@ -146,7 +146,7 @@ def test_a_user_without_a_home_and_without_a_place_for_compiled_code(words: tupl
     place.chmod(0o777)
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("HOME", "XDG_", "NUMBA_"))}
     done = subprocess.run(
-        [*NOBODY, sys.executable, "-B", "-c", "from cli.main import main; main()", *map(str, words)]
+        [*NOBODY, sys.executable, "-B", "-c", "from scenewright.cli.main import main; main()", *map(str, words)]
         + (["--out", str(place / "out")] if words == FUSE else []),
         cwd="/",  # a folder that may not be written either: numba takes ~ for a folder of it
         env={**kept, "PYTHONPATH": str(REPOSITORY)},

@@ -11,9 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-
-from schemas.errors import BadInput
-from stages.kit.formats.masks import PanopticReader, decode_panoptic_png, encode_panoptic_png, write_panoptic_zip
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.masks import (
+    PanopticReader,
+    decode_panoptic_png,
+    encode_panoptic_png,
+    write_panoptic_zip,
+)
 
 
 @given(

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.cutting.demonstrations.recipes import CELLS, TRAINING_SHARE
+from scenewright.stages.cutting.demonstrations.trials import make_trial
+from scenewright.stages.cutting.evaluate_stage import attempt
+from scenewright.stages.cutting.methods import Learned, learn_methods
+from scenewright.stages.cutting.ours.imagining import imagine
+from scenewright.stages.cutting.policy import carry_out
+from scenewright.stages.cutting.world.foods import make_food
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.tabulation import markdown
-from stages.cutting.demonstrations.recipes import CELLS, TRAINING_SHARE
-from stages.cutting.demonstrations.trials import make_trial
-from stages.cutting.evaluate_stage import attempt
-from stages.cutting.methods import Learned, learn_methods
-from stages.cutting.ours.imagining import imagine
-from stages.cutting.policy import carry_out
-from stages.cutting.world.foods import make_food
 
 TRAININGS, GOALS = 5, 20
 GROWTH = {f"cubes{n}": n for n in (8, 16, 32, 64, 128, 200)}
@@ -29,7 +29,11 @@ ARMS = {
     "bc": "BC",
     "qnet": "QNet",
 }
-SHARED = ("stages.cutting.trying", "stages.cutting.methods", "stages.cutting.ours.imagining")
+SHARED = (
+    "scenewright.stages.cutting.trying",
+    "scenewright.stages.cutting.methods",
+    "scenewright.stages.cutting.ours.imagining",
+)
 
 
 def seeds(first: int) -> tuple[str, ...]:
@@ -133,7 +137,7 @@ EXPERIMENT = Experiment(
     together=lambda trial: trial.seed.split("-")[0],
     measure=measure,
     record=Run,
-    code=dict.fromkeys(ARMS, SHARED) | {"ours_perceived": (*SHARED, "stages.cutting.sight.perceiving")},
+    code=dict.fromkeys(ARMS, SHARED) | {"ours_perceived": (*SHARED, "scenewright.stages.cutting.sight.perceiving")},
     measures={
         "iou": mean("iou"),
         "iou_thesis": mean("iou_thesis"),

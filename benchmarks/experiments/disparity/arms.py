@@ -7,12 +7,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from stages.disparity.parameters import DisparityParameters
-from stages.disparity.raft.checkpoint import load_network
-from stages.disparity.raft.matching import estimated, larger, moved_right, open_raft, smaller, start_of
-from stages.disparity.semi_global import SemiGlobalSettings, gray_of, match
-from stages.kit.stereo.disparity_map import DisparityMap
+from scenewright.stages.disparity.parameters import DisparityParameters
+from scenewright.stages.disparity.raft.checkpoint import load_network
+from scenewright.stages.disparity.raft.matching import estimated, larger, moved_right, open_raft, smaller, start_of
+from scenewright.stages.disparity.semi_global import SemiGlobalSettings, gray_of, match
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
 Arm = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]
 TRUSTED: float = DisparityParameters().minimum_confidence  # type: ignore[call-arg]

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.stages.disparity.rectification import matched_features
+from scenewright.stages.disparity.semi_global import gray_of
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.suture.world.tubes import NEEDLE, THREAD
 
 from benchmarks.disparity.rendered_pairs import kept, needle_stem, room_stems
 from benchmarks.steps import made
-from stages.disparity.rectification import matched_features
-from stages.disparity.semi_global import gray_of
-from stages.kit.formats.frames import FrameReader
-from stages.suture.world.tubes import NEEDLE, THREAD
 
 ROOM_SEEDS = (1000,)
 """Reporting seed of the recipe `room`."""

@@ -12,16 +12,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pydantic import Field
+from scenewright.stages.disparity.raft.matching import SMALL_UPDATES
+from scenewright.stages.disparity.search_range import search_range
+from scenewright.stages.disparity.semi_global import gray_of
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
+from scenewright.stages.kit.stereo.pictures import confidence_colors, disparity_colors
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.disparity.arms import DERIVED, NETWORK, WORDS, Arm, arms_of
 from benchmarks.experiments.disparity.cases import CASES, NEEDLE_SEEDS, TUNING_NEEDLES, Pair
-from stages.disparity.raft.matching import SMALL_UPDATES
-from stages.disparity.search_range import search_range
-from stages.disparity.semi_global import gray_of
-from stages.kit.stage import Parameters
-from stages.kit.stereo.disparity_map import DisparityMap
-from stages.kit.stereo.pictures import confidence_colors, disparity_colors
 
 UNITS = {
     "bad2": "bad-2, of known [%]",

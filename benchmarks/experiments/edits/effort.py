@@ -10,23 +10,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scenewright.cli.viewing.desk.desk import Desk
+from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.stages.edit.anchoring import written_box
+from scenewright.stages.edit.graph_edits import and_below
+from scenewright.stages.edit.map_state import MapState
+from scenewright.stages.kit.geometry.boxes import box_yaw, gravity_aligned_box, points_in_box
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.scene_penetration import resting_overlaps
+from scenewright.stages.urdf.settle_report import COLLISION_DEPTH
 
 from benchmarks.experiments.edits.making import WIDER
 from benchmarks.steps import opened, step
-from cli.viewing.desk.desk import Desk
-from schemas.cad_scene import SURROUNDINGS, CadScene
-from schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile
-from schemas.interactive_scene import InteractiveScene
-from schemas.scene_parts import Box
-from schemas.vocabulary import UNNAMED, load_vocabulary
-from stages.edit.anchoring import written_box
-from stages.edit.graph_edits import and_below
-from stages.edit.map_state import MapState
-from stages.kit.geometry.boxes import box_yaw, gravity_aligned_box, points_in_box
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.world import load_scene
-from stages.urdf.scene_penetration import resting_overlaps
-from stages.urdf.settle_report import COLLISION_DEPTH
 
 MENTAL, POINT_AND_CLICK, KEY = 1.35, 1.3, 0.28
 """Seconds of the keystroke-level model (Card, Moran and Newell 1980): to decide, to point and click, to type a

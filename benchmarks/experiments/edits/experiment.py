@@ -12,6 +12,11 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.edit.map_state import MapState, read_state
+from scenewright.stages.kit.measurement.bootstrap import Interval, figure_interval
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.edits.landing import ARMS, by_geometry
@@ -21,11 +26,6 @@ from benchmarks.generated_rooms import RECIPES, STEPS, make_library, make_room
 from benchmarks.graph_scores import read_room
 from benchmarks.steps import opened, step
 from benchmarks.tabulation import Figure
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.edit.map_state import MapState, read_state
-from stages.kit.measurement.bootstrap import Interval, figure_interval
-from stages.kit.stage import Parameters
 
 SIZE = (320, 240)
 MADE_ON = "same"

@@ -7,16 +7,16 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+from scenewright.schemas.edits import Add, Anchor, Merge, SetFloor, SetGravity
+from scenewright.stages.edit.anchoring import Fitting
+from scenewright.stages.edit.applying import apply_edits
+from scenewright.stages.edit.map_edits import MAP_EDITS
+from scenewright.stages.edit.map_state import MapState
+from scenewright.stages.edit.parameters import EditMapParameters
+from scenewright.stages.evaluate.truth import TrueRoom
 
 from benchmarks.experiments.edits.making import Asked
 from benchmarks.experiments.edits.truth import MapTruth, true_object
-from schemas.edits import Add, Anchor, Merge, SetFloor, SetGravity
-from stages.edit.anchoring import Fitting
-from stages.edit.applying import apply_edits
-from stages.edit.map_edits import MAP_EDITS
-from stages.edit.map_state import MapState
-from stages.edit.parameters import EditMapParameters
-from stages.evaluate.truth import TrueRoom
 
 FITTING = Fitting(**EditMapParameters.model_validate({}).model_dump())
 Landing = Literal["right", "wrong", "conflict", "absent"]

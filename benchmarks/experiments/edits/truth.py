@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.edit.map_state import MapState
-from stages.evaluate.point_labels import nearest_labels
-from stages.evaluate.truth import TrueRoom
+from scenewright.stages.edit.map_state import MapState
+from scenewright.stages.evaluate.point_labels import nearest_labels
+from scenewright.stages.evaluate.truth import TrueRoom
 
 NEAR = 0.05
 """A vertex belongs to the true surface at most this far [m]."""

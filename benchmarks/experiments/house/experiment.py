@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
 from benchmarks.experiments.house.furnishing import RECIPES, furnish
@@ -24,8 +26,6 @@ from benchmarks.experiments.surface.scenes import camera_of
 from benchmarks.reporting_seeds import Method, newest
 from benchmarks.steps import made, opened
 from benchmarks.tabulation import Figure, markdown
-from schemas.cad_library import CadLibrary
-from stages.kit.stage import Parameters
 
 MASKS, NETWORK = "masks", "network"
 OWN = "own"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
 
 from benchmarks.steps import made, opened
-from schemas.cad_library import CadLibrary
-from stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
 
 FOLDERS = {
     "aws": ("aws_furniture", ()),

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene, Replacement
+from scenewright.stages.evaluate.alignment_errors import alignment_error
+from scenewright.stages.evaluate.joint_errors import joint_errors, placed_joints
+from scenewright.stages.evaluate.model_shapes import ModelShape, PlacedShape
+from scenewright.stages.evaluate.replacement_measures import retrieval_rank
+from scenewright.stages.evaluate.shape_loading import model_shape, placed_candidate
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
 
 from benchmarks.experiments.house.furnishing import House
 from benchmarks.experiments.house.models import MODELS
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene, Replacement
-from stages.evaluate.alignment_errors import alignment_error
-from stages.evaluate.joint_errors import joint_errors, placed_joints
-from stages.evaluate.model_shapes import ModelShape, PlacedShape
-from stages.evaluate.replacement_measures import retrieval_rank
-from stages.evaluate.shape_loading import model_shape, placed_candidate
-from stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
 
 SAME_SIZE, SAME_AREA = 0.001, 0.05
 """Edges of boxes [m] and surfaces [share] of one shape in two files differ by less: nobody sees their insides."""

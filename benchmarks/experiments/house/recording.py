@@ -14,6 +14,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.synthesize.seen_surface import SeenSurface
 from scipy.ndimage import distance_transform_edt, label
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
@@ -21,10 +25,6 @@ from scipy.spatial import cKDTree
 from benchmarks.experiments.house.furnishing import House
 from benchmarks.experiments.house.models import MODELS
 from benchmarks.experiments.house.tiny_renderer import TinyRenderer
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import look_at
-from stages.synthesize.seen_surface import SeenSurface
 
 EYE = 1.6
 """Height of the camera [m]."""

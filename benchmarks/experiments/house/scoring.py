@@ -6,6 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.evaluate.map_measures import ANY_CLASS, load_map
+from scenewright.stages.evaluate.point_labels import nearest_labels
+from scenewright.stages.evaluate.truth import stuff_classes
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality, intersection_over_union, panoptic_quality
 
 from benchmarks.experiments.house.furnishing import House
 from benchmarks.experiments.house.placing import Stand, joints_given, stands, true_places
@@ -13,17 +24,6 @@ from benchmarks.experiments.house.recording import Recording, class_of
 from benchmarks.experiments.surface.measuring import distances
 from benchmarks.nested_furniture import nested
 from benchmarks.steps import opened
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import SCENE_NODE, ContactGraph
-from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence
-from stages.evaluate.map_measures import ANY_CLASS, load_map
-from stages.evaluate.point_labels import nearest_labels
-from stages.evaluate.truth import stuff_classes
-from stages.kit.geometry.transforms import apply
-from stages.kit.measurement.panoptic_quality import ClassQuality, intersection_over_union, panoptic_quality
 
 VOXEL = 0.02
 NEAR = 0.05

@@ -9,8 +9,7 @@ from typing import Any, Self
 import numpy as np
 import pybullet
 import trimesh
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 NEAR, FAR = 0.1, 20.0
 """Clipping planes [m]."""

@@ -6,13 +6,14 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from scenewright.stages.kit.measurement.bootstrap import Interval
+from scenewright.stages.pack.environment import PackingWorld
+from scenewright.stages.pack.loop import run_loop
+from scenewright.stages.pack.motion import MotionPlanner
+
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, only, ratio
 from benchmarks.experiments.llm3.arms import ARMS, EVERYWHERE, make_instance
 from benchmarks.tabulation import markdown
-from stages.kit.measurement.bootstrap import Interval
-from stages.pack.environment import PackingWorld
-from stages.pack.loop import run_loop
-from stages.pack.motion import MotionPlanner
 
 TUNING, REPORTING = range(100), range(1000, 1100)
 RIVALS = ("random", "random_restarts", "backtracking", "backtracking_corners", "ours_no_reasons")

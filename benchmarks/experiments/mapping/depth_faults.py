@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 BIAS = 0.013
 """Largest share by which depth is too long or too short: kitchen, living room and office differ by as much."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.measurement.pose_error import associate
 
 from benchmarks.generated_rooms import make_room, room_of
 from benchmarks.steps import made
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.measurement.pose_error import associate
 
 DENSER = 10
 """Pictures of the recording for each one that is mapped: a map takes few, a camera that is tracked gives many."""

@@ -6,20 +6,24 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-
-from benchmarks.experiment import Measure, Results
-from benchmarks.experiments.mapping.arms import SHOWN
-from benchmarks.experiments.mapping.measuring import Outcome, Ranked
-from benchmarks.generated_rooms import RECIPES
-from stages.evaluate.truth import stuff_classes
-from stages.kit.measurement.average_precision import (
+from scenewright.stages.evaluate.truth import stuff_classes
+from scenewright.stages.kit.measurement.average_precision import (
     PrecisionRecall,
     average_precision,
     average_precision_thesis_code,
     mean_precision,
 )
-from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, average_quality_thesis_code
-from stages.synthesize.recipes import load_recipe
+from scenewright.stages.kit.measurement.panoptic_quality import (
+    ClassQuality,
+    average_quality,
+    average_quality_thesis_code,
+)
+from scenewright.stages.synthesize.recipes import load_recipe
+
+from benchmarks.experiment import Measure, Results
+from benchmarks.experiments.mapping.arms import SHOWN
+from benchmarks.experiments.mapping.measuring import Outcome, Ranked
+from benchmarks.generated_rooms import RECIPES
 
 Figure = Callable[[Sequence[Outcome]], float | None]
 ANY = "any"

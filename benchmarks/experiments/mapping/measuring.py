@@ -10,6 +10,36 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.evaluate.graph_measures import box_candidates
+from scenewright.stages.evaluate.map_measures import (
+    PredictedMap,
+    instance_candidates,
+    label_true_points,
+    load_map,
+    measure_quality,
+    quality_thesis_code,
+)
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.fuse.closing import MaskSource
+from scenewright.stages.fuse.mapping import PanopticMapper
+from scenewright.stages.fuse.stage import new_mapper, write_map
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.measurement.average_precision import Candidates, match_greedily
+from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
+from scenewright.stages.segment.one_frame import FUSION, describe
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 
 from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.mapping.arms import (
@@ -28,36 +58,6 @@ from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.experiments.mapping.estimated import estimated_poses
 from benchmarks.generated_rooms import RoomFolder, error_seed, make_room, room_of
 from benchmarks.steps import context_in, opened, unrecorded
-from schemas.contact_graph import ContactGraphFile
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence as SequenceArtifact
-from schemas.vocabulary import load_vocabulary
-from stages.evaluate.graph_measures import box_candidates
-from stages.evaluate.map_measures import (
-    PredictedMap,
-    instance_candidates,
-    label_true_points,
-    load_map,
-    measure_quality,
-    quality_thesis_code,
-)
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.results import Part
-from stages.evaluate.truth import TrueRoom, load_truth
-from stages.fuse.closing import MaskSource
-from stages.fuse.mapping import PanopticMapper
-from stages.fuse.stage import new_mapper, write_map
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.measurement.average_precision import Candidates, match_greedily
-from stages.kit.measurement.panoptic_quality import ClassQuality
-from stages.kit.stage import Parameters
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
-from stages.segment.one_frame import FUSION, describe
-from stages.segment.parameters import SegmentParameters
-from stages.segment.settings import fusion_settings, geometric_settings
 
 DRIFT_STREAM, FAULT_STREAM = 11, 12
 SEED = 0

@@ -17,6 +17,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, median
 from benchmarks.experiments.mosd_supports.support_score import SupportScore, f1, score_graph
@@ -24,9 +27,6 @@ from benchmarks.experiments.mosd_supports.tabletop_maps import LabelledView, bui
 from benchmarks.mosd_frames import CAMERA, DEPTH_UNIT, FOLDER, frame_files, kind_of
 from benchmarks.steps import unrecorded
 from benchmarks.tabulation import markdown
-from schemas.errors import BadInput
-from stages.kit.stage import Parameters
-from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
 ANNOTATIONS = Path(__file__).resolve().parents[3] / "data" / "annotations" / "mosd_supports"
 BASE = "table"

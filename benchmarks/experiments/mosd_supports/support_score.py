@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from schemas.contact_graph import ContactGraphFile
-from stages.truth.support_annotation import SupportAnnotation
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.truth.support_annotation import SupportAnnotation
 
 SECOND = ("second", "also_supports", "leans_on")
 

@@ -11,18 +11,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import LabelEntry
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.geometry.cameras import back_project, project
+from scenewright.stages.kit.geometry.planes import ransac_plane
+from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scipy.optimize import linear_sum_assignment
 
 from benchmarks.steps import opened, step
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.geometry.cameras import back_project, project
-from stages.kit.geometry.planes import ransac_plane
-from stages.kit.geometry.transforms import apply, inverse
 
 VOXEL_SIZE = 0.004
 """Metres; what rests on these tables is 2 to 30 cm high."""

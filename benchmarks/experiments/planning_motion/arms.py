@@ -15,14 +15,21 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.compiled_rrt import way_is_free
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.path_query import (
+    Effort,
+    Query,
+    compiled_free,
+    confirm,
+    moving_arrays,
+    refusal_counts,
+)
+from scenewright.stages.kit.motion.path_search import find_path, leave_narrow
+from scenewright.stages.kit.motion.rrt_connect import FINER, SearchSpace, interpolate, rrt_connect, without_repeats
 
 from benchmarks.experiments.planning_motion.queries import CHAIN, MotionQuery
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.compiled_rrt import way_is_free
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.path_query import Effort, Query, compiled_free, confirm, moving_arrays, refusal_counts
-from stages.kit.motion.path_search import find_path, leave_narrow
-from stages.kit.motion.rrt_connect import FINER, SearchSpace, interpolate, rrt_connect, without_repeats
 
 RESOLUTION = 0.05
 """Largest step of a joint between two checks of our search [rad]."""

@@ -15,6 +15,9 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
+from scenewright.stages.kit.measurement.bootstrap import Interval
+from scenewright.stages.kit.motion.rrt_connect import densify
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean, median, ratio, statistic
 from benchmarks.experiments.planning_motion.arms import ARMS, FINE
@@ -26,9 +29,6 @@ from benchmarks.experiments.planning_motion.queries import (
     room_set,
     shelf_set,
 )
-from stages.kit.measurement.bootstrap import Interval
-from stages.kit.motion.rrt_connect import densify
-from stages.kit.stage import Parameters
 
 QUERIES = 200
 TUNING, REPORTING = range(0, QUERIES), range(5000, 5000 + QUERIES)

@@ -11,18 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Box
-from stages.kit.motion.base_placement import in_arm_frame, sample_bases
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.grasps import sample_grasps
-from stages.kit.motion.kinematics import arm_chain, inverse_kinematics, random_starts
-from stages.kit.simulation.robot import Configuration, Robot
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.shapes import link_shapes, surface_points
-from stages.kit.simulation.world import PhysicsWorld, load_scene
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.motion.base_placement import in_arm_frame, sample_bases
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.grasps import sample_grasps
+from scenewright.stages.kit.motion.kinematics import arm_chain, inverse_kinematics, random_starts
+from scenewright.stages.kit.simulation.robot import Configuration, Robot
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
+from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene
 
 PANDA = load_robot("panda")
 CHAIN = arm_chain(PANDA)

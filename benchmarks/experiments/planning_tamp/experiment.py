@@ -16,22 +16,22 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.kit.measurement.bootstrap import pooled_interval
+from scenewright.stages.kit.measurement.proportions import wilson_interval
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.tasks.pddl import parse_domain, parse_problem
+from scenewright.stages.kit.tasks.strips import positive_task
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan.tasks import TaskName
 
 from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Bench, Experiment, Results, Trial
 from benchmarks.experiments.planning_tamp.rooms import exact_room
 from benchmarks.steps import made, opened, unrecorded
 from benchmarks.tabulation import Figure
-from schemas.cad_library import CadLibrary
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from stages.kit.measurement.bootstrap import pooled_interval
-from stages.kit.measurement.proportions import wilson_interval
-from stages.kit.progress import SilentProgress
-from stages.kit.tasks.pddl import parse_domain, parse_problem
-from stages.kit.tasks.strips import positive_task
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan.tasks import TaskName
 
 TASKS: tuple[TaskName, ...] = get_args(TaskName)
 GROUPS = {task: (task,) for task in TASKS} | {

@@ -7,18 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.cad_library import CadLibrary
-from schemas.errors import BadInput
-from schemas.interactive_scene import InteractiveScene
-from schemas.scene_parts import SurfacePlane
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.synthesize.arrangement import arrange
-from stages.synthesize.furniture import Catalogue
-from stages.synthesize.placement import PlacedObject
-from stages.synthesize.recipes import load_recipe
-from stages.synthesize.truth import object_boxes, scene_bodies, true_graph
-from stages.synthesize.viewpoints import blocked_floor
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.synthesize.arrangement import arrange
+from scenewright.stages.synthesize.furniture import Catalogue
+from scenewright.stages.synthesize.placement import PlacedObject
+from scenewright.stages.synthesize.recipes import load_recipe
+from scenewright.stages.synthesize.truth import object_boxes, scene_bodies, true_graph
+from scenewright.stages.synthesize.viewpoints import blocked_floor
 
 
 def shut_furniture(things: Sequence[PlacedObject], catalogue: Catalogue) -> tuple[PlacedObject, ...]:

@@ -13,17 +13,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from pydantic import Field
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.preflight.inspection import inspect_source
+from scenewright.stages.ingest.preflight.report import InspectionReport
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial, mean, median
 from benchmarks.experiments.preflight.faults import FAULTS, NOTHING, Fault, Named
 from benchmarks.experiments.real import EXPECTED
 from benchmarks.steps import made
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.preflight.inspection import inspect_source
-from stages.ingest.preflight.report import InspectionReport
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Parameters
 
 REPORTED_SEEDS = tuple(str(seed) for seed in range(200, 212))
 """Rooms that no threshold was set on."""

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.pose_conventions import BODY_FROM_OPTICAL, MIRROR_Y, OPENGL_AXES
-from stages.ingest.preflight.report import CameraReport
-from stages.ingest.source import Entry, LoadedFrame, LogSource
-from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.pose_conventions import BODY_FROM_OPTICAL, MIRROR_Y, OPENGL_AXES
+from scenewright.stages.ingest.preflight.report import CameraReport
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource
+from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 
 Fault = Callable[[LogSource], LogSource]
 Named = Callable[[CameraReport], bool]

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import Field
+from scenewright.stages.engine.chain import REPOSITORY, command_prefix
+from scenewright.stages.engine.reading import read_manifest
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.registry import all_backends
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.real_all.made_logs import MADE
 from benchmarks.tabulation import markdown
-from stages.engine.chain import REPOSITORY, command_prefix
-from stages.engine.reading import read_manifest
-from stages.kit.stage import Parameters
-from stages.segment.registry import all_backends
 
 EXPECTATIONS = Path(__file__).resolve().parents[2] / "expectations" / "real_all.toml"
 LOGS: dict[str, dict[str, Any]] = tomllib.loads(EXPECTATIONS.read_text(encoding="utf-8"))

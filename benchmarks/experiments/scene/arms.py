@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.graph.parameters import GraphParameters
+
 from benchmarks.experiments.mapping.arms import DRIFTING as DRIFTING_POSES
 from benchmarks.experiments.mapping.arms import ESTIMATED as ESTIMATED_POSES
 from benchmarks.experiments.mapping.arms import LASTING
-from stages.cad.parameters import CadParameters
-from stages.graph.parameters import GraphParameters
 
 
 @dataclass(frozen=True)

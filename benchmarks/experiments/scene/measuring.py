@@ -11,6 +11,24 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.cad_library import CadLibrary, CadModel, LibraryFile
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.cad.candidates import Shortlist
+from scenewright.stages.cad.model_surfaces import ModelSurface
+from scenewright.stages.cad.stage import METHODS, choose_and_write, find_candidates
+from scenewright.stages.evaluate.correspondence import point_overlaps
+from scenewright.stages.evaluate.map_measures import label_true_points, load_map
+from scenewright.stages.evaluate.replacement_measures import ObjectResult, replacements_of
+from scenewright.stages.evaluate.shape_loading import true_shapes
+from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.kit.formats.mobility import BUILT_IN, STANDS
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.urdf.mujoco_settle import mujoco_motions
+from scenewright.stages.urdf.settle_report import BodyMotion, SettleReport, settle_report
 
 from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.mapping.experiment import EXPERIMENT as MAPPING
@@ -23,24 +41,6 @@ from benchmarks.graph_scores import OPTIONS, distance_figures, judge
 from benchmarks.keeping import measure_missing
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import StepFailed, context_in, made, opened, unrecorded
-from schemas.cad_library import CadLibrary, CadModel, LibraryFile
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.cad.candidates import Shortlist
-from stages.cad.model_surfaces import ModelSurface
-from stages.cad.stage import METHODS, choose_and_write, find_candidates
-from stages.evaluate.correspondence import point_overlaps
-from stages.evaluate.map_measures import label_true_points, load_map
-from stages.evaluate.replacement_measures import ObjectResult, replacements_of
-from stages.evaluate.shape_loading import true_shapes
-from stages.evaluate.truth import TrueRoom, load_truth
-from stages.kit.formats.mobility import BUILT_IN, STANDS
-from stages.kit.stage import Parameters
-from stages.urdf.mujoco_settle import mujoco_motions
-from stages.urdf.settle_report import BodyMotion, SettleReport, settle_report
 
 ARM = {arm.name: arm for arm in ARMS}
 SEED = 0

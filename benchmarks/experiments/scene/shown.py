@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.geometric import segment_depth
+from scenewright.stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.settings import geometric_settings
 
 from benchmarks.experiments.mapping.measuring import masks_of
 from benchmarks.generated_rooms import error_seed
 from benchmarks.graph_scores import OPTIONS
-from schemas.sequence import Sequence as SequenceArtifact
-from stages.kit.formats.frames import FrameReader
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.geometric import segment_depth
-from stages.segment.panoptic import PanopticFrame
-from stages.segment.parameters import SegmentParameters
-from stages.segment.settings import geometric_settings
 
 LEAST_PIXELS = 30
 """Of a thing in a picture 320 wide that counts as a view of it."""

@@ -6,8 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from schemas.cad_library import CadModel
+from scenewright.schemas.cad_library import CadModel
 
 
 def extents(model: CadModel) -> np.ndarray:

@@ -14,6 +14,14 @@ from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
+from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.evaluate.map_measures import PredictedMap, load_map
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.truth import load_truth
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.experiments.mapping.arms import Arm, all_arms
@@ -22,14 +30,6 @@ from benchmarks.experiments.mapping.measuring import Outcome, outcome_of_map
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
 from benchmarks.experiments.scenenn.tables import ALL, MEASURES, all_figures, of_ten, printed, read_published
 from benchmarks.steps import opened, step
-from schemas.contact_graph import ContactGraph, ContactGraphFile
-from schemas.errors import BadInput, UsageError
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from stages.evaluate.map_measures import PredictedMap, load_map
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.truth import load_truth
-from stages.kit.stage import Parameters
 
 WHAT_TO_FETCH = (
     "make scenenn DATA=folder: SceneNN is not here; fetch <scene>.ply, <scene>.xml, trajectory.log and the frames of "

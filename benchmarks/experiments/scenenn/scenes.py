@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from stages.ingest.layouts.scenenn import reader as scenenn
+from scenewright.stages.ingest.layouts.scenenn import reader as scenenn
 
 FRAMES = ("", "main", "scenes")
 """Folders below the data's in which scenes may lie."""

@@ -8,13 +8,14 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+from scenewright.stages.kit.measurement.average_precision import average_precision_thesis_code
+
 from benchmarks.experiment import Measure
 from benchmarks.experiments.mapping.figures_of_merit import MEASURES as OF_MAPS
 from benchmarks.experiments.mapping.figures_of_merit import class_figures, precision_measure
 from benchmarks.experiments.mapping.measuring import Outcome
 from benchmarks.experiments.mapping.printed import PRINTED
 from benchmarks.tabulation import MISSING, markdown
-from stages.kit.measurement.average_precision import average_precision_thesis_code
 
 ALL = "all"
 MEASURES = {name: measure for name, measure in OF_MAPS.items() if name != "frames_per_second"} | {

@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterator, Sequence
 
 import cv2
 import numpy as np
+from scenewright.stages.kit.drawing.plots import STYLE, plt, save
+from scenewright.stages.suture.evaluation.judgement import Estimate
+from scenewright.stages.suture.evaluation.needle_figures import MEASURES as FIGURES
+from scenewright.stages.suture.evaluation.plots import COLORS
+from scenewright.stages.suture.needle.drawing import draw_eyes
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.world.render import render
+from scenewright.stages.suture.world.sampling import seen_scene
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.views import CASES, TWO_CAMERAS_NOISE, observe, run
 from benchmarks.reporting_seeds import Method, newest
-from stages.kit.drawing.plots import STYLE, plt, save
-from stages.suture.evaluation.judgement import Estimate
-from stages.suture.evaluation.needle_figures import MEASURES as FIGURES
-from stages.suture.evaluation.plots import COLORS
-from stages.suture.needle.drawing import draw_eyes
-from stages.suture.needle.estimate import estimate
-from stages.suture.world.render import render
-from stages.suture.world.sampling import seen_scene
 
 TUNING, REPORTING = range(500), newest("needles").seeds
 PICTURED = 4

@@ -12,21 +12,20 @@ import time
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.suture.evaluation.judgement import Estimate, judged
-from stages.suture.masks import spoiled_masks
-from stages.suture.motion_reports import motions_to_last, reported_motion
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.filter import fuse
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.needle.thesis import thesis_average, thesis_estimate
-from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, NeedlePose, StereoRig
-from stages.suture.world.corruption import noisy_disparity
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.sampling import seen_scene
-from stages.suture.world.scene import NeedleScene, moved_scene, random_motions
-from stages.suture.world.tubes import USUAL_NEEDLE, NeedleShape
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.suture.evaluation.judgement import Estimate, judged
+from scenewright.stages.suture.masks import spoiled_masks
+from scenewright.stages.suture.motion_reports import motions_to_last, reported_motion
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.filter import fuse
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from scenewright.stages.suture.needle.thesis import thesis_average, thesis_estimate
+from scenewright.stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, NeedlePose, StereoRig
+from scenewright.stages.suture.world.corruption import noisy_disparity
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.sampling import seen_scene
+from scenewright.stages.suture.world.scene import NeedleScene, moved_scene, random_motions
+from scenewright.stages.suture.world.tubes import USUAL_NEEDLE, NeedleShape
 
 CALIBRATION_ERROR = 0.15
 FRAMES = 10

@@ -15,24 +15,24 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
+from scenewright.stages.suture.evaluation.judgement import Estimate, judged
+from scenewright.stages.suture.masks import learned_masks
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.radius_fit import estimate_without_radius
+from scenewright.stages.suture.needle.thesis import thesis_estimate
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
+from scenewright.stages.suture.segmentation.infer import Masks, Segmenter
+from scenewright.stages.suture.world.render import Eye
+from scenewright.stages.suture.world.sampling import seen_scene
+from scenewright.stages.suture.world.scene import NeedleScene
+from scenewright.stages.suture.world.tubes import NEEDLE, THREAD
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.experiment import MEASURES as POSES
 from benchmarks.experiments.stitch_needle.views import CASES, observe
 from benchmarks.reporting_seeds import Method, newest
 from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
-from stages.suture.evaluation.judgement import Estimate, judged
-from stages.suture.masks import learned_masks
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.radius_fit import estimate_without_radius
-from stages.suture.needle.thesis import thesis_estimate
-from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
-from stages.suture.segmentation.checkpoint import BUNDLED
-from stages.suture.segmentation.infer import Masks, Segmenter
-from stages.suture.world.render import Eye
-from stages.suture.world.sampling import seen_scene
-from stages.suture.world.scene import NeedleScene
-from stages.suture.world.tubes import NEEDLE, THREAD
 
 NEEDLES = "needles"
 """Group of the reporting seeds."""

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.suture.rig import StereoRig
+from scenewright.stages.suture.thread.reconstruct import ThreadCurve
+from scenewright.stages.suture.world.scene import NeedleScene
 from scipy.spatial import cKDTree
-
-from stages.kit.geometry.transforms import apply
-from stages.suture.rig import StereoRig
-from stages.suture.thread.reconstruct import ThreadCurve
-from stages.suture.world.scene import NeedleScene
 
 FINE = 0.0001
 """The true curve is taken in steps of this [m]."""

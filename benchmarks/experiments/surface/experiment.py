@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 from pydantic import Field
+from scenewright.stages.fuse.integration import integrate
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.smoothing import smoothed_tsdf
+from scenewright.stages.fuse.surface import extract_surface
+from scenewright.stages.fuse.voxel_blocks import VoxelBlocks
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean, median, statistic
 from benchmarks.experiments.surface.measuring import Surfaced, judge, seen_level_points
 from benchmarks.experiments.surface.scenes import FARTHEST, Scene, board_at, camera_of, room_at
-from stages.fuse.integration import integrate
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.surface import extract_surface
-from stages.fuse.voxel_blocks import VoxelBlocks
-from stages.kit.stage import Parameters
 
 ANGLES, HEIGHTS = (5, 10, 15, 20, 30, 50, 90), (0.8, 1.2, 1.6)
 RECIPES = ("room", "kitchen", "office", "bedroom")

@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 import trimesh
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply, look_at
+from scenewright.stages.kit.rendering.depth_noise import disturb_depth
 
 from benchmarks.generated_rooms import make_library
 from benchmarks.steps import made
-from schemas.scene_parts import Camera
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply, look_at
-from stages.kit.rendering.depth_noise import disturb_depth
 
 FARTHEST = 4.0
 """Depth is used up to here [m]."""

@@ -12,16 +12,16 @@ from collections.abc import Callable, Iterator, Sequence
 
 import cv2
 from pydantic import Field
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.tableware.vision.detection import detect
+from scenewright.stages.tableware.vision.thesis_detection import detect_thesis
+from scenewright.stages.tableware.world.overhead import LEVELS, SCHEMES, Scheme, overhead_camera, render_overhead
+from scenewright.stages.tableware.world.scenes import TIERS, make_table
 
 from benchmarks.experiment import Bench, Experiment, Trial
 from benchmarks.experiments.tidy_detect.figures import MEASURES, doubts, more_figures
 from benchmarks.experiments.tidy_detect.looks import Look, Looks
 from benchmarks.experiments.tidy_detect.score import compare
-from stages.kit.stage import Parameters
-from stages.tableware.vision.detection import detect
-from stages.tableware.vision.thesis_detection import detect_thesis
-from stages.tableware.world.overhead import LEVELS, SCHEMES, Scheme, overhead_camera, render_overhead
-from stages.tableware.world.scenes import TIERS, make_table
 
 ARMS = {"ours": detect, "thesis": detect_thesis}
 TUNING, REPORTING = (*range(200), *range(1000, 1200)), range(1200, 1300)

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.stages.kit.measurement.bootstrap import pooled_interval
 
 from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Measure, Results
 from benchmarks.experiments.tidy_detect.looks import Looks
 from benchmarks.experiments.tidy_detect.score import Match, counts, measures, reliability
 from benchmarks.tabulation import Figure, markdown
-from stages.kit.measurement.bootstrap import pooled_interval
 
 ALL, OURS = "detect", "ours"
 

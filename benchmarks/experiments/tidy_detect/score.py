@@ -6,11 +6,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from scenewright.schemas.base import Model
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.world.items import STANDARD, UTENSILS, Table
 from scipy.optimize import linear_sum_assignment
-
-from schemas.base import Model
-from stages.tableware.vision.detections import Detection
-from stages.tableware.world.items import STANDARD, UTENSILS, Table
 
 NEAR = 0.020
 """A detection counts for an item of its kind no further away than this in the plane [m]."""

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
-
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.choice import declared_policy
-from stages.tableware.planning.joint import JointPolicy, plan, rules_in
-from stages.tableware.planning.optimum import Optimum
-from stages.tableware.planning.policy import Policy
-from stages.tableware.planning.time_model import (
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.choice import declared_policy
+from scenewright.stages.tableware.planning.joint import JointPolicy, plan, rules_in
+from scenewright.stages.tableware.planning.optimum import Optimum
+from scenewright.stages.tableware.planning.policy import Policy
+from scenewright.stages.tableware.planning.time_model import (
     EXACT,
     Chances,
     TimeModel,
@@ -22,14 +21,14 @@ from stages.tableware.planning.time_model import (
     with_spills,
     with_thesis_failures,
 )
-from stages.tableware.policies.pull import PullPolicy
-from stages.tableware.policies.random import RandomOne
-from stages.tableware.policies.random_piles import RandomPile
-from stages.tableware.policies.stack import StackPolicy
-from stages.tableware.simulation.fast import run_trial
-from stages.tableware.simulation.trial import Trial
-from stages.tableware.world.items import Table
-from stages.tableware.world.scenes import make_table
+from scenewright.stages.tableware.policies.pull import PullPolicy
+from scenewright.stages.tableware.policies.random import RandomOne
+from scenewright.stages.tableware.policies.random_piles import RandomPile
+from scenewright.stages.tableware.policies.stack import StackPolicy
+from scenewright.stages.tableware.simulation.fast import run_trial
+from scenewright.stages.tableware.simulation.trial import Trial
+from scenewright.stages.tableware.world.items import Table
+from scenewright.stages.tableware.world.scenes import make_table
 
 OURS = {name: declared_policy(name).rules for name in ("ours", "ours_without_loaded_pulls", "ours_bold")}
 SIMPLE = ("random", "random_piles", "stack", "pull")

@@ -7,14 +7,13 @@ import time
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import UsageError
-from schemas.language_map import LanguageMap
-from stages.kit.geometry.boxes import box_corners
-from stages.kit.open_words.encoder import checked_text
-from stages.kit.open_words.finding import Finder, Found
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.open_words.options import EncoderParameters
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.stages.kit.geometry.boxes import box_corners
+from scenewright.stages.kit.open_words.encoder import checked_text
+from scenewright.stages.kit.open_words.finding import Finder, Found
+from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.options import EncoderParameters
 
 LEAST = 0.5
 """Probability of an answer, as `splat query` takes it unless it is told otherwise."""

@@ -8,20 +8,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cli.edit_command import asked_edit
-from cli.viewing.desk.asking import Asking
-from cli.viewing.desk.forms import forms_of
-from cli.viewing.desk.subjects import subjects_of
-from cli.viewing.view import viewer_of
-from schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile
-from schemas.errors import BadInput, ScenewrightError, UsageError
-from schemas.language_map import LanguageMap
-from schemas.plain_text import cleaned
-from schemas.vocabulary import load_vocabulary
-from stages.edit.edits_file import UNWRITTEN, Changed, append_edits, read_edits, remove_edit, revision_of
-from stages.engine.reading import open_artifact, read_manifest
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.page.page_canvas import PageCanvas, ServedPage
+from scenewright.cli.edit_command import asked_edit
+from scenewright.cli.viewing.desk.asking import Asking
+from scenewright.cli.viewing.desk.forms import forms_of
+from scenewright.cli.viewing.desk.subjects import subjects_of
+from scenewright.cli.viewing.view import viewer_of
+from scenewright.schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile
+from scenewright.schemas.errors import BadInput, ScenewrightError, UsageError
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.schemas.plain_text import cleaned
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.edit.edits_file import UNWRITTEN, Changed, append_edits, read_edits, remove_edit, revision_of
+from scenewright.stages.engine.reading import open_artifact, read_manifest
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas, ServedPage
 
 SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("editing.js", "asking.js"))
 EMPTY = EditsFile(format="scenewright-edits", version=1)

@@ -12,9 +12,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import AfterValidator
 from pydantic.fields import FieldInfo
-
-from schemas import edits
-from schemas.hand_written import Point, UprightBox
+from scenewright.schemas import edits
+from scenewright.schemas.hand_written import Point, UprightBox
 
 OF_ALL = frozenset({*edits.Edit.model_fields, "what"})
 """Fields that every edit has: who, when and why are asked for once."""

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeVar
 
-from cli.viewing.inputs import input_artifact
-from schemas.artifact import Artifact
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.schemas.artifact import Artifact
 
 MOST_GENERATIONS = 20
 """Artifacts between one and what it was made from."""
@@ -43,6 +43,6 @@ def behind(artifact: Artifact, wanted: type[Kind]) -> Iterator[Kind]:
 
 
 def _input_of(artifact: Artifact, kind: str) -> Artifact | None:
-    from schemas.kinds import KINDS
+    from scenewright.schemas.kinds import KINDS
 
     return input_artifact(artifact, KINDS[kind]) if kind in KINDS else None

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from cli.viewing.desk.subject import Subject
-from cli.viewing.inputs import input_artifact
-from schemas.contact_graph import ContactGraph, GraphNode
-from schemas.edits import Anchor
-from schemas.panoptic_map import PanopticMap
-from stages.edit.anchoring import anchor_of_node, written_box
-from stages.edit.applying import Table
-from stages.edit.graph_edits import GRAPH_EDITS, GraphState
-from stages.edit.map_state import Thing
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.graphs import draw_graph_over
+from scenewright.cli.viewing.desk.subject import Subject
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.schemas.contact_graph import ContactGraph, GraphNode
+from scenewright.schemas.edits import Anchor
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.edit.anchoring import anchor_of_node, written_box
+from scenewright.stages.edit.applying import Table
+from scenewright.stages.edit.graph_edits import GRAPH_EDITS, GraphState
+from scenewright.stages.edit.map_state import Thing
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.graphs import draw_graph_over
 
 
 class GraphSubject(Subject[GraphState]):

@@ -6,15 +6,14 @@ from dataclasses import replace
 from functools import cached_property
 
 import trimesh
-
-from cli.viewing.desk.subject import Subject
-from schemas.edits import Anchor
-from schemas.panoptic_map import PanopticMap
-from stages.edit.anchoring import anchor_of
-from stages.edit.map_edits import MAP_EDITS
-from stages.edit.map_state import MapState, Thing, read_state
-from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.maps import ShownThing, draw_map
+from scenewright.cli.viewing.desk.subject import Subject
+from scenewright.schemas.edits import Anchor
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.edit.anchoring import anchor_of
+from scenewright.stages.edit.map_edits import MAP_EDITS
+from scenewright.stages.edit.map_state import MapState, Thing, read_state
+from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.maps import ShownThing, draw_map
 
 
 class MapSubject(Subject[MapState]):

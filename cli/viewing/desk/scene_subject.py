@@ -10,23 +10,23 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from cli.viewing.cad_scene_view import draw_cad_scene_of
-from cli.viewing.desk.generations import behind
-from cli.viewing.desk.graph_subject import GraphSubject
-from cli.viewing.inputs import input_artifact
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import GraphNode
-from schemas.errors import UsageError
-from schemas.panoptic_map import PanopticMap
-from stages.edit.anchoring import Conflict
-from stages.edit.applying import Table
-from stages.edit.map_state import Thing
-from stages.edit.scene_edits import SCENE_EDITS, asked_move, joint_anchors
-from stages.edit.scene_state import SceneState
-from stages.kit.formats.cad_models import read_model
-from stages.kit.measurement.cad_candidates import candidates_of
-from stages.kit.viewing.canvas import Canvas
+from scenewright.cli.viewing.cad_scene_view import draw_cad_scene_of
+from scenewright.cli.viewing.desk.generations import behind
+from scenewright.cli.viewing.desk.graph_subject import GraphSubject
+from scenewright.cli.viewing.inputs import input_artifact
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.edit.anchoring import Conflict
+from scenewright.stages.edit.applying import Table
+from scenewright.stages.edit.map_state import Thing
+from scenewright.stages.edit.scene_edits import SCENE_EDITS, asked_move, joint_anchors
+from scenewright.stages.edit.scene_state import SceneState
+from scenewright.stages.kit.formats.cad_models import read_model
+from scenewright.stages.kit.measurement.cad_candidates import candidates_of
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 
 class SceneSubject(GraphSubject):

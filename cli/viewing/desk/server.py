@@ -8,13 +8,12 @@ from collections.abc import Callable
 from typing import Any
 
 from pydantic import Field, ValidationError
-
-from cli.viewing.desk.desk import Desk, Stale
-from schemas.base import Model
-from schemas.edits import Text
-from schemas.errors import ScenewrightError
-from stages.edit.edits_file import Changed
-from stages.kit.services.receiving import BoundedHandler, BoundedServer
+from scenewright.cli.viewing.desk.desk import Desk, Stale
+from scenewright.schemas.base import Model
+from scenewright.schemas.edits import Text
+from scenewright.schemas.errors import ScenewrightError
+from scenewright.stages.edit.edits_file import Changed
+from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedServer
 
 HOST = "127.0.0.1"
 LARGEST_REQUEST = 200_000

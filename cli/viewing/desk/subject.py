@@ -7,15 +7,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
-from cli.edit_node_command import NO_MODEL, NOTHING
-from schemas.artifact import Artifact
-from schemas.edits import Anchor, AnyEdit, AppliedEdit, Edit
-from schemas.errors import UsageError
-from stages.edit.anchoring import Fitting
-from stages.edit.applying import State, Table, apply_edits
-from stages.edit.map_state import Thing
-from stages.edit.parameters import EditMapParameters
-from stages.kit.viewing.canvas import Canvas
+from scenewright.cli.edit_node_command import NO_MODEL, NOTHING
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.edits import Anchor, AnyEdit, AppliedEdit, Edit
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.edit.anchoring import Fitting
+from scenewright.stages.edit.applying import State, Table, apply_edits
+from scenewright.stages.edit.map_state import Thing
+from scenewright.stages.edit.parameters import EditMapParameters
+from scenewright.stages.kit.viewing.canvas import Canvas
 
 FITTING = Fitting(**EditMapParameters.model_validate({}).model_dump())
 """As the steps take it unless they are told otherwise."""

@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from cli.viewing.desk.generations import before_edits, behind
-from cli.viewing.desk.graph_subject import GraphSubject
-from cli.viewing.desk.map_subject import MapSubject
-from cli.viewing.desk.scene_subject import SceneSubject
-from cli.viewing.desk.subject import Subject
-from schemas.artifact import Artifact
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.edits import Edit
-from schemas.errors import BadInput
-from schemas.panoptic_map import PanopticMap
+from scenewright.cli.viewing.desk.generations import before_edits, behind
+from scenewright.cli.viewing.desk.graph_subject import GraphSubject
+from scenewright.cli.viewing.desk.map_subject import MapSubject
+from scenewright.cli.viewing.desk.scene_subject import SceneSubject
+from scenewright.cli.viewing.desk.subject import Subject
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.edits import Edit
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import PanopticMap
 
 SUBJECTS: tuple[tuple[type[Artifact], type[Subject[Any]]], ...] = (
     (CadScene, SceneSubject),

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from math import log2
 
 import numpy as np
-
-from stages.agent.obstacle_map import CELL, OCCUPIED, ObstacleMap
-from stages.agent.scene_map import quarter
-from stages.agent.senses import Base
+from scenewright.stages.agent.obstacle_map import CELL, OCCUPIED, ObstacleMap
+from scenewright.stages.agent.scene_map import quarter
+from scenewright.stages.agent.senses import Base
 
 WRONG = 0.1
 """**Assumed** rate of wrong votes of a region."""

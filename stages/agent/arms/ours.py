@@ -13,17 +13,16 @@ from itertools import chain
 from math import hypot
 
 import numpy as np
-
-from schemas.plan import Failure
-from stages.agent.arms.next_view import ahead_of, best_floor_view, fallen_where, floor_seen, worth
-from stages.agent.arms.skills import CommonSkills
-from stages.agent.arms.stations import APART, around, corners, drivable, other_sides
-from stages.agent.body import Body
-from stages.agent.exploration import explore
-from stages.agent.goals import CARRIERS
-from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
-from stages.agent.scene_map import Item, Region, classes_not_of, quarter
-from stages.agent.senses import Base, Detection, Position
+from scenewright.schemas.plan import Failure
+from scenewright.stages.agent.arms.next_view import ahead_of, best_floor_view, fallen_where, floor_seen, worth
+from scenewright.stages.agent.arms.skills import CommonSkills
+from scenewright.stages.agent.arms.stations import APART, around, corners, drivable, other_sides
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.exploration import explore
+from scenewright.stages.agent.goals import CARRIERS
+from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
+from scenewright.stages.agent.scene_map import Item, Region, classes_not_of, quarter
+from scenewright.stages.agent.senses import Base, Detection, Position
 
 SURE_OF_USE = 2
 """Regions of views by which a thing has to be ahead in being clean or used."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
-from stages.agent.arms.ours import Mechanisms, OwnSkills
-from stages.agent.arms.skills import CommonSkills
-from stages.agent.arms.thesis import ThesisSkills
-from stages.agent.body import Body
-from stages.agent.brains.rules import Style
+from scenewright.stages.agent.arms.ours import Mechanisms, OwnSkills
+from scenewright.stages.agent.arms.skills import CommonSkills
+from scenewright.stages.agent.arms.thesis import ThesisSkills
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.brains.rules import Style
 
 ALL = Mechanisms()
 

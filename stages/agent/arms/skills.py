@@ -7,14 +7,14 @@ from collections.abc import Callable
 from math import hypot
 from typing import Protocol
 
-from stages.agent.arms.stations import spots, spots_near, spots_on
-from stages.agent.body import Body
-from stages.agent.exploration import explore
-from stages.agent.goals import CARRIERS
-from stages.agent.language.program import PlanError
-from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject, Value
-from stages.agent.scene_map import Item, SceneMap
-from stages.agent.senses import Base, Position
+from scenewright.stages.agent.arms.stations import spots, spots_near, spots_on
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.exploration import explore
+from scenewright.stages.agent.goals import CARRIERS
+from scenewright.stages.agent.language.program import PlanError
+from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject, Value
+from scenewright.stages.agent.scene_map import Item, SceneMap
+from scenewright.stages.agent.senses import Base, Position
 
 
 class Skills(Protocol):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import atan2, ceil, cos, hypot, pi, sin
 
-from stages.agent.goals import NEAR_MIDDLE
-from stages.agent.scene_map import Item, SceneMap, quarter
-from stages.agent.senses import Base, Position, SeenFurniture
+from scenewright.stages.agent.goals import NEAR_MIDDLE
+from scenewright.stages.agent.scene_map import Item, SceneMap, quarter
+from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 
 APART = 0.35
 """Between neighbouring base poses along an edge [m]."""

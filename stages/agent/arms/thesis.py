@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from stages.agent.arms.skills import CommonSkills
-from stages.agent.arms.stations import around, drivable, middles
-from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
-from stages.agent.scene_map import Item, quarter
-from stages.agent.senses import Position
+from scenewright.stages.agent.arms.skills import CommonSkills
+from scenewright.stages.agent.arms.stations import around, drivable, middles
+from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
+from scenewright.stages.agent.scene_map import Item, quarter
+from scenewright.stages.agent.senses import Position
 
 SHORT = 0.1
 """Sides whose middle is this much farther from the target than the nearest are no "short distance" [m]."""

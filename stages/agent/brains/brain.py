@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from stages.agent.language.interpreter import Ran
+from scenewright.stages.agent.language.interpreter import Ran
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pydantic import Field
-
-from schemas.base import Model
-from stages.agent.brains.brain import Reply
-from stages.agent.brains.prompt import feedback_text, system_prompt, task_text
-from stages.agent.language.interpreter import Ran
-from stages.kit.language.chat import Chat
-from stages.kit.language.messages import Message, say
-from stages.kit.language.reply_schema import schema_of
+from scenewright.schemas.base import Model
+from scenewright.stages.agent.brains.brain import Reply
+from scenewright.stages.agent.brains.prompt import feedback_text, system_prompt, task_text
+from scenewright.stages.agent.language.interpreter import Ran
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.messages import Message, say
+from scenewright.stages.kit.language.reply_schema import schema_of
 
 SHOWN_TURNS = 30
 """Of the latest programs and what came of them, shown with every question."""

@@ -3,11 +3,11 @@ for exploring and driving. What an execution returns is not looked at."""
 
 from __future__ import annotations
 
-from stages.agent.brains.brain import Reply
-from stages.agent.brains.slips import Slips
-from stages.agent.brains.words import NotUnderstood, understood
-from stages.agent.goals import FURNITURE, Among, Description, Gather, Goal, Move, Shut
-from stages.agent.language.interpreter import Ran
+from scenewright.stages.agent.brains.brain import Reply
+from scenewright.stages.agent.brains.slips import Slips
+from scenewright.stages.agent.brains.words import NotUnderstood, understood
+from scenewright.stages.agent.goals import FURNITURE, Among, Description, Gather, Goal, Move, Shut
+from scenewright.stages.agent.language.interpreter import Ran
 
 WITH_DOORS = ("fridge", "dresser")
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from stages.agent.language.interpreter import Ran
-from stages.agent.language.tools import TOOLS
-from stages.agent.language.values import as_text
-from stages.kit.language.actions import quoted
+from scenewright.stages.agent.language.interpreter import Ran
+from scenewright.stages.agent.language.tools import TOOLS
+from scenewright.stages.agent.language.values import as_text
+from scenewright.stages.kit.language.actions import quoted
 
 ROLE = """You are the brain of a robot in a home that it has never seen. A user asks for something. You plan, call the
 robot's functions, read what comes back, and change the plan where it is called for."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 
-from stages.agent.brains.brain import Reply
-from stages.agent.brains.slips import Slips
-from stages.agent.brains.steps import Step, steps_to, steps_to_door
-from stages.agent.brains.words import NotUnderstood, understood
-from stages.agent.goals import CARRIERS, FURNITURE, Among, Description, Gather, Goal, Move, Shut
-from stages.agent.language.interpreter import Called, Ran
-from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
+from scenewright.stages.agent.brains.brain import Reply
+from scenewright.stages.agent.brains.slips import Slips
+from scenewright.stages.agent.brains.steps import Step, steps_to, steps_to_door
+from scenewright.stages.agent.brains.words import NotUnderstood, understood
+from scenewright.stages.agent.goals import CARRIERS, FURNITURE, Among, Description, Gather, Goal, Move, Shut
+from scenewright.stages.agent.language.interpreter import Called, Ran
+from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 
 MOST_FAILURES = 3
 """Of one step of one thing before it is left alone."""

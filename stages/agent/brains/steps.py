@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from stages.kit.tasks.strips import Domain, Problem, Schema, ground
-from stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.kit.tasks.strips import Domain, Problem, Schema, ground
+from scenewright.stages.kit.tasks.task_planner import plan_task
 
 IT, BEFORE, AFTER, NOWHERE = "it", "before", "after", "nowhere"
 """The thing, the spot where it is and the spot where it belongs; furniture before which nobody stands."""

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import re
 
-from stages.agent.goals import CATEGORIES, FURNITURE, THINGS, Among, Description, Gather, Goal, Move, Shut, kind
+from scenewright.stages.agent.goals import (
+    CATEGORIES,
+    FURNITURE,
+    THINGS,
+    Among,
+    Description,
+    Gather,
+    Goal,
+    Move,
+    Shut,
+    kind,
+)
 
 LONGEST = 2_000
 """Characters of a task."""

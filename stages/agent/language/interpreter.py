@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
-from schemas.plan import Failure
-from stages.agent.language.program import PlanError, Program
-from stages.agent.language.tools import BY_NAME, sort_of
-from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject, Value, as_text, truth
-from stages.kit.language.actions import quoted
+from scenewright.schemas.plan import Failure
+from scenewright.stages.agent.language.program import PlanError, Program
+from scenewright.stages.agent.language.tools import BY_NAME, sort_of
+from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject, Value, as_text, truth
+from scenewright.stages.kit.language.actions import quoted
 
 MOST_STEPS, MOST_ROUNDS, MOST_CALLS = 2_000, 50, 100
 """Statements, rounds of one loop and calls of tools in one program."""

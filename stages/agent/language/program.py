@@ -6,7 +6,7 @@ import ast
 import re
 from dataclasses import dataclass
 
-from schemas.plan import Failure
+from scenewright.schemas.plan import Failure
 
 LONGEST, MOST_NODES, DEEPEST = 20_000, 2_000, 30
 """Characters, nodes and nesting of one program."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.agent.language.values import Outcome, SceneObject
+from scenewright.stages.agent.language.values import Outcome, SceneObject
 
 THING, TEXT = "object", "text"
 

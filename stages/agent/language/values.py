@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from stages.kit.language.actions import quoted
+from scenewright.stages.kit.language.actions import quoted
 
 
 @dataclass(frozen=True)

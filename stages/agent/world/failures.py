@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from stages.kit.rendering.segmenter_errors import GRASPS, SegmenterRates
+from scenewright.stages.kit.rendering.segmenter_errors import GRASPS, SegmenterRates
 
 EXECUTIONS = 262
 PLACES = 140 / 2 + 122 / 4

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
-
-from schemas.apartment import Apartment, Furniture, Thing
-from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.senses import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep
-from stages.agent.world.events import Event, EventLog
-from stages.agent.world.failures import Rates
-from stages.agent.world.floor import Floor
-from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors
+from scenewright.schemas.apartment import Apartment, Furniture, Thing
+from scenewright.stages.agent.obstacle_map import ObstacleMap
+from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep
+from scenewright.stages.agent.world.events import Event, EventLog
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.floor import Floor
+from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors
 
 REACH, HIGHEST = 1.3, 1.4
 """Of the arm from the middle of the base over the ground, and the highest place [m]."""

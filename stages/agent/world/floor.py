@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-
-from schemas.apartment import Apartment
-from stages.agent.obstacle_map import CELL, cell_of
-from stages.agent.senses import Base
+from scenewright.schemas.apartment import Apartment
+from scenewright.stages.agent.obstacle_map import CELL, cell_of
+from scenewright.stages.agent.senses import Base
 
 RANGE, RAYS = 5.0, 360
 """Of the head camera [m], and rays of one turn."""

@@ -7,11 +7,10 @@ from math import hypot, pi
 from pathlib import Path
 
 import numpy as np
-
-from schemas.apartment import Apartment, Door, Furniture, Room, Thing
-from schemas.base import Model
-from schemas.errors import UsageError
-from schemas.outside import file_toml
+from scenewright.schemas.apartment import Apartment, Door, Furniture, Room, Thing
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.outside import file_toml
 
 RECIPE = Path(__file__).resolve().parents[3] / "data" / "agent" / "apartment.toml"
 TRIES = 60

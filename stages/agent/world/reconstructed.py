@@ -10,16 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.schemas.apartment import LARGEST_SIDE, Apartment, Furniture, Room, Thing
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.stages.agent.obstacle_map import CELL
+from scenewright.stages.agent.scene_map import Mapped
+from scenewright.stages.agent.senses import Detection, SeenFurniture, Sweep
+from scenewright.stages.agent.world.floor import Floor
+from scenewright.stages.kit.geometry.transforms import transform_from_quaternion
 from scipy.ndimage import distance_transform_edt
-
-from schemas.apartment import LARGEST_SIDE, Apartment, Furniture, Room, Thing
-from schemas.errors import BadInput
-from schemas.interactive_scene import SceneBody
-from stages.agent.obstacle_map import CELL
-from stages.agent.scene_map import Mapped
-from stages.agent.senses import Detection, SeenFurniture, Sweep
-from stages.agent.world.floor import Floor
-from stages.kit.geometry.transforms import transform_from_quaternion
 
 SHELL = ("floor", "wall", "ceiling")
 LEAST = 0.1

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
-
-from schemas.apartment import Apartment, Furniture, Thing
-from stages.agent.body import Body
-from stages.agent.world.events import Event
+from scenewright.schemas.apartment import Apartment, Furniture, Thing
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.world.events import Event
 
 
 class Lying(Protocol):

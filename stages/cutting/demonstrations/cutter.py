@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.cutting.demonstrations.recipes import Category, Recipe, Split
-from stages.cutting.world.body import Body, Plane
-from stages.cutting.world.canonical import canonical
-from stages.cutting.world.knife import Knife, Refused, cut
+from scenewright.stages.cutting.demonstrations.recipes import Category, Recipe, Split
+from scenewright.stages.cutting.world.body import Body, Plane
+from scenewright.stages.cutting.world.canonical import canonical
+from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 
 ATTEMPTS = 8
 """To place a plane that the knife cuts."""

@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.cutting_demonstrations import CuttingDemonstrations, CuttingPlane, DemonstratedCut, DemonstrationRecord
-from schemas.errors import BadInput
-from stages.cutting.bodies_file import read_bodies
-from stages.cutting.demonstrations.cutter import Demonstration
-from stages.cutting.world.body import Body, Plane
-from stages.cutting.world.knife import Knife, Refused, cut
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cutting_demonstrations import (
+    CuttingDemonstrations,
+    CuttingPlane,
+    DemonstratedCut,
+    DemonstrationRecord,
+)
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.bodies_file import read_bodies
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration
+from scenewright.stages.cutting.world.body import Body, Plane
+from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 
 
 def plane_record(plane: Plane) -> CuttingPlane:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from stages.cutting.demonstrations.cutter import Demonstration, Scatter, follow
-from stages.cutting.demonstrations.recipes import CELLS, TRAINING_SHARE, recipes_of
-from stages.cutting.world.foods import FAMILIES, make_food
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration, Scatter, follow
+from scenewright.stages.cutting.demonstrations.recipes import CELLS, TRAINING_SHARE, recipes_of
+from scenewright.stages.cutting.world.foods import FAMILIES, make_food
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 SPACING = 0.3
 """Between objects on the board [m]."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.stages.cutting.world.canonical import Canonical
+from scenewright.stages.cutting.world.voxels import Grid
 from scipy.optimize import linear_sum_assignment
-
-from stages.cutting.world.canonical import Canonical
-from stages.cutting.world.voxels import Grid
 
 VOXELS = 48
 """Along the longest edge of the two fragments."""

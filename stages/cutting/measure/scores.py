@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.cutting.measure.overlap import best_pairs, overlaps
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.canonical import Canonical, canonical
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import pdist
-
-from stages.cutting.measure.overlap import best_pairs, overlaps
-from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import Canonical, canonical
 
 DISTANCE_VOXELS = 10
 """Along the longest edge: points between which distances are taken."""

@@ -6,11 +6,18 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
-
-from stages.cutting.ours.cells import Cloud, Tree, cells
-from stages.cutting.ours.grammar import Grammar
-from stages.cutting.ours.items import Item, features, likeness
-from stages.cutting.ours.structures import MOST_BITS, best_trees, groupings, match, misfits, proposals, rule_bits
+from scenewright.stages.cutting.ours.cells import Cloud, Tree, cells
+from scenewright.stages.cutting.ours.grammar import Grammar
+from scenewright.stages.cutting.ours.items import Item, features, likeness
+from scenewright.stages.cutting.ours.structures import (
+    MOST_BITS,
+    best_trees,
+    groupings,
+    match,
+    misfits,
+    proposals,
+    rule_bits,
+)
 
 MOST_PIECES = 4
 """Beyond these, pieces are filled one by one."""

@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numba
 import numpy as np
-
-from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import box_edges, canonical
-from stages.cutting.world.voxels import Grid, occupancy
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.canonical import box_edges, canonical
+from scenewright.stages.cutting.world.voxels import Grid, occupancy
 
 LATTICE = 18
 """Points along every edge of the box around a piece."""

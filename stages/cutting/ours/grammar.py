@@ -14,12 +14,11 @@ from functools import cached_property
 
 import numba
 import numpy as np
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration
+from scenewright.stages.cutting.demonstrations.recipes import CATEGORIES
+from scenewright.stages.cutting.ours.items import features, item_of
+from scenewright.stages.cutting.world.canonical import axis_across
 from scipy.cluster.vq import kmeans2
-
-from stages.cutting.demonstrations.cutter import Demonstration
-from stages.cutting.demonstrations.recipes import CATEGORIES
-from stages.cutting.ours.items import features, item_of
-from stages.cutting.world.canonical import axis_across
 
 MOST_TYPES = 12
 LEAST_DEVIATION = 0.05

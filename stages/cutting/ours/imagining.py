@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from schemas.cutting_demonstrations import CategoryName
-from schemas.errors import BadInput
-from stages.cutting.demonstrations.recipes import CATEGORIES, LONG
-from stages.cutting.ours.cells import Cloud, Split, Tree, cells, cloud_of
-from stages.cutting.ours.grammar import Grammar
-from stages.cutting.ours.items import Item
-from stages.cutting.ours.structures import factors, nested
-from stages.cutting.world.body import Body
+from scenewright.schemas.cutting_demonstrations import CategoryName
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.demonstrations.recipes import CATEGORIES, LONG
+from scenewright.stages.cutting.ours.cells import Cloud, Split, Tree, cells, cloud_of
+from scenewright.stages.cutting.ours.grammar import Grammar
+from scenewright.stages.cutting.ours.items import Item
+from scenewright.stages.cutting.ours.structures import factors, nested
+from scenewright.stages.cutting.world.body import Body
 
 Words = Sequence[tuple[int, CategoryName]]
 

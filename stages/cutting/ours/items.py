@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import box_edges
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.canonical import box_edges
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.plan import Failure
-from stages.cutting.ours.allocation import allocate
-from stages.cutting.ours.cells import Cloud, Split, cloud_of, leaves
-from stages.cutting.ours.grammar import Grammar
-from stages.cutting.ours.items import Item
-from stages.cutting.ours.structures import Foreseen, best_trees
-from stages.cutting.policy import Action, Stop
-from stages.cutting.world.body import Body, Plane
-from stages.cutting.world.knife import Knife, face_edges
+from scenewright.schemas.plan import Failure
+from scenewright.stages.cutting.ours.allocation import allocate
+from scenewright.stages.cutting.ours.cells import Cloud, Split, cloud_of, leaves
+from scenewright.stages.cutting.ours.grammar import Grammar
+from scenewright.stages.cutting.ours.items import Item
+from scenewright.stages.cutting.ours.structures import Foreseen, best_trees
+from scenewright.stages.cutting.policy import Action, Stop
+from scenewright.stages.cutting.world.body import Body, Plane
+from scenewright.stages.cutting.world.knife import Knife, face_edges
 
 DOUBT = 0.02
 """Of what is there that a goal may ask for beyond it, or leave over without that being a fragment of its own."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.cutting_model import CuttingGrammar, CuttingRule, FragmentType
-from stages.cutting.ours.grammar import Grammar, Rule
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cutting_model import CuttingGrammar, CuttingRule, FragmentType
+from scenewright.stages.cutting.ours.grammar import Grammar, Rule
 
 
 def grammar_record(grammar: Grammar) -> CuttingGrammar:

@@ -8,13 +8,12 @@ from functools import lru_cache
 from itertools import permutations
 
 import numpy as np
+from scenewright.stages.cutting.ours.cells import Cloud, Split, Tree, cells
+from scenewright.stages.cutting.ours.grammar import Grammar
+from scenewright.stages.cutting.ours.items import Item, features, likeness
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import pdist
-
-from stages.cutting.ours.cells import Cloud, Split, Tree, cells
-from stages.cutting.ours.grammar import Grammar
-from stages.cutting.ours.items import Item, features, likeness
 
 BEAM, FINALISTS = 4, 5
 """Trees of a group that are judged on a few points, and of these on all points, with planes by volume."""

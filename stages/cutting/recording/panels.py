@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from schemas.scene_parts import Camera
-from stages.cutting.pictures import bounds_of, colored
-from stages.cutting.world.body import Body, Plane
-from stages.kit.geometry.transforms import look_at
-from stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.cutting.pictures import bounds_of, colored
+from scenewright.stages.cutting.world.body import Body, Plane
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 WIDTH, HEIGHT = 480, 360
 """Of one picture [px]."""

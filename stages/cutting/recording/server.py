@@ -14,12 +14,11 @@ from typing import Literal
 import numpy as np
 from PIL import Image
 from pydantic import ValidationError
-
-from schemas.base import Model
-from schemas.cutting_demonstrations import CategoryName
-from stages.cutting.recording.panels import NoCut
-from stages.cutting.recording.session import Session
-from stages.kit.services.receiving import BoundedHandler, BoundedServer
+from scenewright.schemas.base import Model
+from scenewright.schemas.cutting_demonstrations import CategoryName
+from scenewright.stages.cutting.recording.panels import NoCut
+from scenewright.stages.cutting.recording.session import Session
+from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedServer
 
 HOST = "127.0.0.1"
 PAGE = Path(__file__).with_name("page.html")

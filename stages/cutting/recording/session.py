@@ -7,16 +7,15 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-
-from schemas.cutting_demonstrations import CategoryName, CuttingRecording, RecordedTrial
-from schemas.errors import BadInput
-from stages.cutting.demonstrations.cutter import Demonstration
-from stages.cutting.demonstrations.records import record_of, replay
-from stages.cutting.recording.panels import NoCut, Panels, panels
-from stages.cutting.world.body import Body
-from stages.cutting.world.foods import FAMILIES, make_food
-from stages.cutting.world.knife import Knife, Refused, cut
-from stages.kit.geometry.transforms import transform_from
+from scenewright.schemas.cutting_demonstrations import CategoryName, CuttingRecording, RecordedTrial
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration
+from scenewright.stages.cutting.demonstrations.records import record_of, replay
+from scenewright.stages.cutting.recording.panels import NoCut, Panels, panels
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.foods import FAMILIES, make_food
+from scenewright.stages.cutting.world.knife import Knife, Refused, cut
+from scenewright.stages.kit.geometry.transforms import transform_from
 
 GAP = 0.008
 """By which what was cut is pushed apart [m]."""

@@ -8,14 +8,13 @@ from typing import Literal
 
 import numpy as np
 import torch
-
-from schemas.plan import Failure
-from stages.cutting.corpus import Choice, Corpus, plane_out
-from stages.cutting.learning import MixtureOfPlanes, fit, layers, seeded
-from stages.cutting.policy import Action, Goal, Stop
-from stages.cutting.thesis.encoder import Features
-from stages.cutting.thesis.model import FEATURES
-from stages.cutting.world.body import Body
+from scenewright.schemas.plan import Failure
+from scenewright.stages.cutting.corpus import Choice, Corpus, plane_out
+from scenewright.stages.cutting.learning import MixtureOfPlanes, fit, layers, seeded
+from scenewright.stages.cutting.policy import Action, Goal, Stop
+from scenewright.stages.cutting.thesis.encoder import Features
+from scenewright.stages.cutting.thesis.model import FEATURES
+from scenewright.stages.cutting.world.body import Body
 
 EMBEDDING = 32
 DISCOUNT, MARGIN = 0.95, 0.2

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from stages.cutting.board import LIFT, Board
-from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import canonical
-from stages.kit.geometry.transforms import transform_from
+from scenewright.stages.cutting.board import LIFT, Board
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.canonical import canonical
+from scenewright.stages.kit.geometry.transforms import transform_from
 
 BETWEEN = 0.05
 """Gap between pieces that are laid down beside each other [m]."""

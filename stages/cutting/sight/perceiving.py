@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scenewright.schemas.plan import Failure
+from scenewright.stages.cutting.ours.grammar import Grammar
+from scenewright.stages.cutting.ours.items import Item
+from scenewright.stages.cutting.ours.policy import OursPolicy
+from scenewright.stages.cutting.policy import Action, Stop
+from scenewright.stages.cutting.sight.laying import BETWEEN
+from scenewright.stages.cutting.sight.seeing import DOUBT, see
+from scenewright.stages.cutting.sight.views import look
+from scenewright.stages.cutting.world.body import Body
 from scipy.optimize import linear_sum_assignment
-
-from schemas.plan import Failure
-from stages.cutting.ours.grammar import Grammar
-from stages.cutting.ours.items import Item
-from stages.cutting.ours.policy import OursPolicy
-from stages.cutting.policy import Action, Stop
-from stages.cutting.sight.laying import BETWEEN
-from stages.cutting.sight.seeing import DOUBT, see
-from stages.cutting.sight.views import look
-from stages.cutting.world.body import Body
 
 
 class PerceivingPolicy:

@@ -14,17 +14,16 @@ import cv2
 import numpy as np
 import trimesh
 from PIL import Image
-
-from schemas.base import Model, Transform, as_transform
-from schemas.errors import BadInput
-from schemas.outside import LARGEST_SHOWN, file_content
-from schemas.scene_parts import Camera
-from stages.cutting.pictures import colored
-from stages.cutting.sight.views import View
-from stages.cutting.world.body import Body
-from stages.kit.formats.image_headers import may_be_decoded
-from stages.kit.geometry.transforms import is_rigid
-from stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.schemas.base import Model, Transform, as_transform
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import LARGEST_SHOWN, file_content
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.cutting.pictures import colored
+from scenewright.stages.cutting.sight.views import View
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.formats.image_headers import may_be_decoded
+from scenewright.stages.kit.geometry.transforms import is_rigid
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 HINT = "a folder of color.png, depth.png and camera.json, or of such folders (docs/CUTTING.md)"
 MILLIMETRE = 0.001

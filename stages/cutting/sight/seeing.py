@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.stages.cutting.sight.surface import zero_surface
+from scenewright.stages.cutting.sight.views import View
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.geometry.cameras import back_project, project
+from scenewright.stages.kit.geometry.point_clouds import clusters
+from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scipy.ndimage import gaussian_filter, grey_dilation, label
-
-from stages.cutting.sight.surface import zero_surface
-from stages.cutting.sight.views import View
-from stages.cutting.world.body import Body
-from stages.kit.geometry.cameras import back_project, project
-from stages.kit.geometry.point_clouds import clusters
-from stages.kit.geometry.transforms import apply, inverse
 
 ABOVE = 0.003
 """Height over the board from which points belong to what lies there [m]: the noise of the board is below."""

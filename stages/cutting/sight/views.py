@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import open3d as o3d
-
-from schemas.scene_parts import Camera
-from stages.cutting.world.body import Body
-from stages.kit.geometry.cameras import project
-from stages.kit.geometry.ray_scenes import triangles_of
-from stages.kit.geometry.transforms import apply, inverse, look_at
-from stages.kit.rendering.depth_noise import disturb_depth
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.kit.geometry.cameras import project
+from scenewright.stages.kit.geometry.ray_scenes import triangles_of
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
+from scenewright.stages.kit.rendering.depth_noise import disturb_depth
 
 WIDTH, HEIGHT, FOCAL = 1280, 720, 900.0
 """Of the sensors [px]."""

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
-
-from stages.cutting.corpus import queries, sampled
-from stages.cutting.learning import fit, layers, seeded
-from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import Canonical, canonical
+from scenewright.stages.cutting.corpus import queries, sampled
+from scenewright.stages.cutting.learning import fit, layers, seeded
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.canonical import Canonical, canonical
 
 CODE = 16
 STEPS, BATCH = 800, 24

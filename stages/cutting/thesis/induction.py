@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.cutting.corpus import Corpus
 from scipy.cluster.vq import kmeans2
-
-from stages.cutting.corpus import Corpus
 
 MOST_TYPES = 9
 GAMMA = 0.28

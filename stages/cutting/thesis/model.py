@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-
-from stages.cutting.corpus import Corpus, corpus_of
-from stages.cutting.demonstrations.cutter import Demonstration
-from stages.cutting.learning import MixtureOfPlanes, fit, layers, seeded
-from stages.cutting.thesis.encoder import CODE, Features, train_encoder
-from stages.cutting.thesis.induction import Grammar, induce, production_of
+from scenewright.stages.cutting.corpus import Corpus, corpus_of
+from scenewright.stages.cutting.demonstrations.cutter import Demonstration
+from scenewright.stages.cutting.learning import MixtureOfPlanes, fit, layers, seeded
+from scenewright.stages.cutting.thesis.encoder import CODE, Features, train_encoder
+from scenewright.stages.cutting.thesis.induction import Grammar, induce, production_of
 
 FEATURES = CODE + 1
 

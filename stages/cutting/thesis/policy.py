@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-
-from schemas.plan import Failure
-from stages.cutting.corpus import plane_out
-from stages.cutting.policy import Action, Goal, Stop
-from stages.cutting.thesis.model import ThesisModel
-from stages.cutting.thesis.search import Search
-from stages.cutting.world.body import Body
+from scenewright.schemas.plan import Failure
+from scenewright.stages.cutting.corpus import plane_out
+from scenewright.stages.cutting.policy import Action, Goal, Stop
+from scenewright.stages.cutting.thesis.model import ThesisModel
+from scenewright.stages.cutting.thesis.search import Search
+from scenewright.stages.cutting.world.body import Body
 
 
 class ThesisPolicy:

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from scenewright.stages.cutting.thesis.induction import Grammar
 from scipy.optimize import linear_sum_assignment
-
-from stages.cutting.thesis.induction import Grammar
 
 ROUNDS = 160
 """Rollouts a decision; the thesis does not say."""

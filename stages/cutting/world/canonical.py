@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.cutting.world.body import Body
-from stages.cutting.world.voxels import Grid, occupancy
-from stages.kit.geometry.transforms import apply, inverse, transform_from
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.voxels import Grid, occupancy
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
 
 OCTANT_VOXELS = 24
 """Along the longest edge, to tell which octant holds most."""

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.body import Body
 
 RINGS, POINTS = 22, 28
 """Rings along the spine, points around it: 1,232 triangles."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.plan import Failure
-from stages.cutting.world.body import Body, Plane
+from scenewright.schemas.plan import Failure
+from scenewright.stages.cutting.world.body import Body, Plane
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,11 @@ from typing import Literal
 
 import numpy as np
 import trimesh
-
-from schemas.errors import BadInput
-from stages.cutting.world.body import Body, unite
-from stages.cutting.world.canonical import canonical
-from stages.cutting.world.voxels import Grid, occupancy
-from stages.kit.formats.mesh_files import read_mesh
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.world.body import Body, unite
+from scenewright.stages.cutting.world.canonical import canonical
+from scenewright.stages.cutting.world.voxels import Grid, occupancy
+from scenewright.stages.kit.formats.mesh_files import read_mesh
 
 LONGEST, SHORTEST = 1.0, 0.004
 """Edge of what lies on a board [m]."""

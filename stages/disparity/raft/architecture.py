@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 OTHER_FILE = "give one of the authors' raftstereo-*.pth, or the .safetensors that scenewright made of it"
 Shapes = Mapping[str, tuple[int, ...]]

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-from schemas.errors import BadInput
-from stages.disparity.raft.architecture import OTHER_FILE, architecture_of
-from stages.disparity.raft.network import RaftStereo
-from stages.kit.formats.network_file import put_tensors, write_network
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.disparity.raft.architecture import OTHER_FILE, architecture_of
+from scenewright.stages.disparity.raft.network import RaftStereo
+from scenewright.stages.kit.formats.network_file import put_tensors, write_network
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 
 FORMAT = "RAFT-Stereo checkpoint"
 PREFIX = "module."

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import torch
+from scenewright.stages.disparity.raft.architecture import Architecture
 from torch import nn
-
-from stages.disparity.raft.architecture import Architecture
 
 
 def normalisation(channels: int, batch: bool) -> nn.Module:

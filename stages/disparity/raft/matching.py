@@ -8,14 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-
-from stages.disparity.consistency import confidence_of, left_right_difference
-from stages.disparity.raft.architecture import SMALL
-from stages.disparity.raft.checkpoint import load_network
-from stages.disparity.raft.network import RaftStereo
-from stages.disparity.search_range import usual_range
-from stages.disparity.semi_global import gray_of, mirrored
-from stages.kit.stereo.disparity_map import DisparityMap
+from scenewright.stages.disparity.consistency import confidence_of, left_right_difference
+from scenewright.stages.disparity.raft.architecture import SMALL
+from scenewright.stages.disparity.raft.checkpoint import load_network
+from scenewright.stages.disparity.raft.network import RaftStereo
+from scenewright.stages.disparity.search_range import usual_range
+from scenewright.stages.disparity.semi_global import gray_of, mirrored
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
 UPDATES, SMALL_UPDATES = 32, 5
 """Updates of the disparity by default: of the authors' networks, and of the small one, which is trained with four."""

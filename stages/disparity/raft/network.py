@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import torch
+from scenewright.stages.disparity.raft.architecture import Architecture
+from scenewright.stages.disparity.raft.correlation import RowCorrelation
+from scenewright.stages.disparity.raft.encoders import ContextEncoder, FeatureEncoder, Residual
+from scenewright.stages.disparity.raft.update import UpdateBlock
 from torch import nn
 from torch.nn import functional
-
-from stages.disparity.raft.architecture import Architecture
-from stages.disparity.raft.correlation import RowCorrelation
-from stages.disparity.raft.encoders import ContextEncoder, FeatureEncoder, Residual
-from stages.disparity.raft.update import UpdateBlock
 
 DIVISOR = 32
 """Pictures are padded to multiples of this [px]."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import torch
+from scenewright.stages.disparity.raft.architecture import Architecture
 from torch import nn
 from torch.nn import functional
-
-from stages.disparity.raft.architecture import Architecture
 
 
 class RecurrentUnit(nn.Module):

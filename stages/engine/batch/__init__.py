@@ -4,7 +4,7 @@
 executor, `scene_run` runs one, `results` keeps what came of it, `summary` says it to people; `session` ties them.
 """
 
-from stages.engine.batch.expansion import Batch, read_batch
-from stages.engine.batch.outcomes import worst_exit_code
+from scenewright.stages.engine.batch.expansion import Batch, read_batch
+from scenewright.stages.engine.batch.outcomes import worst_exit_code
 
 __all__ = ["Batch", "read_batch", "worst_exit_code"]

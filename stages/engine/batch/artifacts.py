@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.evaluation import Evaluation, MetricsFile
-from schemas.manifest import Manifest
-from stages.engine.reading import check_sizes, read_manifest
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.evaluation import Evaluation, MetricsFile
+from scenewright.schemas.manifest import Manifest
+from scenewright.stages.engine.reading import check_sizes, read_manifest
 
 
 def manifests(folder: Path, steps: Sequence[str]) -> dict[str, Manifest]:

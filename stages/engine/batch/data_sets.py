@@ -6,10 +6,10 @@ import glob
 import os
 from pathlib import Path, PurePath
 
-from schemas.errors import UsageError
-from schemas.outside import file_text
-from stages.engine.batch.names import distinct, matched_part, names_from_paths
-from stages.engine.batch.spec import DataSpec
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.outside import file_text
+from scenewright.stages.engine.batch.names import distinct, matched_part, names_from_paths
+from scenewright.stages.engine.batch.spec import DataSpec
 
 LARGEST_LIST = 64 * 2**20
 """Bytes of a list of paths."""

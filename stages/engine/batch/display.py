@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from stages.engine.batch.job import Job
-from stages.engine.batch.outcomes import is_explained
-from stages.engine.batch.quantities import format_bytes, format_seconds
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scene_log import LOG_NAME, LogFollower
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.outcomes import is_explained
+from scenewright.stages.engine.batch.quantities import format_bytes, format_seconds
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower
 
 REFRESH = 0.5
 """Between two drawings of the table [s]."""

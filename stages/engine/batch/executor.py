@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
 
 
 class Executor(Protocol):

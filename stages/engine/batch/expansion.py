@@ -11,13 +11,19 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
-from schemas.errors import UsageError
-from stages.engine.batch.data_sets import find_scenes
-from stages.engine.batch.fingerprints import absolute_inputs, file_state, fingerprint, input_variables, pipeline_facts
-from stages.engine.batch.job import Job
-from stages.engine.batch.names import is_folder_name
-from stages.engine.batch.spec import BatchSpec, ParameterSet, read_spec
-from stages.engine.pipelines import Pipeline, pipeline_path, read_pipeline, resolve_variables
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.engine.batch.data_sets import find_scenes
+from scenewright.stages.engine.batch.fingerprints import (
+    absolute_inputs,
+    file_state,
+    fingerprint,
+    input_variables,
+    pipeline_facts,
+)
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.names import is_folder_name
+from scenewright.stages.engine.batch.spec import BatchSpec, ParameterSet, read_spec
+from scenewright.stages.engine.pipelines import Pipeline, pipeline_path, read_pipeline, resolve_variables
 
 
 @dataclass(frozen=True)
@@ -178,7 +184,17 @@ def scene_command(batch: Batch, run: PlannedRun, folder: Path, *, force: bool) -
     """Return the command line that runs a scene: what a person would type for this scene alone."""
     settings = [word for name, value in sorted(run.settings.items()) for word in ("--set", f"{name}={value}")]
     accepted = [word for outcome in batch.spec.accept for word in ("--accept", outcome)]
-    words = [sys.executable, "-m", "cli", "run", str(batch.pipeline_file), "--out", str(folder), *settings, *accepted]
+    words = [
+        sys.executable,
+        "-m",
+        "scenewright",
+        "run",
+        str(batch.pipeline_file),
+        "--out",
+        str(folder),
+        *settings,
+        *accepted,
+    ]
     return (*words, *(("--force",) if force else ()))
 
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from schemas.base import canonical_json
-from stages.engine.discovery import stage_by_name
-from stages.engine.pipelines import Pipeline
-from stages.kit.digests import sha256_of_text
-from stages.kit.library_versions import library_version
+from scenewright.schemas.base import canonical_json
+from scenewright.stages.engine.discovery import stage_by_name
+from scenewright.stages.engine.pipelines import Pipeline
+from scenewright.stages.kit.digests import sha256_of_text
+from scenewright.stages.kit.library_versions import library_version
 
 State = tuple[int, int, int]
 

@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from schemas.errors import MachineFailure
+from scenewright.schemas.errors import MachineFailure
 
 LOCK_NAME = ".batch.lock"
 

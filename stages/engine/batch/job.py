@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.base import Count, Model, Seed
+from scenewright.schemas.base import Count, Model, Seed
 
 
 class Job(Model):

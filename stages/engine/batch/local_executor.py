@@ -8,10 +8,10 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scene_run import run_scene
-from stages.engine.batch.warm import WarmScenes
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scene_run import run_scene
+from scenewright.stages.engine.batch.warm import WarmScenes
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",

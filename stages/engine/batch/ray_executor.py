@@ -13,16 +13,16 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from schemas.errors import MachineFailure, MissingDependency, UsageError
-from stages.engine.batch.job import Job
-from stages.engine.batch.local_executor import thread_environment
-from stages.engine.batch.outcomes import MACHINE_FAILED
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scene_log import clean
-from stages.engine.batch.scene_run import run_scene, this_host
-from stages.engine.batch.spec import RayOptions
-from stages.engine.batch.warm import WarmScenes
-from stages.engine.chain import REPOSITORY
+from scenewright.schemas.errors import MachineFailure, MissingDependency, UsageError
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.local_executor import thread_environment
+from scenewright.stages.engine.batch.outcomes import MACHINE_FAILED
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scene_log import clean
+from scenewright.stages.engine.batch.scene_run import run_scene, this_host
+from scenewright.stages.engine.batch.spec import RayOptions
+from scenewright.stages.engine.batch.warm import WarmScenes
+from scenewright.stages.engine.chain import REPOSITORY
 
 CANCEL_PATIENCE = 5.0
 """Added to the grace of the scenes when the cluster is asked to stop them [s]."""

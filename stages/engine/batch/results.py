@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError
-
-from schemas.base import Count, Model, Seed, canonical_json
-from schemas.errors import BadInput, MachineFailure, first_problem
-from schemas.outside import file_content
-from stages.engine.batch.outcomes import Outcome
+from scenewright.schemas.base import Count, Model, Seed, canonical_json
+from scenewright.schemas.errors import BadInput, MachineFailure, first_problem
+from scenewright.schemas.outside import file_content
+from scenewright.stages.engine.batch.outcomes import Outcome
 
 RESULTS_NAME = "results.jsonl"
 LARGEST_RESULTS = 2**30

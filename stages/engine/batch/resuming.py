@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
-from stages.engine.batch.artifacts import is_still_there
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.storage import stored_digest
+from scenewright.stages.engine.batch.artifacts import is_still_there
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.storage import stored_digest
 
 Retry = Literal["failed", "none", "all"]
 RETRY: tuple[Retry, ...] = ("failed", "none", "all")

@@ -22,19 +22,24 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import psutil
-
-from schemas.errors import BadInput, ScenewrightError
-from schemas.outside import file_json
-from stages.engine.batch.artifacts import manifests, measures
-from stages.engine.batch.job import Job
-from stages.engine.batch.outcomes import MACHINE_FAILED, Outcome, classify, signal_name, signal_of
-from stages.engine.batch.processes import created_at, end_group, group_is_alive, resident_memory, signal_group
-from stages.engine.batch.quantities import format_bytes, format_seconds
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scene_log import LOG_NAME, LogFollower, clean
-from stages.engine.batch.storage import drop_local, send
-from stages.engine.chain import REPOSITORY
-from stages.engine.forking import Process
+from scenewright.schemas.errors import BadInput, ScenewrightError
+from scenewright.schemas.outside import file_json
+from scenewright.stages.engine.batch.artifacts import manifests, measures
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.outcomes import MACHINE_FAILED, Outcome, classify, signal_name, signal_of
+from scenewright.stages.engine.batch.processes import (
+    created_at,
+    end_group,
+    group_is_alive,
+    resident_memory,
+    signal_group,
+)
+from scenewright.stages.engine.batch.quantities import format_bytes, format_seconds
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower, clean
+from scenewright.stages.engine.batch.storage import drop_local, send
+from scenewright.stages.engine.chain import REPOSITORY
+from scenewright.stages.engine.forking import Process
 
 LAUNCHER = Path(__file__).with_name("launcher.py")
 PROCESS_NAME = ".batch-process.json"

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
-from stages.engine.batch.executor import Executor
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.executor import Executor
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
 
 TICK = 0.25
 """The longest wait between two looks of the display [s]."""

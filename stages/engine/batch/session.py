@@ -7,18 +7,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import UsageError
-from stages.engine.batch.display import display_for
-from stages.engine.batch.executor import Executor
-from stages.engine.batch.expansion import Batch, SceneCommand, make_jobs, scene_command
-from stages.engine.batch.folder_lock import folder_lock
-from stages.engine.batch.job import Job
-from stages.engine.batch.local_executor import LocalExecutor
-from stages.engine.batch.outcomes import worst_exit_code
-from stages.engine.batch.results import RESULTS_NAME, ResultsFile, SceneResult, latest_by_job, read_results
-from stages.engine.batch.resuming import Retry, missing_jobs
-from stages.engine.batch.scheduler import run_jobs
-from stages.engine.batch.slurm_executor import (
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.engine.batch.display import display_for
+from scenewright.stages.engine.batch.executor import Executor
+from scenewright.stages.engine.batch.expansion import Batch, SceneCommand, make_jobs, scene_command
+from scenewright.stages.engine.batch.folder_lock import folder_lock
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.local_executor import LocalExecutor
+from scenewright.stages.engine.batch.outcomes import worst_exit_code
+from scenewright.stages.engine.batch.results import RESULTS_NAME, ResultsFile, SceneResult, latest_by_job, read_results
+from scenewright.stages.engine.batch.resuming import Retry, missing_jobs
+from scenewright.stages.engine.batch.scheduler import run_jobs
+from scenewright.stages.engine.batch.slurm_executor import (
     FOLDER_NAME,
     Scripts,
     merge_parts,
@@ -27,10 +27,10 @@ from stages.engine.batch.slurm_executor import (
     read_job_list,
     write_scripts,
 )
-from stages.engine.batch.spec import LocalOptions, RayOptions, SlurmOptions
-from stages.engine.batch.storage import check_storage
-from stages.engine.batch.summary import NOT_RUN
-from stages.engine.batch.summary_files import write_summary
+from scenewright.stages.engine.batch.spec import LocalOptions, RayOptions, SlurmOptions
+from scenewright.stages.engine.batch.storage import check_storage
+from scenewright.stages.engine.batch.summary import NOT_RUN
+from scenewright.stages.engine.batch.summary_files import write_summary
 
 Say = Callable[[str], None]
 
@@ -64,7 +64,7 @@ def make_executor(batch: Batch, jobs: int | None) -> Executor:
     """Return the executor that the batch file asks for; `jobs` (from the command line) wins over the file's."""
     options = batch.spec.executor
     if isinstance(options, RayOptions):
-        from stages.engine.batch.ray_executor import RayExecutor
+        from scenewright.stages.engine.batch.ray_executor import RayExecutor
 
         chosen = options.model_copy(update={"jobs": jobs}) if jobs else options
         return RayExecutor(chosen, batch.spec.limits.memory)

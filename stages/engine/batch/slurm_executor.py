@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import MachineFailure, UsageError
-from schemas.outside import file_text
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import RESULTS_NAME, ResultsFile, read_results
-from stages.engine.batch.spec import SlurmOptions
-from stages.engine.chain import REPOSITORY
+from scenewright.schemas.errors import MachineFailure, UsageError
+from scenewright.schemas.outside import file_text
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import RESULTS_NAME, ResultsFile, read_results
+from scenewright.stages.engine.batch.spec import SlurmOptions
+from scenewright.stages.engine.chain import REPOSITORY
 
 FOLDER_NAME = "slurm"
 LIST_NAME = "jobs.txt"
@@ -116,7 +116,7 @@ def write_scripts(
     """Write the job list and the scripts of an array of at least one job into `out`/slurm; `extra` words go to every
     task. Raises MachineFailure when the folder cannot be written."""
     folder, tasks = out / FOLDER_NAME, task_count(len(jobs), options)
-    words = [sys.executable, "-m", "cli", "batch", str(spec_path), "--out", str(out)]
+    words = [sys.executable, "-m", "scenewright", "batch", str(spec_path), "--out", str(out)]
     base = shlex.join(words)
     more = "".join(f" {shlex.quote(word)}" for word in extra)
     array = _script(

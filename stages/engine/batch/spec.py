@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
-
-from schemas.errors import UsageError, first_problem
-from stages.engine.batch.quantities import parse_bytes, parse_seconds, parse_seed_range
-from stages.kit.configuration import read_toml
+from scenewright.schemas.errors import UsageError, first_problem
+from scenewright.stages.engine.batch.quantities import parse_bytes, parse_seconds, parse_seed_range
+from scenewright.stages.kit.configuration import read_toml
 
 HINT = "see docs/BATCH.md"
 

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 from uuid import uuid4
 
-from schemas.errors import MachineFailure, MissingDependency, ScenewrightError, UsageError
-from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
-from stages.engine.batch.artifacts import manifests
-from stages.engine.batch.scene_log import clean
+from scenewright.schemas.errors import MachineFailure, MissingDependency, ScenewrightError, UsageError
+from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
+from scenewright.stages.engine.batch.artifacts import manifests
+from scenewright.stages.engine.batch.scene_log import clean
 
 Value = TypeVar("Value")
 HINT = "see [storage] in docs/BATCH.md"

@@ -7,12 +7,11 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-
-from stages.engine.batch.job import Job
-from stages.engine.batch.outcomes import MEANINGS, Outcome, is_explained
-from stages.engine.batch.results import SceneResult
-from stages.kit.measurement.bootstrap import bootstrap_interval
-from stages.kit.measurement.tables import Cell, Table
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.outcomes import MEANINGS, Outcome, is_explained
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.kit.measurement.bootstrap import bootstrap_interval
+from scenewright.stages.kit.measurement.tables import Cell, Table
 
 NOT_RUN = "not run"
 MANY = 100_000

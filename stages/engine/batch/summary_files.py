@@ -7,11 +7,18 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from schemas.errors import MachineFailure
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.summary import accepted_table, cost_table, count_table, group_table, reason_table, scene_table
-from stages.kit.measurement.tables import Table, as_csv, as_markdown, format_cell
+from scenewright.schemas.errors import MachineFailure
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.summary import (
+    accepted_table,
+    cost_table,
+    count_table,
+    group_table,
+    reason_table,
+    scene_table,
+)
+from scenewright.stages.kit.measurement.tables import Table, as_csv, as_markdown, format_cell
 
 PEOPLE_COLUMNS = ("scene", "parameters", "seed", "outcome", "failed_step", "reason", "seconds", "peak_memory_mb")
 _STYLE = """

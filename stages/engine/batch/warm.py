@@ -16,11 +16,11 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scene_run import LAUNCHER, run_scene, scene_environment, stored
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scene_run import LAUNCHER, run_scene, scene_environment, stored
 
-WORKER = "stages.engine.batch.warm_worker"
+WORKER = "scenewright.stages.engine.batch.warm_worker"
 SECONDS_BETWEEN_LOOKS = 0.25
 PATIENCE = 5.0
 """Beyond the grace of a scene, for a worker that is asked to stop [s]."""

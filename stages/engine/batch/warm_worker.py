@@ -1,4 +1,4 @@
-"""A process that runs scenes in forks of itself: `python -m stages.engine.batch.warm_worker`, started by warm.py.
+"""A process that runs scenes in forks of itself; warm.py starts it by the name of this module.
 
 It reads a request a line (job and host) from standard input and answers with a line: the scene's result, or null for
 one that was stopped. Scenes are processes of their own in groups of their own, watched and limited as ever
@@ -15,10 +15,10 @@ import sys
 import tempfile
 from types import FrameType
 
-from stages.engine import forking
-from stages.engine.batch.job import Job
-from stages.engine.batch.scene_run import run_processes, start_scene
-from stages.engine.interruption import PARENT_VARIABLE
+from scenewright.stages.engine import forking
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.scene_run import run_processes, start_scene
+from scenewright.stages.engine.interruption import PARENT_VARIABLE
 
 
 class _Asked:

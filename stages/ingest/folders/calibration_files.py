@@ -17,12 +17,11 @@ from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML, YAMLError
-
-from schemas.errors import BadInput
-from stages.ingest.folders.files import read_json
-from stages.ingest.messages.records import CalibrationRecord
-from stages.kit.formats.trajectories import read_text
-from stages.kit.geometry.transforms import inverse, is_rigid, transform_from
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.files import read_json
+from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.kit.formats.trajectories import read_text
+from scenewright.stages.kit.geometry.transforms import inverse, is_rigid, transform_from
 
 NAMES = tuple(
     f"{stem}.{ending}"

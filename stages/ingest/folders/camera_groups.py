@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.folders.undistortion import RecordedCamera
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.undistortion import RecordedCamera
 
 MOST_CAMERAS = 8
 """Different intrinsics in one log up to which each is a camera of its own. More mean one camera that refocused, or a

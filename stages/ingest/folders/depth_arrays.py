@@ -9,9 +9,8 @@ import io
 import re
 
 import numpy as np
-
-from stages.ingest.source import Unusable
-from stages.kit.formats.image_headers import LARGEST_IMAGE
+from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE
 
 ARRAY_SUFFIXES = (".npy", ".pfm", ".bin")
 PFM = re.compile(rb"Pf\s+(\d{1,6})\s+(\d{1,6})\s+(-?[0-9.eE+-]{1,20})\s")

@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput, UsageError
-from schemas.outside import file_content, json_of
-from schemas.scene_parts import Camera
-from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
-from stages.ingest.images import decode_image, usable_color, usable_depth
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import LoadedFrame, Role, StreamInfo, Unusable
-from stages.kit.formats.foxglove import decode_color
-from stages.kit.formats.trajectories import read_text
-from stages.kit.geometry.cameras import scaled
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.outside import file_content, json_of
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
+from scenewright.stages.ingest.images import decode_image, usable_color, usable_depth
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import LoadedFrame, Role, StreamInfo, Unusable
+from scenewright.stages.kit.formats.foxglove import decode_color
+from scenewright.stages.kit.formats.trajectories import read_text
+from scenewright.stages.kit.geometry.cameras import scaled
 
 COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp")
 DEPTH_SUFFIXES = (".png", ".pgm", ".tif", ".tiff")

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.folders.files import file_bytes, raw_depth
-from stages.ingest.folders.undistortion import RecordedCamera, undistorted
-from stages.ingest.images import depth_millimetres, fitted_color, usable_color
-from stages.ingest.source import LoadedFrame, Unusable
-from stages.kit.formats.foxglove import decode_color
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.files import file_bytes, raw_depth
+from scenewright.stages.ingest.folders.undistortion import RecordedCamera, undistorted
+from scenewright.stages.ingest.images import depth_millimetres, fitted_color, usable_color
+from scenewright.stages.ingest.source import LoadedFrame, Unusable
+from scenewright.stages.kit.formats.foxglove import decode_color
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,11 @@ import re
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import opened
-from stages.ingest.folders.files import files_of, images_by_number
-from stages.ingest.folders.stamped_poses import StampedPoses, read_stamped_poses
-from stages.kit.formats.trajectories import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.ingest.folders.files import files_of, images_by_number
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, read_stamped_poses
+from scenewright.stages.kit.formats.trajectories import (
     named_rows,
     number_rows,
     read_matrix,

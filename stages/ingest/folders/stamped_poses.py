@@ -8,11 +8,10 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.transform_tree import TransformTree
-from stages.kit.formats.trajectories import number_rows, read_text, transform_from_numbers
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.transform_tree import TransformTree
+from scenewright.stages.kit.formats.trajectories import number_rows, read_text, transform_from_numbers
 
 LATEST_STAMP = 9_000_000_000
 """Seconds since 1970: stamps in nanoseconds stay within 64 bits."""

@@ -9,12 +9,11 @@ from typing import Literal
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.folders.files import resized_camera
-from stages.ingest.parameters import IngestParameters
-from stages.kit.geometry.cameras import intrinsic_matrix
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.files import resized_camera
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
 
 NEGLIGIBLE = 1e-9
 """Coefficients up to here move no pixel."""

@@ -6,24 +6,23 @@ from collections.abc import Callable, Hashable
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.association import fresh, partners
-from stages.ingest.depth_registration import registered_depth
-from stages.ingest.images import depth_millimetres, fitted_color
-from stages.ingest.lenses import Lens
-from stages.ingest.messages.camera_geometry import CameraGeometry
-from stages.ingest.messages.cameras import CameraTopics
-from stages.ingest.messages.container import MessageLog
-from stages.ingest.messages.decoding import decoder_for
-from stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels
-from stages.ingest.messages.pose_source import PoseSource
-from stages.ingest.messages.records import ImageRecord, Undecodable
-from stages.ingest.messages.survey import LogContent
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LoadedFrame, Unusable
-from stages.kit.formats.foxglove import decode_color
-from stages.kit.formats.image_headers import image_size
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.association import fresh, partners
+from scenewright.stages.ingest.depth_registration import registered_depth
+from scenewright.stages.ingest.images import depth_millimetres, fitted_color
+from scenewright.stages.ingest.lenses import Lens
+from scenewright.stages.ingest.messages.camera_geometry import CameraGeometry
+from scenewright.stages.ingest.messages.cameras import CameraTopics
+from scenewright.stages.ingest.messages.container import MessageLog
+from scenewright.stages.ingest.messages.decoding import decoder_for
+from scenewright.stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels
+from scenewright.stages.ingest.messages.pose_source import PoseSource
+from scenewright.stages.ingest.messages.records import ImageRecord, Undecodable
+from scenewright.stages.ingest.messages.survey import LogContent
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LoadedFrame, Unusable
+from scenewright.stages.kit.formats.foxglove import decode_color
+from scenewright.stages.kit.formats.image_headers import image_size
 
 NO_PARTNER = "no_{}_within_tolerance"
 

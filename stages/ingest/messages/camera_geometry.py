@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.folders.files import camera_from_options, overridden
-from stages.ingest.lenses import Lens, check_calibrated, is_calibrated, lens_of, same_rays
-from stages.ingest.messages.cameras import CameraTopics, calibration_of, calibration_topic, fixed_transform
-from stages.ingest.messages.records import CalibrationRecord
-from stages.ingest.messages.survey import LogContent
-from stages.ingest.messages.topic_names import is_rectified, is_registered
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.stereo import stereo_lenses
-from stages.kit.geometry.transforms import transform_from
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.files import camera_from_options, overridden
+from scenewright.stages.ingest.lenses import Lens, check_calibrated, is_calibrated, lens_of, same_rays
+from scenewright.stages.ingest.messages.cameras import CameraTopics, calibration_of, calibration_topic, fixed_transform
+from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.ingest.messages.survey import LogContent
+from scenewright.stages.ingest.messages.topic_names import is_rectified, is_registered
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.stereo import stereo_lenses
+from scenewright.stages.kit.geometry.transforms import transform_from
 
 SAME_PLACE = 1e-6
 

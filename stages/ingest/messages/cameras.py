@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.lenses import is_calibrated
-from stages.ingest.messages.records import CalibrationRecord
-from stages.ingest.messages.survey import Images, LogContent
-from stages.ingest.messages.topic_names import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.lenses import is_calibrated
+from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.ingest.messages.survey import Images, LogContent
+from scenewright.stages.ingest.messages.topic_names import (
     calibration_names,
     camera_names,
     common_length,
@@ -22,8 +21,8 @@ from stages.ingest.messages.topic_names import (
     place,
     without_transport,
 )
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.stereo import is_pair
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.stereo import is_pair
 
 ALMOST_ALL = 0.9
 """A topic with this share of another's images may stand in for it."""

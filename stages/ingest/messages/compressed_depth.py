@@ -13,11 +13,10 @@ import struct
 
 import numpy as np
 from numba import njit
-
-from stages.ingest.images import decode_image
-from stages.ingest.source import Unusable
-from stages.kit.formats.foxglove import PNG_START
-from stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_decoded
+from scenewright.stages.ingest.images import decode_image
+from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.formats.foxglove import PNG_START
+from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_decoded
 
 _HEADER = struct.Struct("<iff")
 _RVL_SIZE = struct.Struct("<II")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 LONGEST = 200
 """Lines that are kept; of a file that is damaged everywhere the rest is only counted."""

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
-from stages.ingest.messages import foxglove_messages, ros_messages
-from stages.ingest.messages.container import Channel
-from stages.ingest.messages.json_messages import json_decoder
-from stages.ingest.messages.protobuf_messages import protobuf_decoder
-from stages.ingest.messages.realsense_bags import (
+from scenewright.stages.ingest.messages import foxglove_messages, ros_messages
+from scenewright.stages.ingest.messages.container import Channel
+from scenewright.stages.ingest.messages.json_messages import json_decoder
+from scenewright.stages.ingest.messages.protobuf_messages import protobuf_decoder
+from scenewright.stages.ingest.messages.realsense_bags import (
     is_stream_transform,
     may_state_depth_unit,
     states_depth_unit,
     with_stream_frames,
 )
-from stages.ingest.messages.records import Record
-from stages.ingest.messages.ros_definitions import UnreadableDefinition, short_name
+from scenewright.stages.ingest.messages.records import Record
+from scenewright.stages.ingest.messages.ros_definitions import UnreadableDefinition, short_name
 
 Decoder = Callable[[bytes], tuple[Record, ...]]
 """Raises Undecodable."""

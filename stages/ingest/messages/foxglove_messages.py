@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from stages.ingest.messages.record_fields import (
+from scenewright.stages.ingest.messages.record_fields import (
     Fields,
     bytes_of,
     frame_of,
@@ -17,7 +17,7 @@ from stages.ingest.messages.record_fields import (
     size_of,
     stamp_of,
 )
-from stages.ingest.messages.records import (
+from scenewright.stages.ingest.messages.records import (
     CalibrationRecord,
     ImageRecord,
     PointsRecord,

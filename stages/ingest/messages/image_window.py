@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stages.ingest.messages.record_fields import Fields, nested, size_of
-from stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.ingest.messages.record_fields import Fields, nested, size_of
+from scenewright.stages.ingest.messages.records import CalibrationRecord
 
 
 def of_published_images(record: CalibrationRecord, fields: Fields) -> CalibrationRecord:

@@ -8,8 +8,8 @@ import json
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from stages.ingest.messages.foxglove_messages import CONVERTERS, type_of
-from stages.ingest.messages.records import Record, Undecodable
+from scenewright.stages.ingest.messages.foxglove_messages import CONVERTERS, type_of
+from scenewright.stages.ingest.messages.records import Record, Undecodable
 
 LARGEST_MESSAGE = 1 << 27
 """Bytes of one JSON message that are parsed: parsing takes up to twenty times as much memory."""

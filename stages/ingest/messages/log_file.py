@@ -6,7 +6,7 @@ import os
 import zlib
 from pathlib import Path
 
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 PIECE = 1 << 20
 

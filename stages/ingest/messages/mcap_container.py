@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Collection, Hashable, Iterator
 from pathlib import Path
 
-from schemas.errors import BadInput
-from stages.ingest.messages.container import Channel, StoredMessage
-from stages.ingest.messages.mcap_log import Location, LogMessage, McapLog
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.messages.container import Channel, StoredMessage
+from scenewright.stages.ingest.messages.mcap_log import Location, LogMessage, McapLog
 
 
 class McapMessages:

@@ -17,14 +17,20 @@ from pathlib import Path
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel
-
-from schemas.errors import BadInput
-from stages.ingest.messages.damage_lines import HINT, DamageLines
-from stages.ingest.messages.log_file import Damaged, LogFile
-from stages.ingest.messages.mcap_records import HEAD, MAGIC, MESSAGE_HEAD, read_channel, read_chunk_head, read_schema
-from stages.ingest.messages.mcap_structure import McapStructure
-from stages.kit.formats.bounded_unpacking import unpacked
-from stages.kit.formats.chunk_cache import ChunkCache
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.messages.damage_lines import HINT, DamageLines
+from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
+from scenewright.stages.ingest.messages.mcap_records import (
+    HEAD,
+    MAGIC,
+    MESSAGE_HEAD,
+    read_channel,
+    read_chunk_head,
+    read_schema,
+)
+from scenewright.stages.ingest.messages.mcap_structure import McapStructure
+from scenewright.stages.kit.formats.bounded_unpacking import unpacked
+from scenewright.stages.kit.formats.chunk_cache import ChunkCache
 
 LARGEST_CHUNK = 1 << 30
 """Unpacked bytes of one chunk, or of one message outside of chunks, that are accepted; more is taken for a bomb."""

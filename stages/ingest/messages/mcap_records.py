@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Schema
-
-from stages.ingest.messages.log_file import Damaged, LogFile
+from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Schema
-
-from schemas.errors import BadInput
-from stages.ingest.messages.damage_lines import HINT, DamageLines
-from stages.ingest.messages.log_file import Damaged, LogFile
-from stages.ingest.messages.mcap_records import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.messages.damage_lines import HINT, DamageLines
+from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
+from scenewright.stages.ingest.messages.mcap_records import (
     COMPRESSIONS,
     DATA_END_SIZE,
     HEAD,

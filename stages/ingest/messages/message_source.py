@@ -6,14 +6,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry
-from stages.ingest.inertial import measured_up
-from stages.ingest.messages.camera_frames import depth_note, frame_entries
-from stages.ingest.messages.camera_geometry import CameraGeometry, geometry_of
-from stages.ingest.messages.cameras import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import LabelEntry
+from scenewright.stages.ingest.inertial import measured_up
+from scenewright.stages.ingest.messages.camera_frames import depth_note, frame_entries
+from scenewright.stages.ingest.messages.camera_geometry import CameraGeometry, geometry_of
+from scenewright.stages.ingest.messages.cameras import (
     CameraTopics,
     alternatives,
     calibration_topic,
@@ -21,13 +20,13 @@ from stages.ingest.messages.cameras import (
     find_cameras,
     unpaired_side,
 )
-from stages.ingest.messages.container import MessageLog
-from stages.ingest.messages.opening import open_message_log
-from stages.ingest.messages.pose_source import PoseSource, find_poses
-from stages.ingest.messages.survey import LogContent, survey
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.frames import LABELS_METADATA, WORLD_METADATA
+from scenewright.stages.ingest.messages.container import MessageLog
+from scenewright.stages.ingest.messages.opening import open_message_log
+from scenewright.stages.ingest.messages.pose_source import PoseSource, find_poses
+from scenewright.stages.ingest.messages.survey import LogContent, survey
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.formats.frames import LABELS_METADATA, WORLD_METADATA
 
 REFUSE_HINT = "leave out --damage refuse to use what is whole"
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.outside import opened
-from stages.ingest.messages.container import MessageLog
-from stages.ingest.messages.mcap_container import open_mcap
-from stages.ingest.messages.mcap_records import MAGIC as MCAP_MAGIC
-from stages.ingest.messages.rosbag1_container import open_rosbag1
-from stages.ingest.messages.rosbag2_container import ZSTD_MAGIC, open_rosbag2
-from stages.ingest.messages.rosbag2_metadata import KEY, NAME, is_part_name, listed_parts
-from stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.ingest.messages.container import MessageLog
+from scenewright.stages.ingest.messages.mcap_container import open_mcap
+from scenewright.stages.ingest.messages.mcap_records import MAGIC as MCAP_MAGIC
+from scenewright.stages.ingest.messages.rosbag1_container import open_rosbag1
+from scenewright.stages.ingest.messages.rosbag2_container import ZSTD_MAGIC, open_rosbag2
+from scenewright.stages.ingest.messages.rosbag2_metadata import KEY, NAME, is_part_name, listed_parts
+from scenewright.stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
 
 _OPENERS: dict[str, Callable[..., MessageLog]] = {"mcap": open_mcap, "rosbag1": open_rosbag1, "rosbag2": open_rosbag2}
 _SUFFIXES = {".mcap": "mcap", ".bag": "rosbag1", ".db3": "rosbag2"}

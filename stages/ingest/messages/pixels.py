@@ -12,13 +12,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.ingest.images import decode_image
-from stages.ingest.messages.compressed_depth import decode_compressed_depth, is_compressed_depth, stored_as
-from stages.ingest.messages.records import ImageRecord
-from stages.ingest.source import Role, Unusable
-from stages.kit.formats.foxglove import JPEG_START, PNG_START, decode_color
-from stages.kit.formats.image_headers import JPEG_BARE_MARKERS, LARGEST_IMAGE, image_size, may_be_decoded
+from scenewright.stages.ingest.images import decode_image
+from scenewright.stages.ingest.messages.compressed_depth import decode_compressed_depth, is_compressed_depth, stored_as
+from scenewright.stages.ingest.messages.records import ImageRecord
+from scenewright.stages.ingest.source import Role, Unusable
+from scenewright.stages.kit.formats.foxglove import JPEG_START, PNG_START, decode_color
+from scenewright.stages.kit.formats.image_headers import JPEG_BARE_MARKERS, LARGEST_IMAGE, image_size, may_be_decoded
 
 MILLIMETRES, METRES = 1000.0, 1.0
 """Depth units per metre."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.messages.survey import LogContent, Poses
-from stages.ingest.messages.topic_names import words
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.transform_tree import TransformTree
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.messages.survey import LogContent, Poses
+from scenewright.stages.ingest.messages.topic_names import words
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.transform_tree import TransformTree
 
 WORLD_FRAMES = ("map", "world", "odom")
 """Names of frames that stand still (REP-105)."""

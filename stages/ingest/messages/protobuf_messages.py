@@ -18,9 +18,8 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
-
-from stages.ingest.messages.foxglove_messages import CONVERTERS, type_of
-from stages.ingest.messages.records import Record, Undecodable
+from scenewright.stages.ingest.messages.foxglove_messages import CONVERTERS, type_of
+from scenewright.stages.ingest.messages.records import Record, Undecodable
 
 CLASSES: dict[str, Any] = {
     "RawImage": RawImage,

@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from stages.ingest.messages.records import Record, TransformRecord
-from stages.kit.geometry.transforms import inverse
+from scenewright.stages.ingest.messages.records import Record, TransformRecord
+from scenewright.stages.kit.geometry.transforms import inverse
 
 _TOPIC = re.compile(
     r"/(?P<device>device_\d+)/(?P<sensor>sensor_\d+)/(?P<stream>\w+)/"

@@ -9,8 +9,7 @@ import math
 from typing import Any
 
 import numpy as np
-
-from stages.ingest.messages.records import Undecodable
+from scenewright.stages.ingest.messages.records import Undecodable
 
 LONGEST_NAME = 4096
 """Characters of a frame, an encoding or a model; what is longer is no name."""

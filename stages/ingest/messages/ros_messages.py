@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
-from stages.ingest.messages import foxglove_messages
-from stages.ingest.messages.foxglove_messages import calibration_record, every_transform
-from stages.ingest.messages.image_window import of_published_images
-from stages.ingest.messages.record_fields import (
+from scenewright.stages.ingest.messages import foxglove_messages
+from scenewright.stages.ingest.messages.foxglove_messages import calibration_record, every_transform
+from scenewright.stages.ingest.messages.image_window import of_published_images
+from scenewright.stages.ingest.messages.record_fields import (
     Fields,
     bytes_of,
     frame_of,
@@ -22,9 +21,16 @@ from stages.ingest.messages.record_fields import (
     stamp_of,
     vector_of,
 )
-from stages.ingest.messages.records import ImageRecord, ImuRecord, PointsRecord, PoseRecord, Record, TransformRecord
-from stages.ingest.messages.ros_definitions import Field, definitions_of, short_name
-from stages.ingest.messages.ros_serialization import RosReader
+from scenewright.stages.ingest.messages.records import (
+    ImageRecord,
+    ImuRecord,
+    PointsRecord,
+    PoseRecord,
+    Record,
+    TransformRecord,
+)
+from scenewright.stages.ingest.messages.ros_definitions import Field, definitions_of, short_name
+from scenewright.stages.ingest.messages.ros_serialization import RosReader
 
 DEPTH_UNIT = Field("depth_units", "f")
 """Metres per unit of depth, where an image states it."""

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from stages.ingest.messages.records import Undecodable
-from stages.ingest.messages.ros_definitions import (
+from scenewright.stages.ingest.messages.records import Undecodable
+from scenewright.stages.ingest.messages.ros_definitions import (
     EMPTY_STRUCT_MEMBER,
     SEQUENCE,
     TEXT,

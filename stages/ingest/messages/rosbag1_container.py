@@ -12,11 +12,11 @@ from collections.abc import Collection, Hashable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from schemas.errors import BadInput
-from stages.ingest.messages.container import Channel, StoredMessage
-from stages.ingest.messages.damage_lines import HINT, DamageLines
-from stages.ingest.messages.log_file import Damaged, LogFile
-from stages.ingest.messages.rosbag1_records import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.messages.container import Channel, StoredMessage
+from scenewright.stages.ingest.messages.damage_lines import HINT, DamageLines
+from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
+from scenewright.stages.ingest.messages.rosbag1_records import (
     BAG_HEADER,
     CHUNK,
     CHUNK_INFO,
@@ -31,8 +31,8 @@ from stages.ingest.messages.rosbag1_records import (
     read_record,
     record_within,
 )
-from stages.kit.formats.bounded_unpacking import unpacked
-from stages.kit.formats.chunk_cache import ChunkCache
+from scenewright.stages.kit.formats.bounded_unpacking import unpacked
+from scenewright.stages.kit.formats.chunk_cache import ChunkCache
 
 LARGEST_CHUNK = 1 << 30
 """Unpacked bytes of one chunk that are accepted; what claims more is taken for a bomb."""

@@ -10,7 +10,7 @@ import re
 import struct
 from dataclasses import dataclass
 
-from stages.ingest.messages.log_file import Damaged, LogFile
+from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07

@@ -8,16 +8,16 @@ from collections.abc import Collection, Hashable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from schemas.errors import BadInput, MachineFailure
-from stages.ingest.messages.container import Channel, StoredMessage
-from stages.ingest.messages.damage_lines import HINT, DamageLines
-from stages.ingest.messages.log_file import Damaged, LogFile
-from stages.ingest.messages.mcap_container import McapMessages
-from stages.ingest.messages.mcap_records import MAGIC as MCAP_MAGIC
-from stages.ingest.messages.rosbag2_metadata import NAME, BagMetadata, listed_parts, read_bag_metadata
-from stages.ingest.messages.sqlite_container import LARGEST_MESSAGE, SqliteMessages
-from stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
-from stages.kit.formats.bounded_unpacking import stated_size, unpack_file, unpacked_within
+from scenewright.schemas.errors import BadInput, MachineFailure
+from scenewright.stages.ingest.messages.container import Channel, StoredMessage
+from scenewright.stages.ingest.messages.damage_lines import HINT, DamageLines
+from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
+from scenewright.stages.ingest.messages.mcap_container import McapMessages
+from scenewright.stages.ingest.messages.mcap_records import MAGIC as MCAP_MAGIC
+from scenewright.stages.ingest.messages.rosbag2_metadata import NAME, BagMetadata, listed_parts, read_bag_metadata
+from scenewright.stages.ingest.messages.sqlite_container import LARGEST_MESSAGE, SqliteMessages
+from scenewright.stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
+from scenewright.stages.kit.formats.bounded_unpacking import stated_size, unpack_file, unpacked_within
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 GREATEST_RATIO = 100

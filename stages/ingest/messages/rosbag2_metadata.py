@@ -17,9 +17,8 @@ from ruamel.yaml.events import (
     SequenceEndEvent,
     SequenceStartEvent,
 )
-
-from schemas.errors import BadInput
-from schemas.outside import file_text
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_text
 
 NAME = "metadata.yaml"
 KEY = "rosbag2_bagfile_information"

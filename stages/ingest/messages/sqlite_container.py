@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from schemas.errors import BadInput, MachineFailure
-from stages.ingest.messages.container import Channel, StoredMessage
-from stages.ingest.messages.damage_lines import HINT, DamageLines
-from stages.ingest.messages.log_file import Damaged, LogFile
+from scenewright.schemas.errors import BadInput, MachineFailure
+from scenewright.stages.ingest.messages.container import Channel, StoredMessage
+from scenewright.stages.ingest.messages.damage_lines import HINT, DamageLines
+from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"SQLite format 3\x00"
 _HEAD_SIZE = 100

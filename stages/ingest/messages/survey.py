@@ -8,13 +8,12 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.ingest.lenses import is_calibrated
-from stages.ingest.messages.container import MessageLog
-from stages.ingest.messages.decoding import decoder_for, why_unreadable
-from stages.ingest.messages.pixels import color_pixels, depth_pixels, label_pixels, role_of, why_other
-from stages.ingest.messages.realsense_bags import is_stream_transform
-from stages.ingest.messages.records import (
+from scenewright.stages.ingest.lenses import is_calibrated
+from scenewright.stages.ingest.messages.container import MessageLog
+from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
+from scenewright.stages.ingest.messages.pixels import color_pixels, depth_pixels, label_pixels, role_of, why_other
+from scenewright.stages.ingest.messages.realsense_bags import is_stream_transform
+from scenewright.stages.ingest.messages.records import (
     CalibrationRecord,
     ImageRecord,
     ImuRecord,
@@ -24,9 +23,9 @@ from stages.ingest.messages.records import (
     TransformRecord,
     Undecodable,
 )
-from stages.ingest.source import Role, StreamInfo, Unusable
-from stages.ingest.transform_tree import Track, TransformTree
-from stages.kit.formats.image_headers import image_size as size_in_header
+from scenewright.stages.ingest.source import Role, StreamInfo, Unusable
+from scenewright.stages.ingest.transform_tree import Track, TransformTree
+from scenewright.stages.kit.formats.image_headers import image_size as size_in_header
 
 IMU_STEP = 50_000_000
 """Inertial samples nearer to the last one kept than this [ns] are not kept: up is a mean."""

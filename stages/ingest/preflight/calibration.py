@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from schemas.scene_parts import Camera
-from stages.ingest.preflight.report import CalibrationReport, Finding, exact
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.preflight.report import CalibrationReport, Finding, exact
 
 CENTER_TOLERANCE = 0.15
 """Principal point off the middle, as share of the size."""

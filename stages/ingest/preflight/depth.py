@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable
 
 import numpy as np
-
-from stages.ingest.preflight.looking import Look
-from stages.ingest.preflight.report import DepthReport, Finding, exact
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.ingest.preflight.report import DepthReport, Finding, exact
 
 PLAUSIBLE = (0.15, 15.0)
 """Median depth [m] of what depth cameras record."""

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.preflight.fits import Fit, as_fit, relative_pose
-from stages.ingest.preflight.looking import Look
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.preflight.fits import Fit, as_fit, relative_pose
+from scenewright.stages.ingest.preflight.looking import Look
 
 FEATURES = 800
 MOST_PAIRS, MOST_MATCHES = 12, 400

@@ -8,24 +8,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.manifest import MANIFEST_NAME
-from schemas.sequence import Sequence
-from stages.ingest.detection import log_format, open_log
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.pose_conventions import converted
-from stages.ingest.preflight.calibration import calibration_findings, calibration_report
-from stages.ingest.preflight.choice import Choice, choose
-from stages.ingest.preflight.depth import depth_findings, depth_report, units_per_metre
-from stages.ingest.preflight.epipolar import FeaturePairs
-from stages.ingest.preflight.looking import Look, look_at_entry
-from stages.ingest.preflight.motion import motion_findings, motion_report
-from stages.ingest.preflight.pictures import picture_findings, picture_report
-from stages.ingest.preflight.pose_findings import depth_is_blamed, pose_findings, rigidity_words
-from stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES, LEAST_PAIRS, PoseOutcome, check_poses
-from stages.ingest.preflight.registration import check_registration, registration_findings
-from stages.ingest.preflight.report import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.ingest.detection import log_format, open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.pose_conventions import converted
+from scenewright.stages.ingest.preflight.calibration import calibration_findings, calibration_report
+from scenewright.stages.ingest.preflight.choice import Choice, choose
+from scenewright.stages.ingest.preflight.depth import depth_findings, depth_report, units_per_metre
+from scenewright.stages.ingest.preflight.epipolar import FeaturePairs
+from scenewright.stages.ingest.preflight.looking import Look, look_at_entry
+from scenewright.stages.ingest.preflight.motion import motion_findings, motion_report
+from scenewright.stages.ingest.preflight.pictures import picture_findings, picture_report
+from scenewright.stages.ingest.preflight.pose_findings import depth_is_blamed, pose_findings, rigidity_words
+from scenewright.stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES, LEAST_PAIRS, PoseOutcome, check_poses
+from scenewright.stages.ingest.preflight.registration import check_registration, registration_findings
+from scenewright.stages.ingest.preflight.report import (
     CameraReport,
     Finding,
     FramesReport,
@@ -37,18 +36,18 @@ from stages.ingest.preflight.report import (
     exact,
     significant,
 )
-from stages.ingest.preflight.reprojection import DepthPairs
-from stages.ingest.preflight.sequence_source import sequence_source
-from stages.ingest.preflight.settings import ingest_parameters
-from stages.ingest.preflight.steps import step_reports
-from stages.ingest.preflight.stereo import stereo_findings, stereo_report, with_stereo_depth
-from stages.ingest.preflight.streams import all_streams, clock_lines, stream_findings, stream_reports
-from stages.ingest.preflight.upright import gravity_findings, gravity_report
-from stages.ingest.registry import all_layouts
-from stages.ingest.selection import NOT_SELECTED, select
-from stages.ingest.source import Entry, LogSource, SourceCamera, Unusable
-from stages.ingest.stage import check_cameras
-from stages.kit.stage import Progress
+from scenewright.stages.ingest.preflight.reprojection import DepthPairs
+from scenewright.stages.ingest.preflight.sequence_source import sequence_source
+from scenewright.stages.ingest.preflight.settings import ingest_parameters
+from scenewright.stages.ingest.preflight.steps import step_reports
+from scenewright.stages.ingest.preflight.stereo import stereo_findings, stereo_report, with_stereo_depth
+from scenewright.stages.ingest.preflight.streams import all_streams, clock_lines, stream_findings, stream_reports
+from scenewright.stages.ingest.preflight.upright import gravity_findings, gravity_report
+from scenewright.stages.ingest.registry import all_layouts
+from scenewright.stages.ingest.selection import NOT_SELECTED, select
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera, Unusable
+from scenewright.stages.ingest.stage import check_cameras
+from scenewright.stages.kit.stage import Progress
 
 LEAST_FRAMES = 12
 """Looked at per camera, however many cameras there are."""

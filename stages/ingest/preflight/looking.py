@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.source import Entry, LoadedFrame, Unusable
-from stages.kit.formats.foxglove import decode_color
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.source import Entry, LoadedFrame, Unusable
+from scenewright.stages.kit.formats.foxglove import decode_color
 
 WORKING_WIDTH = 640
 """Pictures are thinned by a whole factor to about this width."""

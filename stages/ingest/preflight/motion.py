@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-
-from stages.ingest.preflight.fits import relative_pose
-from stages.ingest.preflight.looking import Look
-from stages.ingest.preflight.report import Finding, MotionReport, exact, significant
-from stages.ingest.preflight.reprojection import projected
-from stages.kit.geometry.cameras import back_project
+from scenewright.stages.ingest.preflight.fits import relative_pose
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.ingest.preflight.report import Finding, MotionReport, exact, significant
+from scenewright.stages.ingest.preflight.reprojection import projected
+from scenewright.stages.kit.geometry.cameras import back_project
 
 JUMP = 0.5
 """Metres between neighbours ..."""

@@ -11,15 +11,14 @@ from typing import Any
 import jinja2
 import numpy as np
 from markupsafe import Markup
-
-from schemas.errors import MachineFailure
-from stages.ingest.preflight.charts import curve, histogram, path_from_above, timeline
-from stages.ingest.preflight.inspection import CameraMaterial, Inspection
-from stages.ingest.preflight.pictures import RELATIVE_BLUR, sharpnesses
-from stages.ingest.preflight.poses import Candidate
-from stages.ingest.preflight.report import CameraReport, Hypothesis
-from stages.ingest.preflight.text import hypothesis_words
-from stages.ingest.preflight.views import (
+from scenewright.schemas.errors import MachineFailure
+from scenewright.stages.ingest.preflight.charts import curve, histogram, path_from_above, timeline
+from scenewright.stages.ingest.preflight.inspection import CameraMaterial, Inspection
+from scenewright.stages.ingest.preflight.pictures import RELATIVE_BLUR, sharpnesses
+from scenewright.stages.ingest.preflight.poses import Candidate
+from scenewright.stages.ingest.preflight.report import CameraReport, Hypothesis
+from scenewright.stages.ingest.preflight.text import hypothesis_words
+from scenewright.stages.ingest.preflight.views import (
     Picture,
     depth_in_colors,
     embedded,

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
-
-from stages.ingest.preflight.looking import Look
-from stages.ingest.preflight.report import Finding, PictureReport, exact
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.ingest.preflight.report import Finding, PictureReport, exact
 
 MEASURING_WIDTH = 320
 RELATIVE_BLUR = 0.3

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.pose_convention_names import CONVENTION_WORDS
-from stages.ingest.preflight.depth import TYPICAL, factor_words, scale_advice
-from stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES
-from stages.ingest.preflight.report import DepthReport, Finding, Hypothesis, PoseReport, Severity
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
+from scenewright.stages.ingest.preflight.depth import TYPICAL, factor_words, scale_advice
+from scenewright.stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES
+from scenewright.stages.ingest.preflight.report import DepthReport, Finding, Hypothesis, PoseReport, Severity
 
 DEPTH_DIVISORS = (0.2, 5.0, 6.5535, 1 / 6.5535)
 """Ratios that come from depth images (5000 and 6553.5 against 1000), never from poses."""

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-
-from stages.ingest.pose_convention_names import POSE_CONVENTIONS, PoseConvention
-from stages.ingest.pose_conventions import converted
-from stages.ingest.preflight.fits import Fit
-from stages.ingest.preflight.report import Hypothesis, PoseReport, PoseVerdict, exact, significant
+from scenewright.stages.ingest.pose_convention_names import POSE_CONVENTIONS, PoseConvention
+from scenewright.stages.ingest.pose_conventions import converted
+from scenewright.stages.ingest.preflight.fits import Fit
+from scenewright.stages.ingest.preflight.report import Hypothesis, PoseReport, PoseVerdict, exact, significant
 
 SCALES = tuple(float(f"{10 ** (k / 3):.6g}") for k in range(-9, 10))
 """Scales of the translations that are searched: a factor 2.15 apart, which a fit is broad enough to bridge."""

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.ingest.preflight.looking import Look
-from stages.ingest.preflight.report import Finding, RegistrationReport, exact, significant
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.ingest.preflight.report import Finding, RegistrationReport, exact, significant
 
 MEASURING_WIDTH = 320
 JUMP = 0.08

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from schemas.base import Model
-from schemas.scene_parts import Camera
+from scenewright.schemas.base import Model
+from scenewright.schemas.scene_parts import Camera
 
 SCHEMA_VERSION = 1
 Severity = Literal["wasted", "doubtful", "note"]

@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.ingest.preflight.fits import Fit, as_fit, relative_pose
-from stages.ingest.preflight.looking import Look
-from stages.kit.geometry.cameras import back_project
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.preflight.fits import Fit, as_fit, relative_pose
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.kit.geometry.cameras import back_project
 
 SAMPLES_ACROSS = 40
 """Sampled columns of a picture; rows at the same spacing."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from schemas.sequence import Sequence
-from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
-from stages.kit.formats.foxglove import depth_to_millimetres
-from stages.kit.formats.frames import FrameReader
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
+from scenewright.stages.kit.formats.foxglove import depth_to_millimetres
+from scenewright.stages.kit.formats.frames import FrameReader
 
 
 def sequence_source(sequence: Sequence) -> LogSource:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, get_origin
 
-from schemas.errors import UsageError
-from stages.ingest.parameters import STAGE, IngestParameters, check
-from stages.kit.configuration import parameters_for
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.ingest.parameters import STAGE, IngestParameters, check
+from scenewright.stages.kit.configuration import parameters_for
 
 
 def ingest_parameters(pairs: Iterable[str]) -> IngestParameters:

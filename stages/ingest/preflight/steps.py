@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from stages.ingest.preflight.report import StepReport
+from scenewright.stages.ingest.preflight.report import StepReport
 
 NEEDS: dict[str, tuple[str, ...]] = {
     "ingest": ("usable frames",),

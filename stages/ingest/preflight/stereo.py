@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-
-from stages.ingest.preflight.epipolar import features_of, matched
-from stages.ingest.preflight.looking import Look
-from stages.ingest.preflight.report import Finding, StereoReport, significant
+from scenewright.stages.ingest.preflight.epipolar import features_of, matched
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.ingest.preflight.report import Finding, StereoReport, significant
 
 FRAMES = 6
 LEAST_MATCHES = 40

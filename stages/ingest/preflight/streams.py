@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-
-from stages.ingest.preflight.report import Finding, Gaps, StreamReport, exact, significant
-from stages.ingest.source import Entry, LogSource, StreamInfo
+from scenewright.stages.ingest.preflight.report import Finding, Gaps, StreamReport, exact, significant
+from scenewright.stages.ingest.source import Entry, LogSource, StreamInfo
 
 GAP_FACTOR = 3.0
 """Intervals over so many medians are gaps."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES
-from stages.ingest.preflight.report import CameraReport, Hypothesis, InspectionReport, StreamReport
+from scenewright.stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES
+from scenewright.stages.ingest.preflight.report import CameraReport, Hypothesis, InspectionReport, StreamReport
 
 MARKS = {"wasted": "WASTED", "doubtful": "doubt", "note": "note"}
 

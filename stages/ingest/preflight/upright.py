@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.preflight.looking import Look
-from stages.ingest.preflight.report import Finding, GravityReport, significant
-from stages.ingest.source import LogSource
-from stages.kit.geometry.surface_samples import surface_samples
-from stages.kit.geometry.upright_world import make_upright
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.ingest.preflight.report import Finding, GravityReport, significant
+from scenewright.stages.ingest.source import LogSource
+from scenewright.stages.kit.geometry.surface_samples import surface_samples
+from scenewright.stages.kit.geometry.upright_world import make_upright
 
 
 def gravity_report(

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.ingest.preflight.fits import relative_pose
-from stages.ingest.preflight.looking import Look
-from stages.ingest.preflight.registration import depth_jumps
-from stages.ingest.preflight.reprojection import projected
-from stages.kit.geometry.cameras import back_project
+from scenewright.stages.ingest.preflight.fits import relative_pose
+from scenewright.stages.ingest.preflight.looking import Look
+from scenewright.stages.ingest.preflight.registration import depth_jumps
+from scenewright.stages.ingest.preflight.reprojection import projected
+from scenewright.stages.kit.geometry.cameras import back_project
 
 WIDTH = 400
 """Of a picture on the page [pixels]."""

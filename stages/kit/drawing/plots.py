@@ -14,13 +14,12 @@ import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
-
-from schemas.contact_graph import ContactGraphFile  # noqa: E402
-from schemas.scene_parts import TREE_RELATIONS  # noqa: E402
-from stages.kit.drawing.palette import RELATION_COLORS  # noqa: E402
-from stages.kit.drawing.tree_layout import tree_layout  # noqa: E402
-from stages.kit.geometry.boxes import polygon_area  # noqa: E402
-from stages.kit.measurement.edge_agreement import Edge  # noqa: E402
+from scenewright.schemas.contact_graph import ContactGraphFile  # noqa: E402
+from scenewright.schemas.scene_parts import TREE_RELATIONS  # noqa: E402
+from scenewright.stages.kit.drawing.palette import RELATION_COLORS  # noqa: E402
+from scenewright.stages.kit.drawing.tree_layout import tree_layout  # noqa: E402
+from scenewright.stages.kit.geometry.boxes import polygon_area  # noqa: E402
+from scenewright.stages.kit.measurement.edge_agreement import Edge  # noqa: E402
 
 SERIES_COLORS = ("#2f6fb3", "#e08a2e", "#4d9a6a", "#7a4fb0", "#b0413e")
 NAMED_FROM_AREA = 0.12

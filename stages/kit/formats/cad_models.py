@@ -12,12 +12,11 @@ from typing import cast
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
-
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.errors import BadInput
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.geometry.transforms import transform_from
 
 MODEL_FILE = "model.json"
 URDF_FILE = "model.urdf"

@@ -17,12 +17,11 @@ from google.protobuf.message import DecodeError
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import build_file_descriptor_set
-
-from schemas.errors import BadInput
-from stages.kit.formats import foxglove
-from stages.kit.formats.frames import CAMERA_NAME
-from stages.kit.formats.indexed_mcap import IndexedMcap, Location
-from stages.kit.stereo.disparity_map import DisparityMap
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.frames import CAMERA_NAME
+from scenewright.stages.kit.formats.indexed_mcap import IndexedMcap, Location
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
 ENCODINGS = {"disparity": "32FC1", "confidence": "mono8"}
 _TOPIC = re.compile(rf"/({CAMERA_NAME.pattern})/({'|'.join(ENCODINGS)})")

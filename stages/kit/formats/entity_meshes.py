@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.mesh_files import read_mesh
 
 
 @dataclass(frozen=True)

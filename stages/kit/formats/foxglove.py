@@ -11,10 +11,9 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-
-from schemas.scene_parts import Camera
-from stages.kit.formats.image_headers import may_be_decoded
-from stages.kit.geometry.transforms import quaternion_of, transform_from_quaternion
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.image_headers import may_be_decoded
+from scenewright.stages.kit.geometry.transforms import quaternion_of, transform_from_quaternion
 
 JPEG_QUALITY = 95
 JPEG_START = b"\xff\xd8\xff"

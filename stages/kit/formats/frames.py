@@ -25,13 +25,12 @@ from google.protobuf.message import DecodeError
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import build_file_descriptor_set
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry, Sequence
-from stages.kit.formats import foxglove
-from stages.kit.formats.indexed_mcap import IndexedMcap, Location
-from stages.kit.geometry.transforms import is_rigid
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import LabelEntry, Sequence
+from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.indexed_mcap import IndexedMcap, Location
+from scenewright.stages.kit.geometry.transforms import is_rigid
 
 TRANSFORMS = "/tf"
 WORLD_FRAME, CAMERA_FRAME = "world", "camera"

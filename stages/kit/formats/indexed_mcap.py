@@ -18,11 +18,10 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, MessageIndex, Schema
-
-from schemas.errors import BadInput
-from schemas.outside import opened
-from stages.kit.formats.bounded_unpacking import unpacked
-from stages.kit.formats.chunk_cache import ChunkCache
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.kit.formats.bounded_unpacking import unpacked
+from scenewright.stages.kit.formats.chunk_cache import ChunkCache
 
 HINT = "make the artifact again; `scenewright verify` tells which file changed"
 LARGEST_CHUNK = 256 << 20

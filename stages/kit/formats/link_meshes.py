@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.part_colors import vertex_colors
-from stages.kit.formats.urdf_file import Link, Shape
-from stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.part_colors import vertex_colors
+from scenewright.stages.kit.formats.urdf_file import Link, Shape
+from scenewright.stages.kit.geometry.transforms import apply
 
 GREY = (0.6, 0.6, 0.6, 1.0)
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.urdf_file import Urdf, UrdfJoint
+from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.formats.urdf_file import Urdf, UrdfJoint
-from stages.kit.geometry.transforms import transform_from
 
 
 def link_poses(urdf: Urdf, values: dict[str, float]) -> dict[str, np.ndarray]:

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-
-from stages.kit.formats.ply_files import ColoredMesh
+from scenewright.stages.kit.formats.ply_files import ColoredMesh
 
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 

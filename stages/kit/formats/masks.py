@@ -11,10 +11,9 @@ from types import TracebackType
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_decoded
-from stages.kit.formats.zip_files import find_entry, zip_errors
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_decoded
+from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ID = (1 << 24) - 1
 REMAKE = "run `scenewright segment` again"

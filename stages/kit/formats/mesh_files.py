@@ -20,10 +20,9 @@ from typing import Any, cast
 
 import numpy as np
 import trimesh
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.formats.image_headers import LARGEST_IMAGE, image_size, may_be_decoded
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, image_size, may_be_decoded
 
 LARGEST_FILE = 4 * 2**30
 """Bytes."""

@@ -7,10 +7,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-
-from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, number, numbers
-from stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
-from stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, number, numbers
+from scenewright.stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
+from scenewright.stages.kit.geometry.transforms import quaternion_of
 
 KEY_FRAME = "reconstructed"
 

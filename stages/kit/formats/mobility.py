@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from stages.kit.formats.scene_supports import resting_height
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.stages.kit.formats.scene_supports import resting_height
 
 STANDS = ("supports", "contains")
 BUILT_IN = frozenset(

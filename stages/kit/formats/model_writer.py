@@ -9,12 +9,11 @@ from typing import Protocol
 
 import numpy as np
 import trimesh
-
-from schemas.cad_library import CadModel
-from stages.kit.formats.cad_models import MODEL_FILE, URDF_FILE
-from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
-from stages.kit.geometry.solids import MassProperties, Solid
-from stages.kit.geometry.transforms import transform_from
+from scenewright.schemas.cad_library import CadModel
+from scenewright.stages.kit.formats.cad_models import MODEL_FILE, URDF_FILE
+from scenewright.stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
+from scenewright.stages.kit.geometry.solids import MassProperties, Solid
+from scenewright.stages.kit.geometry.transforms import transform_from
 
 HINGE_DAMPING, SLIDE_DAMPING = 0.3, 4.0
 """[N m s/rad], [N s/m]: a door or drawer that is let go comes to rest within a second or two."""

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-from schemas.errors import BadInput
-from stages.kit.formats.safetensors_file import write_safetensors
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.safetensors_file import write_safetensors
 
 COUNTER = "num_batches_tracked"
 """Of batch normalisation; not needed to use a network, and not written."""

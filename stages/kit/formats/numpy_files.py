@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import opened
-from stages.kit.formats.zip_files import find_entry, zip_errors
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ARRAY = 8 * 2**30
 """Bytes. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""

@@ -8,11 +8,10 @@ from typing import cast
 
 import numpy as np
 import trimesh
-
-from schemas.cad_library import CadModel
-from schemas.cad_scene import CadCandidate
-from stages.kit.formats.cad_models import load_visual_parts, part_transforms, posed_mesh
-from stages.kit.formats.part_colors import recolored, vertex_colors
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.cad_scene import CadCandidate
+from scenewright.stages.kit.formats.cad_models import load_visual_parts, part_transforms, posed_mesh
+from scenewright.stages.kit.formats.part_colors import recolored, vertex_colors
 
 
 def painted_mesh(

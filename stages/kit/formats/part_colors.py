@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.model_writer import write_obj
-from stages.kit.formats.urdf_file import Shape
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.model_writer import write_obj
+from scenewright.stages.kit.formats.urdf_file import Shape
 
 
 def recolored(colors: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> np.ndarray:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
 
 _VERTEX = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
 _FACE = np.dtype([("count", "u1"), ("indices", "<i4", (3,))])

@@ -10,8 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 LONGEST_PIECES = 7
 """Pieces of five bits that a run of at most 2^31 takes."""

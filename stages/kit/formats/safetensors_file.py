@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import file_content, json_of
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content, json_of
 
 TYPES: dict[str, str] = {
     "F64": "<f8",

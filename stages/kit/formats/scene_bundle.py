@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_transform
-from schemas.cad_library import CadModel
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.errors import BadInput
-from schemas.interactive_scene import InteractiveSceneFile, SceneBody
-from schemas.scene_parts import Box
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.mjcf_file import write_mjcf
-from stages.kit.formats.scene_links import (
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.mjcf_file import write_mjcf
+from scenewright.stages.kit.formats.scene_links import (
     BodyLinks,
     box_links,
     cut_links,
@@ -28,13 +27,13 @@ from stages.kit.formats.scene_links import (
     own_visual,
     still_mesh_links,
 )
-from stages.kit.formats.scene_supports import carried_by, resting_height
-from stages.kit.formats.urdf_check import NAME, require_sound
-from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
-from stages.kit.geometry.boxes import box_yaw
-from stages.kit.geometry.layout_slabs import Slab, slabs_of_layout
-from stages.kit.geometry.substances import substance_of
-from stages.kit.geometry.transforms import inverse, is_rigid
+from scenewright.stages.kit.formats.scene_supports import carried_by, resting_height
+from scenewright.stages.kit.formats.urdf_check import NAME, require_sound
+from scenewright.stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
+from scenewright.stages.kit.geometry.boxes import box_yaw
+from scenewright.stages.kit.geometry.layout_slabs import Slab, slabs_of_layout
+from scenewright.stages.kit.geometry.substances import substance_of
+from scenewright.stages.kit.geometry.transforms import inverse, is_rigid
 
 WORLD = "world"
 

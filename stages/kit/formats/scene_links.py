@@ -9,20 +9,31 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Box, Joint
+from scenewright.stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
+from scenewright.stages.kit.formats.model_writer import write_obj
+from scenewright.stages.kit.formats.part_colors import recolored_shapes, vertex_colors
+from scenewright.stages.kit.formats.scene_supports import (
+    Carried,
+    cut_below,
+    furniture_pieces,
+    levelled,
+    pads,
+    standing_points,
+)
+from scenewright.stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
+from scenewright.stages.kit.geometry.box_cover import cover_with_boxes
+from scenewright.stages.kit.geometry.layout_slabs import Slab
+from scenewright.stages.kit.geometry.solids import MassProperties, Solid, box, hull_or_box, mass_properties
+from scenewright.stages.kit.geometry.transforms import (
+    inverse,
+    transform_from,
+    transform_from_quaternion,
+    transform_from_yaw,
+)
 from scipy.spatial.transform import Rotation
-
-from schemas.cad_library import CadModel
-from schemas.errors import BadInput
-from schemas.scene_parts import Box, Joint
-from stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
-from stages.kit.formats.model_writer import write_obj
-from stages.kit.formats.part_colors import recolored_shapes, vertex_colors
-from stages.kit.formats.scene_supports import Carried, cut_below, furniture_pieces, levelled, pads, standing_points
-from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
-from stages.kit.geometry.box_cover import cover_with_boxes
-from stages.kit.geometry.layout_slabs import Slab
-from stages.kit.geometry.solids import MassProperties, Solid, box, hull_or_box, mass_properties
-from stages.kit.geometry.transforms import inverse, transform_from, transform_from_quaternion, transform_from_yaw
 
 LAYOUT_DENSITY = 1000.0
 GREY = (0.6, 0.6, 0.6, 1.0)

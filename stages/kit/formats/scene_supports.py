@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.geometry.boxes import box_yaw
+from scenewright.stages.kit.geometry.convex_pieces import convex_pieces
 from shapely import contains_xy
 from shapely.geometry import MultiPoint, Polygon
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import Box
-from stages.kit.geometry.boxes import box_yaw
-from stages.kit.geometry.convex_pieces import convex_pieces
 
 LARGEST_STEP = 0.04
 """What a surface may stick out of the plane that stands for it, or a thing hover over it [m]: twice the usual voxel."""

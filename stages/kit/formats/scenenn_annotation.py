@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.formats.xml_files import parse_xml
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.xml_files import parse_xml
 
 LARGEST_FILE = 64 * 2**20
 """Bytes. A scene has a few hundred labels."""

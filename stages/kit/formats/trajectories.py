@@ -6,11 +6,10 @@ import re
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_text
+from scenewright.stages.kit.geometry.transforms import is_rigid
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from schemas.outside import file_text
-from stages.kit.geometry.transforms import is_rigid
 
 INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 LARGEST_TEXT = 200_000_000

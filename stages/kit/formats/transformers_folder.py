@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from schemas.errors import BadInput, MissingDependency
-from schemas.outside import file_json
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.outside import file_json
 
 LARGEST_CONFIG = 16 * 2**20
 """Bytes."""

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.urdf_file import JOINT_TYPES, Link, Shape, Urdf, UrdfJoint, parse_urdf
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.urdf_file import JOINT_TYPES, Link, Shape, Urdf, UrdfJoint, parse_urdf
 
 NAME = re.compile(r"[A-Za-z0-9_.\-]+")
 READ_MESHES = (".obj", ".stl", ".ply", ".glb")

@@ -10,14 +10,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.xml_files import parse_xml
+from scenewright.stages.kit.geometry.solids import MassProperties
+from scenewright.stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
+from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.formats.xml_files import parse_xml
-from stages.kit.geometry.solids import MassProperties
-from stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
-from stages.kit.geometry.transforms import transform_from
 
 JOINT_TYPES = ("fixed", "floating", "revolute", "continuous", "prismatic")
 MAXIMUM_BYTES = 64 * 2**20

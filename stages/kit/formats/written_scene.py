@@ -7,12 +7,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-
-from schemas.interactive_scene import InteractiveSceneFile
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.link_meshes import Surface, link_surfaces
-from stages.kit.formats.link_poses import link_poses
-from stages.kit.formats.urdf_file import Urdf, parse_urdf
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.link_meshes import Surface, link_surfaces
+from scenewright.stages.kit.formats.link_poses import link_poses
+from scenewright.stages.kit.formats.urdf_file import Urdf, parse_urdf
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 DEEPEST = 200
 """Levels of nesting; deeper trees would exhaust Python's stack when they are written."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 DEFLATE_LIMIT = 1032
 """Deflate never packs more than this many bytes into one."""

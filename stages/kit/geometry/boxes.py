@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scenewright.schemas.hand_written import UprightBox
+from scenewright.schemas.scene_parts import Box
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
-
-from schemas.hand_written import UprightBox
-from schemas.scene_parts import Box
 
 TILT_TOLERANCE = 1e-6
 """How far (as 1 - cosine) a box's z axis may lean before it no longer counts as gravity-aligned."""

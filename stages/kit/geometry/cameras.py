@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 
 def intrinsic_matrix(camera: Camera) -> np.ndarray:

@@ -10,10 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.cells import cell_keys
-from stages.kit.geometry.planes import PlaneFit, plane_distances, ransac_plane
-from stages.kit.geometry.transforms import rotation_between, transform_from
+from scenewright.stages.kit.geometry.cells import cell_keys
+from scenewright.stages.kit.geometry.planes import PlaneFit, plane_distances, ransac_plane
+from scenewright.stages.kit.geometry.transforms import rotation_between, transform_from
 
 MAXIMUM_TILT = math.radians(35.0)
 """Largest angle between the floor's normal and the cameras' mean up."""

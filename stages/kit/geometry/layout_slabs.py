@@ -11,12 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_vector
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import Box, SurfacePlane
-from stages.kit.geometry.boxes import box_corners, box_rotation
-from stages.kit.geometry.transforms import transform_from, transform_from_quaternion
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import Box, SurfacePlane
+from scenewright.stages.kit.geometry.boxes import box_corners, box_rotation
+from scenewright.stages.kit.geometry.transforms import transform_from, transform_from_quaternion
 
 FLOOR_THICKNESS = 0.2
 FLOOR_MARGIN = 0.5

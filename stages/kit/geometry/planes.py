@@ -7,10 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import SurfacePlane
-from stages.kit.geometry.boxes import minimum_rectangle, polygon_area
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.kit.geometry.boxes import minimum_rectangle, polygon_area
 
 UPWARD = 0.9
 """A normal (or the z axis of a frame) whose z is above this points up [-]."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.cells import row_keys
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-
-from schemas.errors import BadInput
-from stages.kit.geometry.cells import row_keys
 
 MOST_SAMPLES = 50_000_000
 """Points on the large triangles of one mesh: 2,500 m^2 at a centimetre."""

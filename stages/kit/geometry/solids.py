@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import apply
 from scipy.spatial import ConvexHull, QhullError
-
-from stages.kit.geometry.transforms import apply
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
 
 STRIDE_ANGLE = 0.014
 """Angle between neighbouring samples [rad]: 8 pixels of a Kinect at 640x480."""

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.errors import BadInput
-from schemas.sequence import Gravity
-from stages.kit.geometry.gravity import (
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Gravity
+from scenewright.stages.kit.geometry.gravity import (
     AXES,
     find_floor,
     grid_samples,
@@ -20,7 +19,7 @@ from stages.kit.geometry.gravity import (
     upright_from_floor,
     wall_yaw,
 )
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 GRID = 0.05
 CLOUD = Callable[[], tuple[np.ndarray, np.ndarray]]

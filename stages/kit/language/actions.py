@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 from pydantic import Field
-
-from schemas.base import Model
-from schemas.plan import Failure
+from scenewright.schemas.base import Model
+from scenewright.schemas.plan import Failure
 
 LONGEST_NAME = 200
 """Characters of a name that are said: as many as a scene's names may have; a model's own may be of any length."""

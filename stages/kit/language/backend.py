@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from schemas.base import canonical_json
-from stages.kit.language.messages import Image, Message, described
-from stages.kit.language.reply_schema import ReplySchema
+from scenewright.schemas.base import canonical_json
+from scenewright.stages.kit.language.messages import Image, Message, described
+from scenewright.stages.kit.language.reply_schema import ReplySchema
 
 CHARACTERS_PER_TOKEN = 4
 """Rule of thumb for English and JSON, where a server does not count."""

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from schemas.language import LanguageRecord
-from schemas.plan import Failure
-from stages.kit.language.backend import Backend, RawReply, Request
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import Message, say
-from stages.kit.language.reply_schema import DoesNotFollow, ReplySchema
-from stages.kit.language.reply_text import Unreadable, objects_in
+from scenewright.schemas.language import LanguageRecord
+from scenewright.schemas.plan import Failure
+from scenewright.stages.kit.language.backend import Backend, RawReply, Request
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import Message, say
+from scenewright.stages.kit.language.reply_schema import DoesNotFollow, ReplySchema
+from scenewright.stages.kit.language.reply_text import Unreadable, objects_in
 
 T = TypeVar("T")
 

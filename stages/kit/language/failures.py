@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
-from schemas.plan import Failure
+from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
+from scenewright.schemas.plan import Failure
 
 EXIT_CODES = {
     "unreadable_reply": BadInput.exit_code,

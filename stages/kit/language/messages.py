@@ -6,8 +6,8 @@ import hashlib
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from schemas.errors import BadInput
-from stages.kit.formats.image_headers import PNG_START, may_be_decoded
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.image_headers import PNG_START, may_be_decoded
 
 Role = Literal["system", "user", "assistant"]
 LARGEST_IMAGE_BYTES = 20 * 2**20

@@ -11,11 +11,11 @@ import base64
 import json
 from typing import Any, Literal, TypeGuard
 
-from schemas.errors import BadInput
-from stages.kit.language.backend import RawReply, Request, Usage, estimated_usage
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import Image, Message, Text, say
-from stages.kit.services.connection import Answer, Connection, GivenUp, Refused, TryAgain
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.language.backend import RawReply, Request, Usage, estimated_usage
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import Image, Message, Text, say
+from scenewright.stages.kit.services.connection import Answer, Connection, GivenUp, Refused, TryAgain
 
 PATH = "/chat/completions"
 LARGEST_BODY = 8 * 2**20

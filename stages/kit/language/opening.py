@@ -8,15 +8,20 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from schemas.errors import BadInput, MissingDependency, UsageError
-from stages.kit.language.backend import Backend
-from stages.kit.language.chat import Chat, ChatSettings
-from stages.kit.language.openai_compatible import LARGEST_BODY, LONGEST_WAIT, REFUSED_HINT, OpenAICompatibleBackend
-from stages.kit.language.options import LanguageParameters
-from stages.kit.language.recorded import RecordedBackend, RecordingBackend
-from stages.kit.language.transcripts import Transcript, TranscriptFile, read_transcript
-from stages.kit.services.address import stays_on_this_machine
-from stages.kit.services.connection import Connection
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.stages.kit.language.backend import Backend
+from scenewright.stages.kit.language.chat import Chat, ChatSettings
+from scenewright.stages.kit.language.openai_compatible import (
+    LARGEST_BODY,
+    LONGEST_WAIT,
+    REFUSED_HINT,
+    OpenAICompatibleBackend,
+)
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.language.recorded import RecordedBackend, RecordingBackend
+from scenewright.stages.kit.language.transcripts import Transcript, TranscriptFile, read_transcript
+from scenewright.stages.kit.services.address import stays_on_this_machine
+from scenewright.stages.kit.services.connection import Connection
 
 
 def open_chat(

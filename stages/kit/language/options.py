@@ -7,9 +7,8 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
-
-from stages.kit.services.address import check_address
-from stages.kit.stage import NOT_SHOWN, Parameters
+from scenewright.stages.kit.services.address import check_address
+from scenewright.stages.kit.stage import NOT_SHOWN, Parameters
 
 ADDRESS_FORM = "http://HOST:PORT/v1"
 

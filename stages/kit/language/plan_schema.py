@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from stages.kit.language.actions import MOST_CALLS, ActionLanguage, ActionType, PlanReply, check_calls
-from stages.kit.language.reply_schema import DoesNotFollow, ReplySchema, schema_of
+from scenewright.stages.kit.language.actions import MOST_CALLS, ActionLanguage, ActionType, PlanReply, check_calls
+from scenewright.stages.kit.language.reply_schema import DoesNotFollow, ReplySchema, schema_of
 
 
 def plan_schema(language: ActionLanguage, *, closed_names: bool = False) -> ReplySchema[PlanReply]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 
-from stages.kit.language.backend import Backend, RawReply, Request
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import described
-from stages.kit.language.transcripts import Transcript, TranscriptFile, exchange_of
+from scenewright.stages.kit.language.backend import Backend, RawReply, Request
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import described
+from scenewright.stages.kit.language.transcripts import Transcript, TranscriptFile, exchange_of
 
 LONGEST_EXCERPT = 80
 """Characters of a prompt in an error."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from stages.kit.language.backend import RawReply, Request, estimated_usage
+from scenewright.stages.kit.language.backend import RawReply, Request, estimated_usage
 
 
 class ScriptedBackend:

@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError
-
-from schemas.base import Model
-from schemas.errors import BadInput, MachineFailure, first_problem
-from schemas.outside import check_integers, file_content
-from stages.kit.language.backend import RawReply, Request, Usage, request_digest
-from stages.kit.language.messages import described
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, MachineFailure, first_problem
+from scenewright.schemas.outside import check_integers, file_content
+from scenewright.stages.kit.language.backend import RawReply, Request, Usage, request_digest
+from scenewright.stages.kit.language.messages import described
 
 LARGEST_TRANSCRIPT = 512 * 2**20
 """Bytes."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.cad_scene import CadCandidate, Replacement
-from stages.kit.measurement.shape_symmetry import rotation_angle
+from scenewright.schemas.cad_scene import CadCandidate, Replacement
+from scenewright.stages.kit.measurement.shape_symmetry import rotation_angle
 
 
 def candidates_of(replacement: Replacement) -> list[tuple[str, CadCandidate]]:

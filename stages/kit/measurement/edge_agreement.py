@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import TREE_RELATIONS
 
 DIRECTED = TREE_RELATIONS
 Edge = tuple[str, str, str]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.geometry.layout_slabs import Slab, slabs_of_layout
-from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.geometry.layout_slabs import Slab, slabs_of_layout
+from scenewright.stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
 
 
 def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, list[ConvexPiece]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.scene_parts import Relation
+from scenewright.schemas.scene_parts import Relation
 
 
 def evidence(link: Relation) -> str:

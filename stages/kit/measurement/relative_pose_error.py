@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.measurement.pose_error import associate
+from scenewright.stages.kit.measurement.pose_error import associate
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-
-from stages.kit.measurement.convex_overlap import ConvexPiece, penetration_depth, shared_volume
+from scenewright.stages.kit.measurement.convex_overlap import ConvexPiece, penetration_depth, shared_volume
 
 COLLISION_DEPTH = 0.005
 """Pairs deeper than this collide [m]."""

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-
-from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import inverse
-from stages.kit.motion.arm_motion import ARM_RESOLUTION, ArmModel, ArmPlanner, Tally
-from stages.kit.motion.cartesian import follow
-from stages.kit.motion.collision import Collision
-from stages.kit.motion.doors import ContactPoint, tool_poses
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.rrt_connect import densify
-from stages.kit.motion.segments import Manipulation, Segment, whole_body
-from stages.kit.simulation.robot import Configuration, Robot, base_pose
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.motion.arm_motion import ARM_RESOLUTION, ArmModel, ArmPlanner, Tally
+from scenewright.stages.kit.motion.cartesian import follow
+from scenewright.stages.kit.motion.collision import Collision
+from scenewright.stages.kit.motion.doors import ContactPoint, tool_poses
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.rrt_connect import densify
+from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_body
+from scenewright.stages.kit.simulation.robot import Configuration, Robot, base_pose
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 STANDOFF = 0.07
 ARC_STEP = 0.05

@@ -8,18 +8,17 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse, transform_from_yaw
-from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
-from stages.kit.motion.cartesian import follow, straight_poses
-from stages.kit.motion.collision import Collision, CollisionChecker
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import ArmChain, forward, inverse_kinematics, random_starts, reach
-from stages.kit.motion.path_query import Query
-from stages.kit.motion.path_search import find_path
-from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
-from stages.kit.simulation.robot import base_pose
-from stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
+from scenewright.stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
+from scenewright.stages.kit.motion.cartesian import follow, straight_poses
+from scenewright.stages.kit.motion.collision import Collision, CollisionChecker
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import ArmChain, forward, inverse_kinematics, random_starts, reach
+from scenewright.stages.kit.motion.path_query import Query
+from scenewright.stages.kit.motion.path_search import find_path
+from scenewright.stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
+from scenewright.stages.kit.simulation.robot import base_pose
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 WRIST, AS_CARRIED = 3, 1.0
 """Joints that turn the hand alone, and how far those before them are from where the arm carries, at most, in an arm

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse, wrapped
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import ArmChain, shoulder_height
-from stages.kit.motion.path_query import Query
-from stages.kit.motion.path_search import find_path
-from stages.kit.motion.rrt_connect import SearchSpace
-from stages.kit.simulation.robot import base_pose
-from stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.kit.geometry.transforms import inverse, wrapped
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import ArmChain, shoulder_height
+from scenewright.stages.kit.motion.path_query import Query
+from scenewright.stages.kit.motion.path_search import find_path
+from scenewright.stages.kit.motion.rrt_connect import SearchSpace
+from scenewright.stages.kit.simulation.robot import base_pose
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 BASE_RESOLUTION = np.array([0.03, 0.03, 0.06])
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import ArmChain, inverse_kinematics
 from scipy.spatial.transform import Rotation, Slerp
-
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import ArmChain, inverse_kinematics
 
 LARGEST_JUMP = 0.35
 """A joint that turns more than this [rad] between neighbouring poses has changed to another branch of solutions."""

@@ -10,15 +10,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
-from stages.kit.motion.compiled_check import FREE, find_collision
-from stages.kit.motion.compiled_model import CompiledModel
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.robot import Robot
-from stages.kit.simulation.robot_description import PEDESTAL_LINK
-from stages.kit.simulation.world import Contact, PhysicsWorld
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
+from scenewright.stages.kit.motion.compiled_check import FREE, find_collision
+from scenewright.stages.kit.motion.compiled_model import CompiledModel
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.robot import Robot
+from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK
+from scenewright.stages.kit.simulation.world import Contact, PhysicsWorld
 
 _SCENE, _ROBOT, _CARRIED = 1, 2, 4
 RESTING_DEPTH = 0.008

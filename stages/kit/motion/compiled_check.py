@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from stages.kit.motion.compiled_arrays import (
+from scenewright.stages.kit.motion.compiled_arrays import (
     ARM,
     BASE_X,
     BASE_Y,
@@ -21,7 +20,7 @@ from stages.kit.motion.compiled_arrays import (
     RobotArrays,
     SceneArrays,
 )
-from stages.kit.motion.convex_distance import Hull, convex_distance
+from scenewright.stages.kit.motion.convex_distance import Hull, convex_distance
 
 FREE, UNCERTAIN, HIT = 0, 1, 2
 UNSURE = 0.004

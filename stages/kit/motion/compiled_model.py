@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from
-from stages.kit.motion.compiled_arrays import CHECK, RESTING, SKIP, RobotArrays, SceneArrays
-from stages.kit.motion.compiled_check import link_frames
-from stages.kit.motion.convex_pieces import ConvexPiece, link_pieces
-from stages.kit.motion.kinematics import arm_chain
-from stages.kit.simulation.robot import Robot
-from stages.kit.simulation.robot_description import PEDESTAL_LINK, mobile_robot_urdf
-from stages.kit.simulation.world import LoadedBody, PhysicsWorld
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
+from scenewright.stages.kit.motion.compiled_arrays import CHECK, RESTING, SKIP, RobotArrays, SceneArrays
+from scenewright.stages.kit.motion.compiled_check import link_frames
+from scenewright.stages.kit.motion.convex_pieces import ConvexPiece, link_pieces
+from scenewright.stages.kit.motion.kinematics import arm_chain
+from scenewright.stages.kit.simulation.robot import Robot
+from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK, mobile_robot_urdf
+from scenewright.stages.kit.simulation.world import LoadedBody, PhysicsWorld
 
 HULL_MARGIN = 0.001
 """By which Bullet widens every convex hull [m]."""

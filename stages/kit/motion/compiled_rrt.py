@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
-from stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
-from stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_collision
+from scenewright.stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
+from scenewright.stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_collision
 
 UNCERTAIN_COUNT = 0
 """Place in the counts of refusals that the mesh checker might not share; the others follow."""

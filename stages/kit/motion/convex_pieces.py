@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-
-from stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
-from stages.kit.simulation.shapes import link_shapes
+from scenewright.stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
+from scenewright.stages.kit.simulation.shapes import link_shapes
 
 MOST_BALLS = 10
 SMALLEST_BALL = 0.045

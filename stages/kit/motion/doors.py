@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from schemas.scene_parts import Joint
+from scenewright.schemas.scene_parts import Joint
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,11 @@
-"""How motion planning says no: an exception that carries the typed record of schemas.plan."""
+"""How motion planning says no: an exception that carries the typed record of scenewright.schemas.plan."""
 
 from __future__ import annotations
 
 from collections import Counter
 
 import numpy as np
-
-from schemas.plan import Failure
+from scenewright.schemas.plan import Failure
 
 
 class MotionFailed(Exception):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.geometry.transforms import apply, inverse
 
 FINGER_DEPTH = 0.032
 """How far the tool point can go in behind the front of an item before the palm touches it [m]."""

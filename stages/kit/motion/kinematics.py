@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scenewright.stages.kit.simulation.robot_description import RobotDescription, joints_between
+from scenewright.stages.kit.simulation.urdf_split import read_urdf
 from scipy.spatial.transform import Rotation
-
-from stages.kit.simulation.robot_description import RobotDescription, joints_between
-from stages.kit.simulation.urdf_split import read_urdf
 
 POSITION_TOLERANCE = 1e-4
 ROTATION_TOLERANCE = 1e-3

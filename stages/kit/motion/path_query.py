@@ -8,12 +8,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.motion.collision import Collision, CollisionChecker
-from stages.kit.motion.compiled_check import FREE, find_collision
-from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, Moving, shorten, way_is_free
-from stages.kit.motion.failures import end_in_collision, joint_limit
-from stages.kit.motion.rrt_connect import FINER, SearchSpace, densify, first_collision
+from scenewright.stages.kit.motion.collision import Collision, CollisionChecker
+from scenewright.stages.kit.motion.compiled_check import FREE, find_collision
+from scenewright.stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, Moving, shorten, way_is_free
+from scenewright.stages.kit.motion.failures import end_in_collision, joint_limit
+from scenewright.stages.kit.motion.rrt_connect import FINER, SearchSpace, densify, first_collision
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.compiled_rrt import search
-from stages.kit.motion.failures import MotionFailed, no_path
-from stages.kit.motion.path_query import (
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.compiled_rrt import search
+from scenewright.stages.kit.motion.failures import MotionFailed, no_path
+from scenewright.stages.kit.motion.path_query import (
     Effort,
     Query,
     blockers,
@@ -26,7 +25,7 @@ from stages.kit.motion.path_query import (
     refusal_counts,
     shorten_path,
 )
-from stages.kit.motion.rrt_connect import FINER, first_collision, interpolate, rrt_connect, without_repeats
+from scenewright.stages.kit.motion.rrt_connect import FINER, first_collision, interpolate, rrt_connect, without_repeats
 
 STEP = 16
 """Longest extension of a tree, in resolutions."""

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.recording import Recording
-from stages.kit.motion.segments import Segment
-from stages.kit.motion.timing import sample_times, time_path
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.robot import Configuration, Robot
-from stages.kit.simulation.robot_description import RobotDescription
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.recording import Recording
+from scenewright.stages.kit.motion.segments import Segment
+from scenewright.stages.kit.motion.timing import sample_times, time_path
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.robot import Configuration, Robot
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 CONTROL_STEPS = 2
 """Physics steps per control step (120 Hz)."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from_quaternion
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.robot import Robot
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.kit.geometry.transforms import transform_from_quaternion
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.robot import Robot
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 
 @dataclass(frozen=True)

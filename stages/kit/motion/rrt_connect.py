@@ -15,10 +15,9 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import MissingDependency
-from stages.kit.motion.collision import Collision
-from stages.kit.motion.failures import end_in_collision, joint_limit, no_path
+from scenewright.schemas.errors import MissingDependency
+from scenewright.stages.kit.motion.collision import Collision
+from scenewright.stages.kit.motion.failures import end_in_collision, joint_limit, no_path
 
 FINER = 3
 """A path is accepted when it is free at this many times the resolution of the search."""

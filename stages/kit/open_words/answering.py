@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.language_map import LanguageMapFile
-from stages.kit.open_words.calibration import Calibration
-from stages.kit.open_words.relevancy import TEMPERATURE, margins, relevancy
-from stages.kit.open_words.vectors import Vectors
+from scenewright.schemas.language_map import LanguageMapFile
+from scenewright.stages.kit.open_words.calibration import Calibration
+from scenewright.stages.kit.open_words.relevancy import TEMPERATURE, margins, relevancy
+from scenewright.stages.kit.open_words.vectors import Vectors
 
 MOST_ANSWERS = 20
 SHARED = 0.3

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import file_toml
-from schemas.vocabulary import load_vocabulary
-from stages.kit.open_words.encoder import Encoder
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_toml
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.open_words.encoder import Encoder
 
 FILE = "words/calibration.toml"
 """Below data/."""

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-from schemas.errors import BadInput, UsageError
-from stages.kit.formats.network_file import put_tensors, write_network
-from stages.kit.formats.safetensors_file import read_safetensors
-from stages.kit.open_words.two_towers import SIDE, WIDTH, TwoTowers, tokens, words_of
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.kit.formats.network_file import put_tensors, write_network
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors
+from scenewright.stages.kit.open_words.two_towers import SIDE, WIDTH, TwoTowers, tokens, words_of
 
 FORMAT = "scenewright two towers"
 VERSION = "2"

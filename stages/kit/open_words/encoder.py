@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-
-from schemas.errors import BadInput, UsageError
+from scenewright.schemas.errors import BadInput, UsageError
 
 LONGEST_TEXT = 200
 """Characters of a query."""

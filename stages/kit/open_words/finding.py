@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.language_map import LanguageMap, LanguageMapFile
-from schemas.vocabulary import UNNAMED
-from stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
-from stages.kit.open_words.calibration import NAMED_SPLAT, Calibration, calibration_of, recognised
-from stages.kit.open_words.encoder import Encoder
-from stages.kit.open_words.relations import related
-from stages.kit.open_words.relevancy import query_rows
-from stages.kit.open_words.vectors import read_vectors
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.language_map import LanguageMap, LanguageMapFile
+from scenewright.schemas.vocabulary import UNNAMED
+from scenewright.stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
+from scenewright.stages.kit.open_words.calibration import NAMED_SPLAT, Calibration, calibration_of, recognised
+from scenewright.stages.kit.open_words.encoder import Encoder
+from scenewright.stages.kit.open_words.relations import related
+from scenewright.stages.kit.open_words.relevancy import query_rows
+from scenewright.stages.kit.open_words.vectors import read_vectors
 
 
 def source_of(info: LanguageMapFile) -> str:

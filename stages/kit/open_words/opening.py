@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.errors import MissingDependency
-from stages.kit.open_words.encoder import Encoder
-from stages.kit.open_words.options import EncoderParameters
+from scenewright.schemas.errors import MissingDependency
+from scenewright.stages.kit.open_words.encoder import Encoder
+from scenewright.stages.kit.open_words.options import EncoderParameters
 
 
 def open_encoder(parameters: EncoderParameters, weights: Path | None, device: str = "cpu") -> Encoder:
     """Return an encoder. Raises MissingDependency, BadInput, MachineFailure as it may."""
     if parameters.encoder == "huggingface":
-        from stages.kit.open_words.transformers_encoder import TransformersEncoder
+        from scenewright.stages.kit.open_words.transformers_encoder import TransformersEncoder
 
         if weights is None:
             raise MissingDependency(
@@ -21,9 +21,9 @@ def open_encoder(parameters: EncoderParameters, weights: Path | None, device: st
             )
         return TransformersEncoder(weights, device)
     if parameters.encoder == "service":
-        from stages.kit.open_words.service_encoder import ServiceEncoder
+        from scenewright.stages.kit.open_words.service_encoder import ServiceEncoder
 
         return ServiceEncoder(parameters.encoder_address)
-    from stages.kit.open_words.embedded import BUNDLED, EmbeddedEncoder
+    from scenewright.stages.kit.open_words.embedded import BUNDLED, EmbeddedEncoder
 
     return EmbeddedEncoder(BUNDLED if weights is None else weights)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import TREE_RELATIONS
 
 RELATIONS = {
     "on": r"on top of|standing on|lying on|upon|on",

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.open_words.encoder import Encoder
+from scenewright.stages.kit.open_words.encoder import Encoder
 
 CANONICAL = ("object", "things", "stuff", "texture")
 """Phrases that fit anything: a text is relevant where it fits better than each of these."""

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-
-from schemas.errors import BadInput
-from schemas.outside import json_of
-from stages.kit.open_words.encoder import unit
-from stages.kit.services.connection import Connection
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import json_of
+from scenewright.stages.kit.open_words.encoder import unit
+from scenewright.stages.kit.services.connection import Connection
 
 BATCH = 64
 TIMEOUT, RETRIES, WAIT = 120.0, 3, 1.0

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.transformers_folder import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
     load_tokenizer,
@@ -18,7 +17,7 @@ from stages.kit.formats.transformers_folder import (
     read_config,
     short_name,
 )
-from stages.kit.open_words.encoder import unit
+from scenewright.stages.kit.open_words.encoder import unit
 
 FAMILIES = {
     "clip": ("CLIPModel", "clip", "CLIPImageProcessorPil"),

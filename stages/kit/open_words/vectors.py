@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.language_map import LanguageMap
-from stages.kit.formats.map_files import write_arrays
-from stages.kit.formats.numpy_files import read_arrays
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.stages.kit.formats.map_files import write_arrays
+from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 FILE = "vectors.npz"
 NAMES = ("means", "opacities", "pieces", "regions", "vectors")
@@ -18,7 +17,7 @@ NAMES = ("means", "opacities", "pieces", "regions", "vectors")
 
 @dataclass(frozen=True)
 class Vectors:
-    """See `schemas.language_map.LanguageMap`; vectors as float32."""
+    """See `scenewright.schemas.language_map.LanguageMap`; vectors as float32."""
 
     regions: np.ndarray
     means: np.ndarray

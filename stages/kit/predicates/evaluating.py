@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import permutations
 
-from schemas.errors import BadInput
-from stages.kit.predicates.expressions import Predicate, Tree
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.predicates.expressions import Predicate, Tree
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom
 
 LIMIT = 200_000
 """Steps of the evaluation of one atom, those of the predicates that it names included."""

@@ -12,10 +12,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.errors import BadInput
-from stages.kit.predicates.vocabulary import Vocabulary
-from stages.kit.tasks.pddl_expressions import Expression as Listed
-from stages.kit.tasks.pddl_expressions import parse_expression
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.predicates.vocabulary import Vocabulary
+from scenewright.stages.kit.tasks.pddl_expressions import Expression as Listed
+from scenewright.stages.kit.tasks.pddl_expressions import parse_expression
 
 Tree = tuple["Tree | str | float", ...]
 ARITHMETIC = {"plus": 2, "minus": 2, "times": 2, "over": 2, "abs": 1}

@@ -10,14 +10,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Box
-from stages.kit.geometry.transforms import transform_from_quaternion
-from stages.kit.motion.kinematics import arm_chain, reach, shoulder_height
-from stages.kit.predicates.vocabulary import Vocabulary
-from stages.kit.simulation.robot_description import RobotDescription
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.geometry.transforms import transform_from_quaternion
+from scenewright.stages.kit.motion.kinematics import arm_chain, reach, shoulder_height
+from scenewright.stages.kit.predicates.vocabulary import Vocabulary
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 Point = tuple[float, float, float]
 ROOM_WORDS = Vocabulary(

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-
-from stages.kit.registration.pyramid import Level, Pyramid
-from stages.kit.registration.rigid_motion import exponential, orthonormal
+from scenewright.stages.kit.registration.pyramid import Level, Pyramid
+from scenewright.stages.kit.registration.rigid_motion import exponential, orthonormal
 
 PARAMETERS = 8
 """Rotation, translation, gain and bias."""

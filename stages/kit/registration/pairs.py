@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.alignment import Alignment, align
-from stages.kit.registration.pose_graph import Edge
-from stages.kit.registration.pyramid import Pyramid
-from stages.kit.registration.rigid_motion import angle_of, distance_of, inverses
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.alignment import Alignment, align
+from scenewright.stages.kit.registration.pose_graph import Edge
+from scenewright.stages.kit.registration.pyramid import Pyramid
+from scenewright.stages.kit.registration.rigid_motion import angle_of, distance_of, inverses
 
 SYSTEMATIC = np.array([0.0015] * 3 + [0.003] * 3)
 """Errors that do not average out over pixels (lens, depth scale): standard deviations [rad] and [m]."""

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.rigid_motion import adjoint, exponential, inverses, logarithm, orthonormal
 from scipy.sparse import coo_matrix, csc_matrix, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.rigid_motion import adjoint, exponential, inverses, logarithm, orthonormal
 
 SWITCH = 12.0
 """Phi of dynamic covariance scaling: loop edges whose squared error is above it (6 degrees of freedom, of which two

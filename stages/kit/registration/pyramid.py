@@ -8,8 +8,7 @@ from typing import NamedTuple
 import cv2
 import numba
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 DEPTH_JUMP = 0.04
 """Depths of one surface differ by less than this share within 2x2 pixels, and bend by less along three."""

@@ -7,9 +7,8 @@ A twist is (6,): rotation vector [rad] first, then the translation part [m]. Per
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import inverse
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import inverse
 
 
 def skew(vector: np.ndarray) -> np.ndarray:

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 
 class DepthCamera(NamedTuple):

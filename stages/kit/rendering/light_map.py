@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import open3d as o3d
 from numba import njit, prange
-
-from stages.kit.rendering.surfaces import TriangleSoup
+from scenewright.stages.kit.rendering.surfaces import TriangleSoup
 
 LIGHT_POINTS = 4
 """Every lamp is sampled at so many points squared."""

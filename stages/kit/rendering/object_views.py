@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.point_clouds import clusters
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.rendering.depth_noise import disturb_depth
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scipy.ndimage import binary_erosion
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.point_clouds import clusters
-from stages.kit.geometry.transforms import apply
-from stages.kit.rendering.depth_noise import disturb_depth
-from stages.kit.rendering.ray_casting import SceneRenderer
 
 LEAST_PIXELS = 25
 """Of a mask (ConceptGraphs)."""

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 import open3d as o3d
 import trimesh
-
-from schemas.scene_parts import Camera
-from stages.kit.rendering import shading
-from stages.kit.rendering.light_map import AreaLight, LightMap, SoftLight, bake
-from stages.kit.rendering.patterns import GLOSS, Material
-from stages.kit.rendering.shading import Hits, Surfaces
-from stages.kit.rendering.surfaces import TriangleSoup, build_soup, linear_to_srgb
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.rendering import shading
+from scenewright.stages.kit.rendering.light_map import AreaLight, LightMap, SoftLight, bake
+from scenewright.stages.kit.rendering.patterns import GLOSS, Material
+from scenewright.stages.kit.rendering.shading import Hits, Surfaces
+from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup, linear_to_srgb
 
 BACKGROUND = (0.86, 0.89, 0.92)
 """sRGB where no ray hits."""

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
-
-from stages.kit.rendering.light_map import RAY_DIRECTION, LightMap, lookup
-from stages.kit.rendering.patterns import GLOSS, PATTERN, SHARPNESS, SKIRTING, pattern_factor, pattern_line
+from scenewright.stages.kit.rendering.light_map import RAY_DIRECTION, LightMap, lookup
+from scenewright.stages.kit.rendering.patterns import GLOSS, PATTERN, SHARPNESS, SKIRTING, pattern_factor, pattern_line
 
 MISS = np.uint32(0xFFFFFFFF)
 

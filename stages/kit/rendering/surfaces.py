@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import trimesh
 from numba import njit
-
-from schemas.errors import BadInput
-from stages.kit.geometry.cells import row_keys
-from stages.kit.rendering.patterns import Material, is_wood
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.cells import row_keys
+from scenewright.stages.kit.rendering.patterns import Material, is_wood
 
 CREASE_COSINE = float(np.cos(np.deg2rad(40.0)))
 """Faces that meet at a sharper angle keep a hard edge."""

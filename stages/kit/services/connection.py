@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from email.utils import parsedate_to_datetime
 from urllib.parse import urlsplit
 
-from schemas.errors import BadInput, MachineFailure
+from scenewright.schemas.errors import BadInput, MachineFailure
 
 RETRIED = frozenset({408, 425, 429, 500, 502, 503, 504})
 """Status codes of servers that are busy, starting or stumbling."""

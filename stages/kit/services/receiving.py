@@ -19,7 +19,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import urlsplit
 
-from schemas.errors import MachineFailure, UsageError
+from scenewright.schemas.errors import MachineFailure, UsageError
 
 IDLE_SECONDS = 60.0
 """A connection on which nothing comes for so long is closed."""

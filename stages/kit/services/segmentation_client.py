@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.errors import BadInput, MachineFailure, MissingDependency
-from stages.kit.services.connection import Connection
-from stages.kit.services.segmentation_protocol import INFO_PATH, ServiceInfo, parse_info
+from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency
+from scenewright.stages.kit.services.connection import Connection
+from scenewright.stages.kit.services.segmentation_protocol import INFO_PATH, ServiceInfo, parse_info
 
 REFUSED_HINT = "is this a segmentation service? see docs/SEGMENTATION.md"
 

@@ -17,14 +17,13 @@ from typing import Any, NoReturn, TypeGuard
 import cv2
 import numpy as np
 from pydantic import ValidationError
-
-from schemas.base import Model, canonical_json
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.kit.formats import foxglove
-from stages.kit.formats.frames import Frame
-from stages.kit.formats.image_headers import LARGEST_IMAGE, PNG_START, image_size, may_be_decoded
-from stages.kit.formats.masks import LARGEST_ID, decode_panoptic_png, encode_panoptic_png
+from scenewright.schemas.base import Model, canonical_json
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, PNG_START, image_size, may_be_decoded
+from scenewright.stages.kit.formats.masks import LARGEST_ID, decode_panoptic_png, encode_panoptic_png
 
 PROTOCOL = "scenewright-segmentation/1"
 INFO_PATH, SEGMENT_PATH, HEALTH_PATH = "/v1/info", "/v1/segment", "/health"

@@ -5,11 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion, transform_from_yaw
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.robot_description import BASE_JOINTS, PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
-from stages.kit.simulation.world import Contact, PhysicsWorld
+from scenewright.stages.kit.geometry.transforms import (
+    inverse,
+    quaternion_of,
+    transform_from_quaternion,
+    transform_from_yaw,
+)
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.robot_description import (
+    BASE_JOINTS,
+    PEDESTAL_LINK,
+    RobotDescription,
+    mobile_robot_urdf,
+)
+from scenewright.stages.kit.simulation.world import Contact, PhysicsWorld
 
 FINGER_FRICTION = 1.2
 BASE_FORCE = 50000.0

@@ -10,10 +10,9 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
-from schemas.errors import BadInput, MissingDependency, UsageError, first_problem
-from schemas.outside import file_toml
-from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError, first_problem
+from scenewright.schemas.outside import file_toml
+from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
 
 FOLDER = Path(__file__).resolve().parents[3] / "data" / "robots"
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")

@@ -8,10 +8,9 @@ from typing import Literal
 
 import numpy as np
 import trimesh
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.formats.mesh_files import read_mesh
 
 
 def _numbers(text: str | None, default: str) -> list[float]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.formats.urdf_file import MAXIMUM_BYTES
-from stages.kit.formats.xml_files import parse_xml
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.urdf_file import MAXIMUM_BYTES
+from scenewright.stages.kit.formats.xml_files import parse_xml
 
 PART_SEPARATOR = "__"
 

@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.interactive_scene import InteractiveSceneFile, SceneBody
-from stages.kit.formats.urdf_check import require_sound
-from stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
-from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
-from stages.kit.simulation.engine import engine, native_output_to_stderr
-from stages.kit.simulation.urdf_split import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from scenewright.stages.kit.formats.urdf_check import require_sound
+from scenewright.stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
+from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
+from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
+from scenewright.stages.kit.simulation.urdf_split import (
     links_with_friction,
     read_urdf,
     split_body,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.tasks.relaxed import FAR, Relaxed, costs, relaxed_plan
+from scenewright.stages.kit.tasks.relaxed import FAR, Relaxed, costs, relaxed_plan
 
 Relaxation = Literal["add", "max", "ff"]
 

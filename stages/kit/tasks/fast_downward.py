@@ -14,10 +14,10 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from schemas.errors import BadInput, MissingDependency
-from stages.kit.tasks.pddl import domain_text, problem_text
-from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, validate
-from stages.kit.tasks.task_planner import TaskPlan
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.stages.kit.tasks.pddl import domain_text, problem_text
+from scenewright.stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, validate
+from scenewright.stages.kit.tasks.task_planner import TaskPlan
 
 PACKAGE = "up_fast_downward"
 ALIAS = "lama-first"

@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.tasks.relaxed import FAR, Relaxed, costs
+from scenewright.stages.kit.tasks.relaxed import FAR, Relaxed, costs
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,9 @@ import heapq
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.kit.tasks.estimator import Estimator
-from stages.kit.tasks.landmarks import Landmarks
-from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, successor
+from scenewright.stages.kit.tasks.estimator import Estimator
+from scenewright.stages.kit.tasks.landmarks import Landmarks
+from scenewright.stages.kit.tasks.relaxed import FAR, Relaxed, applicable, successor
 
 BOOST = 1000
 

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from stages.kit.tasks.pddl_expressions import Expression, entries, parse_expression, refuse, typed_names, word
-from stages.kit.tasks.strips import Atom, Domain, Problem, Schema
+from scenewright.stages.kit.tasks.pddl_expressions import (
+    Expression,
+    entries,
+    parse_expression,
+    refuse,
+    typed_names,
+    word,
+)
+from scenewright.stages.kit.tasks.strips import Atom, Domain, Problem, Schema
 
 REQUIREMENTS = (":strips", ":typing", ":negative-preconditions")
 Literals = tuple[tuple[Atom, ...], tuple[Atom, ...]]

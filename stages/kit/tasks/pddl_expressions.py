@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput
 
 Expression = str | list["Expression"]
 DEEPEST = 200

@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, types
-
-from stages.kit.tasks.strips import Atom, GroundAction, Problem
+from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem
 
 FAR = 1 << 30
 """Cost of what cannot be reached."""

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.tasks.estimator import Estimator
-from stages.kit.tasks.landmarks import find_landmarks
-from stages.kit.tasks.lazy_search import LazySearch
-from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, relax, successor
-from stages.kit.tasks.strips import Atom, GroundAction, Problem
+from scenewright.stages.kit.tasks.estimator import Estimator
+from scenewright.stages.kit.tasks.landmarks import find_landmarks
+from scenewright.stages.kit.tasks.lazy_search import LazySearch
+from scenewright.stages.kit.tasks.relaxed import FAR, Relaxed, applicable, relax, successor
+from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem
 
 Heuristic = Literal["landmarks", "add", "max", "ff"]
 WEIGHTS = (5, 2, 1)

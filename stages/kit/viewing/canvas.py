@@ -9,8 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
-
-from schemas.scene_parts import Box, Camera
+from scenewright.schemas.scene_parts import Box, Camera
 
 SHELL = "shell"
 """Walls and ceilings that are solid, below this path: hidden at first, as one looks from outside."""

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import TREE_RELATIONS
-from stages.kit.drawing.palette import RELATION_COLORS, UNLABELLED, instance_color
-from stages.kit.geometry.boxes import box_corners
-from stages.kit.measurement.relation_evidence import evidence
-from stages.kit.viewing.canvas import SHELL, Canvas, Color, Trust, bytes_of
-from stages.kit.viewing.meshes import load_mesh
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.stages.kit.drawing.palette import RELATION_COLORS, UNLABELLED, instance_color
+from scenewright.stages.kit.geometry.boxes import box_corners
+from scenewright.stages.kit.measurement.relation_evidence import evidence
+from scenewright.stages.kit.viewing.canvas import SHELL, Canvas, Color, Trust, bytes_of
+from scenewright.stages.kit.viewing.meshes import load_mesh
 
 DRAWN = ("boxes_of_layout", "boxes_before_refinement", "supporting_planes", "edges", "contacts")
 """What a graph draws beside the boxes of things."""

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
-from schemas.errors import BadInput
-from schemas.panoptic_map import EntitiesFile, PanopticMap
-from schemas.scene_parts import Box
-from schemas.vocabulary import load_vocabulary
-from stages.kit.drawing.palette import UNLABELLED, instance_color
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.viewing.canvas import Canvas, Color, Parts, bytes_of, trust_color
-from stages.kit.viewing.meshes import load_mesh
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import EntitiesFile, PanopticMap
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.drawing.palette import UNLABELLED, instance_color
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.viewing.canvas import Canvas, Color, Parts, bytes_of, trust_color
+from scenewright.stages.kit.viewing.meshes import load_mesh
 
 LAYERS = ("color", "instance", "class", "trust")
 """Paths of the mesh of a map, in the four ways that it is drawn."""

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import trimesh
-
-from schemas.scene_parts import Box
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.urdf_file import Shape
-from stages.kit.geometry.boxes import box_rotation
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.viewing.canvas import Canvas, Color, bytes_of
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.urdf_file import Shape
+from scenewright.stages.kit.geometry.boxes import box_rotation
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.viewing.canvas import Canvas, Color, bytes_of
 
 
 def load_mesh(path: Path) -> trimesh.Trimesh:

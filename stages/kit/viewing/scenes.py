@@ -8,16 +8,15 @@ from typing import Literal
 
 import numpy as np
 import trimesh
-
-from schemas.cad_scene import CadSceneFile
-from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
-from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.link_poses import link_poses
-from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
-from stages.kit.geometry.transforms import inverse, transform_from_quaternion
-from stages.kit.viewing.canvas import SHELL, Canvas, JointedLink, Trust
-from stages.kit.viewing.graphs import draw_graph
-from stages.kit.viewing.meshes import merged, shape_mesh
+from scenewright.schemas.cad_scene import CadSceneFile
+from scenewright.schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
+from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.link_poses import link_poses
+from scenewright.stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from_quaternion
+from scenewright.stages.kit.viewing.canvas import SHELL, Canvas, JointedLink, Trust
+from scenewright.stages.kit.viewing.graphs import draw_graph
+from scenewright.stages.kit.viewing.meshes import merged, shape_mesh
 
 NEAR, FAR = 0.02, 0.1
 """A model this near to what was seen is that; one this far is not [m]."""

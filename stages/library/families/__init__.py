@@ -5,27 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
-from stages.library.design import Design
-from stages.library.families.appliances import fridge, microwave
-from stages.library.families.bedroom import bed, book, lamp
-from stages.library.families.carriers import board, tray
-from stages.library.families.containers import bin as waste_bin
-from stages.library.families.containers import box
-from stages.library.families.decoration import plant, utensil, vase
-from stages.library.families.drawers import drawer_unit
-from stages.library.families.electronics import keyboard, monitor
-from stages.library.families.fixtures import sink, toilet
-from stages.library.families.furniture import bench, stool, trolley, wall_shelf, wardrobe
-from stages.library.families.hanging import pendant_lamp, picture
-from stages.library.families.kitchenware import can, cooking_pot, jug, kettle, pan, plate
-from stages.library.families.lidded import chest, toolbox
-from stages.library.families.office import clock, laptop, mouse, printer, remote
-from stages.library.families.seating import chair, sofa
-from stages.library.families.storage import cabinet, shelf, wall_cabinet
-from stages.library.families.tables import desk, table
-from stages.library.families.tableware import bottle, bowl, cup
-from stages.library.families.white_goods import dishwasher, hob, oven, washing_machine
+from scenewright.stages.library.design import Design
+from scenewright.stages.library.families.appliances import fridge, microwave
+from scenewright.stages.library.families.bedroom import bed, book, lamp
+from scenewright.stages.library.families.carriers import board, tray
+from scenewright.stages.library.families.containers import bin as waste_bin
+from scenewright.stages.library.families.containers import box
+from scenewright.stages.library.families.decoration import plant, utensil, vase
+from scenewright.stages.library.families.drawers import drawer_unit
+from scenewright.stages.library.families.electronics import keyboard, monitor
+from scenewright.stages.library.families.fixtures import sink, toilet
+from scenewright.stages.library.families.furniture import bench, stool, trolley, wall_shelf, wardrobe
+from scenewright.stages.library.families.hanging import pendant_lamp, picture
+from scenewright.stages.library.families.kitchenware import can, cooking_pot, jug, kettle, pan, plate
+from scenewright.stages.library.families.lidded import chest, toolbox
+from scenewright.stages.library.families.office import clock, laptop, mouse, printer, remote
+from scenewright.stages.library.families.seating import chair, sofa
+from scenewright.stages.library.families.storage import cabinet, shelf, wall_cabinet
+from scenewright.stages.library.families.tables import desk, table
+from scenewright.stages.library.families.tableware import bottle, bowl, cup
+from scenewright.stages.library.families.white_goods import dishwasher, hob, oven, washing_machine
 
 Generator = Callable[[np.random.Generator, int], Design]
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid, bar, box, cylinder
-from stages.library.design import (
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import Solid, bar, box, cylinder
+from scenewright.stages.library.design import (
     APPLIANCE,
     DARK_PLASTIC,
     PLASTIC,
@@ -20,7 +19,7 @@ from stages.library.design import (
     bar_handle,
     painted,
 )
-from stages.library.families.storage import GAP
+from scenewright.stages.library.families.storage import GAP
 
 WHITE = Paint((242, 244, 246), 220.0)
 SHELF_GLASS = Paint((206, 222, 226), 2400.0)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import box, cushion, cylinder, shell
-from stages.library.design import CARDBOARD, FABRIC, LINEN, PAPER, STEEL, WOOD, Design, Paint, painted
+from scenewright.stages.kit.geometry.solids import box, cushion, cylinder, shell
+from scenewright.stages.library.design import CARDBOARD, FABRIC, LINEN, PAPER, STEEL, WOOD, Design, Paint, painted
 
 
 def bed(random: np.random.Generator, style: int) -> Design:

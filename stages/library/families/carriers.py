@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import bar, box, hull, prism, rounded_rectangle
-from stages.library.design import LACQUER, PLASTIC, STEEL, WOOD, Design, Paint, Piece, painted
+from scenewright.stages.kit.geometry.solids import bar, box, hull, prism, rounded_rectangle
+from scenewright.stages.library.design import LACQUER, PLASTIC, STEEL, WOOD, Design, Paint, Piece, painted
 
 
 def board(random: np.random.Generator, style: int) -> Design:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import box as block
-from stages.kit.geometry.solids import cylinder, hull, shell
-from stages.library.design import CARDBOARD, PLASTIC, STEEL, Design, Paint, painted
+from scenewright.stages.kit.geometry.solids import box as block
+from scenewright.stages.kit.geometry.solids import cylinder, hull, shell
+from scenewright.stages.library.design import CARDBOARD, PLASTIC, STEEL, Design, Paint, painted
 
 
 def box(random: np.random.Generator, style: int) -> Design:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, shell
-from stages.library.design import CERAMIC, GLASS, PLASTIC, STEEL, WOOD, Design, Paint, painted
+from scenewright.stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, shell
+from scenewright.stages.library.design import CERAMIC, GLASS, PLASTIC, STEEL, WOOD, Design, Paint, painted
 
 LEAVES = ((70, 120, 60), (58, 104, 66), (96, 140, 70))
 EARTH = Paint((74, 54, 40), 1100.0)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import box, cylinder
-from stages.library.design import DARK_PLASTIC, LACQUER, STEEL, WOOD, Design, Moving, painted
-from stages.library.families.storage import Carcass, drawer
+from scenewright.stages.kit.geometry.solids import box, cylinder
+from scenewright.stages.library.design import DARK_PLASTIC, LACQUER, STEEL, WOOD, Design, Moving, painted
+from scenewright.stages.library.families.storage import Carcass, drawer
 
 
 def drawer_unit(random: np.random.Generator, style: int) -> Design:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import box, cylinder, hull, prism, rounded_rectangle
-from stages.library.design import DARK_PLASTIC, PLASTIC, SCREEN, STEEL, Design, Paint, painted
+from scenewright.stages.kit.geometry.solids import box, cylinder, hull, prism, rounded_rectangle
+from scenewright.stages.library.design import DARK_PLASTIC, PLASTIC, SCREEN, STEEL, Design, Paint, painted
 
 
 def monitor(random: np.random.Generator, style: int) -> Design:

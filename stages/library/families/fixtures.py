@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, prism, rounded_rectangle
+from scenewright.stages.library.design import LACQUER, STEEL, WOOD, Design, Moving, Paint, Piece, painted
+from scenewright.stages.library.families.parts import GAP, Span, lid, open_box
+from scenewright.stages.library.families.storage import hinged_door
 from scipy.spatial import ConvexHull
-
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, prism, rounded_rectangle
-from stages.library.design import LACQUER, STEEL, WOOD, Design, Moving, Paint, Piece, painted
-from stages.library.families.parts import GAP, Span, lid, open_box
-from stages.library.families.storage import hinged_door
 
 PORCELAIN = Paint((244, 244, 242), 2300.0)
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import bar, box, cushion, cylinder, hull
-from stages.library.design import DARK_PLASTIC, FABRIC, LACQUER, STEEL, WOOD, Design, Piece, painted
-from stages.library.families.storage import GAP, Carcass, drawer, hinged_door
+from scenewright.stages.kit.geometry.solids import bar, box, cushion, cylinder, hull
+from scenewright.stages.library.design import DARK_PLASTIC, FABRIC, LACQUER, STEEL, WOOD, Design, Piece, painted
+from scenewright.stages.library.families.storage import GAP, Carcass, drawer, hinged_door
 
 
 def stool(random: np.random.Generator, style: int) -> Design:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import box, cylinder, shell
-from stages.library.design import CARDBOARD, LINEN, PAPER, STEEL, WOOD, Design, Paint, Piece, painted
+from scenewright.stages.kit.geometry.solids import box, cylinder, shell
+from scenewright.stages.library.design import CARDBOARD, LINEN, PAPER, STEEL, WOOD, Design, Paint, Piece, painted
 
 BULB = Paint((250, 240, 200), 800.0)
 

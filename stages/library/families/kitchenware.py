@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, shell
-from stages.library.design import CERAMIC, DARK_PLASTIC, PLASTIC, STEEL, Design, Moving, Paint, painted
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, shell
+from scenewright.stages.library.design import CERAMIC, DARK_PLASTIC, PLASTIC, STEEL, Design, Moving, Paint, painted
 
 SHEET = 2700.0
 """Pans and pots: aluminium [kg/m^3]."""

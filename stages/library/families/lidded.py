@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import box, cylinder, hull
-from stages.library.design import FABRIC, LACQUER, PLASTIC, STEEL, WOOD, Design, Paint, Piece, bar_handle, painted
-from stages.library.families.parts import GAP, Span, lid, open_box
+from scenewright.stages.kit.geometry.solids import box, cylinder, hull
+from scenewright.stages.library.design import (
+    FABRIC,
+    LACQUER,
+    PLASTIC,
+    STEEL,
+    WOOD,
+    Design,
+    Paint,
+    Piece,
+    bar_handle,
+    painted,
+)
+from scenewright.stages.library.families.parts import GAP, Span, lid, open_box
 
 
 def chest(random: np.random.Generator, style: int) -> Design:

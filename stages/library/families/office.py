@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import bar, box, hull, prism, rounded_rectangle
-from stages.library.design import DARK_PLASTIC, PLASTIC, SCREEN, STEEL, Design, Paint, bar_handle, painted
-from stages.library.families.parts import GAP, lid, slide_out
+from scenewright.stages.kit.geometry.solids import bar, box, hull, prism, rounded_rectangle
+from scenewright.stages.library.design import DARK_PLASTIC, PLASTIC, SCREEN, STEEL, Design, Paint, bar_handle, painted
+from scenewright.stages.library.families.parts import GAP, lid, slide_out
 
 
 def laptop(random: np.random.Generator, style: int) -> Design:

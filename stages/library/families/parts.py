@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid, bar, box
-from stages.library.design import Moving, Paint, Piece, bar_handle, painted
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import Solid, bar, box
+from scenewright.stages.library.design import Moving, Paint, Piece, bar_handle, painted
 
 GAP = 0.002
 """Between what moves and what stays [m]."""

@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import Solid, bar, box, circle, cushion, cylinder, hull, prism, rounded_rectangle
-from stages.library.design import FABRIC, PLASTIC, STEEL, WOOD, Design, Piece, painted
+from scenewright.stages.kit.geometry.solids import (
+    Solid,
+    bar,
+    box,
+    circle,
+    cushion,
+    cylinder,
+    hull,
+    prism,
+    rounded_rectangle,
+)
+from scenewright.stages.library.design import FABRIC, PLASTIC, STEEL, WOOD, Design, Piece, painted
 
 
 def chair(random: np.random.Generator, style: int) -> Design:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid, box
-from stages.library.design import LACQUER, STEEL, WOOD, Design, Moving, Paint, bar_handle, painted
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import Solid, box
+from scenewright.stages.library.design import LACQUER, STEEL, WOOD, Design, Moving, Paint, bar_handle, painted
 
 GAP = 0.002
 """Between a front and the carcass, and between neighbouring fronts [m]."""

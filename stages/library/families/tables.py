@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import Solid, box, cylinder, prism, rounded_rectangle
-from stages.library.design import LACQUER, STEEL, WOOD, Design, painted
+from scenewright.stages.kit.geometry.solids import Solid, box, cylinder, prism, rounded_rectangle
+from scenewright.stages.library.design import LACQUER, STEEL, WOOD, Design, painted
 
 
 def _corner_legs(width: float, depth: float, height: float, leg: float, inset: float) -> list[Solid]:

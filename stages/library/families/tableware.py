@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import Solid, bar, cylinder, shell
-from stages.library.design import CERAMIC, GLASS, PLASTIC, Design, Paint, painted
+from scenewright.stages.kit.geometry.solids import Solid, bar, cylinder, shell
+from scenewright.stages.library.design import CERAMIC, GLASS, PLASTIC, Design, Paint, painted
 
 
 def bottle(random: np.random.Generator, style: int) -> Design:

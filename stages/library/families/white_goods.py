@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, shell
-from stages.library.design import (
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import Solid, bar, box, cylinder, hull, shell
+from scenewright.stages.library.design import (
     APPLIANCE,
     DARK_PLASTIC,
     SCREEN,
@@ -19,8 +18,8 @@ from stages.library.design import (
     bar_handle,
     painted,
 )
-from stages.library.families.appliances import WHITE, lined_chamber
-from stages.library.families.parts import DEPTH_FROM_HEIGHT, GAP, Span, flap, knob, slide_out
+from scenewright.stages.library.families.appliances import WHITE, lined_chamber
+from scenewright.stages.library.families.parts import DEPTH_FROM_HEIGHT, GAP, Span, flap, knob, slide_out
 
 GLASS_CERAMIC = Paint((24, 26, 30), 2300.0)
 SIDES = 16

@@ -6,20 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.cad_library import Affordances, CadModel, ModelState
-from schemas.errors import BadInput
-from schemas.scene_parts import Joint
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.model_writer import PartGeometry
-from stages.kit.geometry.solids import mass_properties, volume
-from stages.kit.geometry.transforms import apply
-from stages.library.affordances import affordances
-from stages.library.importing.painting import painted
-from stages.library.importing.placing import Part
-from stages.library.modelling import joint_values, motion
-from stages.library.surfaces import TOO_INTRICATE, Sections, surface_planes
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_library import Affordances, CadModel, ModelState
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Joint
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.model_writer import PartGeometry
+from scenewright.stages.kit.geometry.solids import mass_properties, volume
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.library.affordances import affordances
+from scenewright.stages.library.importing.painting import painted
+from scenewright.stages.library.importing.placing import Part
+from scenewright.stages.library.modelling import joint_values, motion
+from scenewright.stages.library.surfaces import TOO_INTRICATE, Sections, surface_planes
 
 KNOB_SHARE = 0.2
 """Moving parts smaller than this share of the model's diagonal get no states of their own."""

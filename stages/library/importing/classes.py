@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
-
-from schemas.base import Model
-from schemas.vocabulary import load_vocabulary
+from scenewright.schemas.base import Model
+from scenewright.schemas.vocabulary import load_vocabulary
 
 DATA = Path(__file__).resolve().parents[3] / "data"
 TABLE_FILE, WORDS_FILE = "imported_models.toml", "labels/words.toml"

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.xml_files import parse_xml
+from scenewright.stages.library.importing.limits import MOST_VERTICES, Allowance
+from scenewright.stages.library.importing.source_folder import long_row
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.formats.xml_files import parse_xml
-from stages.library.importing.limits import MOST_VERTICES, Allowance
-from stages.library.importing.source_folder import long_row
 
 MOST_INDICES = 30_000_000
 MOST_INSTANCES = 20_000

@@ -8,20 +8,20 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from schemas.errors import BadInput
-from stages.library.importing.limits import told_refusals
-from stages.library.importing.loose_models import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.library.importing.limits import told_refusals
+from scenewright.stages.library.importing.loose_models import (
     is_shapenet_table,
     read_loose_model,
     read_shapenet_model,
     shapenet_rows,
 )
-from stages.library.importing.mesh_reading import MESH_SUFFIXES
-from stages.library.importing.mjcf_models import is_mjcf, read_mjcf_models
-from stages.library.importing.sdf_models import read_sdf_models
-from stages.library.importing.source_folder import SourceFolder
-from stages.library.importing.source_model import SourceModel
-from stages.library.importing.urdf_models import read_partnet_model, read_urdf_model
+from scenewright.stages.library.importing.mesh_reading import MESH_SUFFIXES
+from scenewright.stages.library.importing.mjcf_models import is_mjcf, read_mjcf_models
+from scenewright.stages.library.importing.sdf_models import read_sdf_models
+from scenewright.stages.library.importing.source_folder import SourceFolder
+from scenewright.stages.library.importing.source_model import SourceModel
+from scenewright.stages.library.importing.urdf_models import read_partnet_model, read_urdf_model
 
 DESCRIPTIONS = (".urdf", ".sdf", ".world", ".xml", ".mjcf")
 PARTNET_FILE, SHAPENET_FILE = "mobility.urdf", "metadata.csv"

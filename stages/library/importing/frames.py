@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.library.importing.classes import UsualSize
-from stages.library.importing.source_model import Declared, Direction
+from scenewright.stages.library.importing.classes import UsualSize
+from scenewright.stages.library.importing.source_model import Declared, Direction
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
 LIKELY_UNITS = ("m", "cm", "mm", "inch")

@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.geometry.transforms import apply
-from stages.library.importing.source_model import SourceJoint, SourceLink, SourceModel
-from stages.library.modelling import BODY
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.library.importing.source_model import SourceJoint, SourceLink, SourceModel
+from scenewright.stages.library.modelling import BODY
 
 SMALLEST_RANGE = {"revolute": 1e-3, "prismatic": 1e-4}
 """A joint that moves less is held fast [rad, m]."""

@@ -6,12 +6,11 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import apply
-from stages.library.importing.grouping import Group
-from stages.library.importing.source_model import Surface
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.library.importing.grouping import Group
+from scenewright.stages.library.importing.source_model import Surface
 
 HANDLE = re.compile(r"handle|grip|knob|pull", re.IGNORECASE)
 

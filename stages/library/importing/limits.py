@@ -13,12 +13,11 @@ from contextlib import contextmanager
 
 import cv2
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.plain_text import cleaned
+from scenewright.stages.library.importing.source_model import Surface
 from scipy.spatial import QhullError
 from shapely.errors import ShapelyError
-
-from schemas.errors import BadInput
-from schemas.plain_text import cleaned
-from stages.library.importing.source_model import Surface
 
 MOST_TRIANGLES = 1_000_000
 """Of a model, repeated meshes counted each time, and of a mesh file."""

@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import opened
-from stages.library.importing.mesh_reading import read_mesh_file
-from stages.library.importing.source_folder import SourceFolder, numbers
-from stages.library.importing.source_model import Declared, Direction, SourceLink, SourceModel
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.library.importing.mesh_reading import read_mesh_file
+from scenewright.stages.library.importing.source_folder import SourceFolder, numbers
+from scenewright.stages.library.importing.source_model import Declared, Direction, SourceLink, SourceModel
 
 LARGEST_TABLE = 64 * 2**20
 LARGEST_HEADER = 64 * 2**10

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import ValidationError
-
-from schemas.base import Model
-from schemas.errors import BadInput, first_problem
-from schemas.outside import file_toml
-from schemas.vocabulary import load_vocabulary
-from stages.library.importing.source_model import SourceModel
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import file_toml
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.library.importing.source_model import SourceModel
 
 LARGEST_FILE = 4 * 2**20
 MOST_PATTERNS = 1000

@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 import trimesh
-
-from schemas.errors import BadInput
-from stages.kit.formats.mesh_files import gltf_pixels, gltf_tree, mesh_of_bytes, meshes_of_glb, whole_number
-from stages.library.importing.collada_file import parse_collada
-from stages.library.importing.limits import MOST_SHAPES, MOST_TRIANGLES, MOST_VERTICES, SIMPLIFY
-from stages.library.importing.pictures import MOST_PIXELS, Pictures, face_colors
-from stages.library.importing.source_folder import LARGEST_FILE, LARGEST_TEXT, SourceFolder
-from stages.library.importing.source_model import Declared, Surface, painted_faces
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.mesh_files import gltf_pixels, gltf_tree, mesh_of_bytes, meshes_of_glb, whole_number
+from scenewright.stages.library.importing.collada_file import parse_collada
+from scenewright.stages.library.importing.limits import MOST_SHAPES, MOST_TRIANGLES, MOST_VERTICES, SIMPLIFY
+from scenewright.stages.library.importing.pictures import MOST_PIXELS, Pictures, face_colors
+from scenewright.stages.library.importing.source_folder import LARGEST_FILE, LARGEST_TEXT, SourceFolder
+from scenewright.stages.library.importing.source_model import Declared, Surface, painted_faces
 
 MESH_SUFFIXES = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
 LARGEST_MATERIALS = 16 * 2**20

@@ -13,16 +13,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.geometry.solids import Solid, box, cylinder
-from stages.kit.geometry.transforms import transform_from
-from stages.library.importing.limits import MOST_TRIANGLES_OF_A_FILE, Allowance, few_findings
-from stages.library.importing.mesh_reading import read_mesh_file
-from stages.library.importing.primitives import ball, capsule
-from stages.library.importing.source_folder import SourceFolder, list_of_numbers, numbers
-from stages.library.importing.source_model import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.solids import Solid, box, cylinder
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.library.importing.limits import MOST_TRIANGLES_OF_A_FILE, Allowance, few_findings
+from scenewright.stages.library.importing.mesh_reading import read_mesh_file
+from scenewright.stages.library.importing.primitives import ball, capsule
+from scenewright.stages.library.importing.source_folder import SourceFolder, list_of_numbers, numbers
+from scenewright.stages.library.importing.source_model import (
     JointKind,
     SourceJoint,
     SourceLink,
@@ -31,6 +29,7 @@ from stages.library.importing.source_model import (
     painted_faces,
     solid_surface,
 )
+from scipy.spatial.transform import Rotation
 
 DEEPEST_INCLUDES = 10
 MOST_INCLUDES = 2000

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.library.importing.pictures import few_colors
-from stages.library.importing.source_model import Surface
+from scenewright.stages.library.importing.pictures import few_colors
+from scenewright.stages.library.importing.source_model import Surface
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from stages.kit.formats.image_headers import image_size, may_be_decoded
-from stages.library.importing.source_folder import SourceFolder
+from scenewright.stages.kit.formats.image_headers import image_size, may_be_decoded
+from scenewright.stages.library.importing.source_folder import SourceFolder
 
 LARGEST_PICTURE = 64 * 2**20
 MOST_PIXELS = 400_000_000

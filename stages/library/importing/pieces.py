@@ -15,15 +15,14 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.geometry.solids import Solid, hull, volume
+from scenewright.stages.library.importing.source_model import Surface
+from scenewright.stages.library.importing.versions import coacd_version
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
-
-from schemas.errors import BadInput
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.geometry.solids import Solid, hull, volume
-from stages.library.importing.source_model import Surface
-from stages.library.importing.versions import coacd_version
 
 COACD_SETTINGS = {
     "threshold": 0.08,

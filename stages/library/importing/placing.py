@@ -11,19 +11,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import Solid
+from scenewright.stages.kit.geometry.transforms import apply, transform_from
+from scenewright.stages.library.importing.frames import model_rotation
+from scenewright.stages.library.importing.grouping import Group
+from scenewright.stages.library.importing.handles import with_handle
+from scenewright.stages.library.importing.pieces import convex_pieces
+from scenewright.stages.library.importing.source_model import Direction, SourceModel, Surface
+from scenewright.stages.library.modelling import BODY
 from scipy.spatial.transform import Rotation
-
-from schemas.base import as_vector
-from schemas.errors import BadInput
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid
-from stages.kit.geometry.transforms import apply, transform_from
-from stages.library.importing.frames import model_rotation
-from stages.library.importing.grouping import Group
-from stages.library.importing.handles import with_handle
-from stages.library.importing.pieces import convex_pieces
-from stages.library.importing.source_model import Direction, SourceModel, Surface
-from stages.library.modelling import BODY
 
 MOST_PARTS = 500
 """Parts of a model that move."""

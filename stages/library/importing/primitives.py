@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.solids import Solid, hull
+from scenewright.stages.kit.geometry.solids import Solid, hull
 
 RINGS, SIDES = 6, 16
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from schemas.cad_library import ImportedModel
-from stages.library.importing.frames import unit_name
+from scenewright.schemas.cad_library import ImportedModel
+from scenewright.stages.library.importing.frames import unit_name
 
 HEADER = ("model", "class", "size [m]", "joints", "unit", "up", "front", "good for", "findings")
 LONGEST_NAME = 44

@@ -12,15 +12,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.geometry.solids import Solid, box, cylinder
-from stages.kit.geometry.transforms import inverse, transform_from
-from stages.library.importing.limits import MOST_SHAPES, MOST_TRIANGLES_OF_A_FILE, Allowance, few_findings
-from stages.library.importing.primitives import ball, capsule
-from stages.library.importing.source_folder import SourceFolder, numbers
-from stages.library.importing.source_model import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.solids import Solid, box, cylinder
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
+from scenewright.stages.library.importing.limits import MOST_SHAPES, MOST_TRIANGLES_OF_A_FILE, Allowance, few_findings
+from scenewright.stages.library.importing.primitives import ball, capsule
+from scenewright.stages.library.importing.source_folder import SourceFolder, numbers
+from scenewright.stages.library.importing.source_model import (
     JointKind,
     SourceJoint,
     SourceLink,
@@ -28,7 +26,8 @@ from stages.library.importing.source_model import (
     Surface,
     solid_surface,
 )
-from stages.library.importing.urdf_models import Naming, mesh_surfaces
+from scenewright.stages.library.importing.urdf_models import Naming, mesh_surfaces
+from scipy.spatial.transform import Rotation
 
 KINDS: dict[str, JointKind] = {
     "fixed": "fixed",

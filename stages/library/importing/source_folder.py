@@ -10,10 +10,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.formats.xml_files import parse_xml
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.xml_files import parse_xml
 
 LARGEST_FILE = 256 * 2**20
 """Bytes of a mesh or a picture."""

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-
-from stages.kit.geometry.solids import Solid
-from stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.geometry.solids import Solid
+from scenewright.stages.kit.geometry.transforms import apply
 
 Direction = tuple[float, float, float]
 JointKind = Literal["fixed", "floating", "revolute", "continuous", "prismatic", "unknown"]

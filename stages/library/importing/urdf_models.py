@@ -8,17 +8,15 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.formats.urdf_file import joint_ends
-from stages.kit.geometry.solids import Solid, box, cylinder
-from stages.kit.geometry.transforms import transform_from
-from stages.library.importing.limits import Allowance, few_findings
-from stages.library.importing.mesh_reading import read_mesh_file
-from stages.library.importing.primitives import ball
-from stages.library.importing.source_folder import SourceFolder, numbers
-from stages.library.importing.source_model import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.urdf_file import joint_ends
+from scenewright.stages.kit.geometry.solids import Solid, box, cylinder
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.library.importing.limits import Allowance, few_findings
+from scenewright.stages.library.importing.mesh_reading import read_mesh_file
+from scenewright.stages.library.importing.primitives import ball
+from scenewright.stages.library.importing.source_folder import SourceFolder, numbers
+from scenewright.stages.library.importing.source_model import (
     Declared,
     JointKind,
     SourceJoint,
@@ -28,6 +26,7 @@ from stages.library.importing.source_model import (
     painted_faces,
     solid_surface,
 )
+from scipy.spatial.transform import Rotation
 
 KINDS: dict[str, JointKind] = {
     "fixed": "fixed",

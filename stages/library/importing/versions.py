@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from importlib import metadata, util
 
-from schemas.errors import MissingDependency
-from stages.library.parameters import AdditionParameters
+from scenewright.schemas.errors import MissingDependency
+from scenewright.stages.library.parameters import AdditionParameters
 
 COACD = "coacd"
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stages.kit.tasks.strips import Schema
-from stages.plan.action import PlanAction
+from scenewright.stages.kit.tasks.strips import Schema
+from scenewright.stages.plan.action import PlanAction
 
 
 class Drive(PlanAction):

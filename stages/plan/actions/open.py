@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from stages.kit.motion.doors import is_open
-from stages.kit.motion.segments import Manipulation
-from stages.kit.tasks.strips import Schema
-from stages.plan.action import Execution, MotionRequest, PlanAction
-from stages.plan.checks import check_joints
-from stages.plan.door_motion import check_joint, plan_open
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.stages.kit.motion.doors import is_open
+from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.tasks.strips import Schema
+from scenewright.stages.plan.action import Execution, MotionRequest, PlanAction
+from scenewright.stages.plan.checks import check_joints
+from scenewright.stages.plan.door_motion import check_joint, plan_open
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 
 class Open(PlanAction):

@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.plan import Check
-from stages.kit.motion.segments import Manipulation
-from stages.kit.tasks.strips import Schema
-from stages.plan.action import Execution, MotionRequest, PlanAction
-from stages.plan.believed_tree import TreeState
-from stages.plan.carriers import HAND
-from stages.plan.checks import GoalInRoom
-from stages.plan.pick_place import plan_pick
-from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
+from scenewright.schemas.plan import Check
+from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.tasks.strips import Schema
+from scenewright.stages.plan.action import Execution, MotionRequest, PlanAction
+from scenewright.stages.plan.believed_tree import TreeState
+from scenewright.stages.plan.carriers import HAND
+from scenewright.stages.plan.checks import GoalInRoom
+from scenewright.stages.plan.pick_place import plan_pick
+from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 
 
 def check_held(goal: GoalInRoom) -> Check:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.segments import Manipulation
-from stages.kit.tasks.strips import Schema
-from stages.plan.action import Execution, MotionRequest, PlanAction
-from stages.plan.believed_tree import TreeState
-from stages.plan.carriers import carried_by, carrier
-from stages.plan.checks import check_in, check_on
-from stages.plan.pick_place import GraspStyle, plan_place
-from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, placement_style
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.tasks.strips import Schema
+from scenewright.stages.plan.action import Execution, MotionRequest, PlanAction
+from scenewright.stages.plan.believed_tree import TreeState
+from scenewright.stages.plan.carriers import carried_by, carrier
+from scenewright.stages.plan.checks import check_in, check_on
+from scenewright.stages.plan.pick_place import GraspStyle, plan_place
+from scenewright.stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, placement_style
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 MOST_TILT = 0.35
 """What was put down stands when it is tilted by less [rad]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.kit.predicates.expressions import Predicate, Tree
+from scenewright.stages.kit.predicates.expressions import Predicate, Tree
 
 _NAMES = {
     "x": "the middle",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from schemas.errors import UsageError
-from schemas.learned_domain import HeardPhrase, LabelledExample, LearnedDomainFile, LearnedPredicate
-from stages.kit.tasks.strips import Domain, Schema, atom_text
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.learned_domain import HeardPhrase, LabelledExample, LearnedDomainFile, LearnedPredicate
+from scenewright.stages.kit.tasks.strips import Domain, Schema, atom_text
 
 
 def domain_lines(file: LearnedDomainFile, operators: Domain) -> Iterator[str]:

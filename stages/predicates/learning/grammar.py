@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
-from stages.kit.predicates.expressions import Tree, size_of
-from stages.predicates.learning.phrases import Phrase
-from stages.predicates.learning.setting import KITCHEN, OWN_NUMBER, Measure, Setting
+from scenewright.stages.kit.predicates.expressions import Tree, size_of
+from scenewright.stages.predicates.learning.phrases import Phrase
+from scenewright.stages.predicates.learning.setting import KITCHEN, OWN_NUMBER, Measure, Setting
 
 BOTH_SAID = 2.0
 """Taken off a relation with a condition, whose words are many: it costs little where a phrase speaks of both."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass, field
 
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Predicate, Tree
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom, Domain
-from stages.predicates.learning.operators import Transition, learn_operators
-from stages.predicates.learning.phrases import Phrase
-from stages.predicates.learning.setting import KITCHEN, Setting
-from stages.predicates.learning.synthesis import Label
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Predicate, Tree
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom, Domain
+from scenewright.stages.predicates.learning.operators import Transition, learn_operators
+from scenewright.stages.predicates.learning.phrases import Phrase
+from scenewright.stages.predicates.learning.setting import KITCHEN, Setting
+from scenewright.stages.predicates.learning.synthesis import Label
 
 
 @dataclass

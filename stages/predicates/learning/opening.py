@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from stages.kit.language.opening import open_chat
-from stages.kit.language.scripted import ScriptedBackend
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.random_exploration import RandomLearner
-from stages.predicates.learning.setting import Setting
-from stages.predicates.learning.thesis import ThesisLearner, stand_in
-from stages.predicates.learning.thesis_memory import ThesisMemory
-from stages.predicates.parameters import TeachParameters
-from stages.predicates.teacher.simulated import Teacher
+from scenewright.stages.kit.language.opening import open_chat
+from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.ours import OursLearner
+from scenewright.stages.predicates.learning.random_exploration import RandomLearner
+from scenewright.stages.predicates.learning.setting import Setting
+from scenewright.stages.predicates.learning.thesis import ThesisLearner, stand_in
+from scenewright.stages.predicates.learning.thesis_memory import ThesisMemory
+from scenewright.stages.predicates.parameters import TeachParameters
+from scenewright.stages.predicates.teacher.simulated import Teacher
 
 STAND_IN = "word-list"
 

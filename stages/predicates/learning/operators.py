@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stages.kit.tasks.strips import Atom, Domain, Schema
+from scenewright.stages.kit.tasks.strips import Atom, Domain, Schema
 
 RARE = 0.05
 """A change that follows an action less often than this is taken for an accident."""

@@ -12,15 +12,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom
-from stages.predicates.learning.memory import Memory, Turn
-from stages.predicates.learning.operators import Transition
-from stages.predicates.learning.phrases import Phrase, phrase_of
-from stages.predicates.learning.synthesis import FOLLOWED, Label, Synthesiser
-from stages.predicates.teacher.simulated import Teacher
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom
+from scenewright.stages.predicates.learning.memory import Memory, Turn
+from scenewright.stages.predicates.learning.operators import Transition
+from scenewright.stages.predicates.learning.phrases import Phrase, phrase_of
+from scenewright.stages.predicates.learning.synthesis import FOLLOWED, Label, Synthesiser
+from scenewright.stages.predicates.teacher.simulated import Teacher
 
 MOST_QUESTIONS = 3
 """About one phrase, told apart from its rivals."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom
-from stages.predicates.learning.ours import OursLearner
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom
+from scenewright.stages.predicates.learning.ours import OursLearner
 
 
 class RandomLearner(OursLearner):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import Any
 
-from schemas.errors import BadInput
-from schemas.learned_domain import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.learned_domain import (
     DialogueTurn,
     DoneAction,
     GoalMeaning,
@@ -20,17 +20,17 @@ from schemas.learned_domain import (
     SeenState,
     StatedPrecondition,
 )
-from stages.kit.predicates.expressions import Predicate, check, read, text_of
-from stages.kit.predicates.room import Body, RoomState
-from stages.kit.predicates.vocabulary import Perceived
-from stages.predicates.language.saying import say
-from stages.predicates.learning.memory import Memory, Turn
-from stages.predicates.learning.operators import Transition
-from stages.predicates.learning.phrases import Phrase
-from stages.predicates.learning.setting import SETTINGS
-from stages.predicates.learning.synthesis import Label
-from stages.predicates.learning.thesis_memory import THESIS, ThesisMemory
-from stages.predicates.state import Seen, State
+from scenewright.stages.kit.predicates.expressions import Predicate, check, read, text_of
+from scenewright.stages.kit.predicates.room import Body, RoomState
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.predicates.language.saying import say
+from scenewright.stages.predicates.learning.memory import Memory, Turn
+from scenewright.stages.predicates.learning.operators import Transition
+from scenewright.stages.predicates.learning.phrases import Phrase
+from scenewright.stages.predicates.learning.setting import SETTINGS
+from scenewright.stages.predicates.learning.synthesis import Label
+from scenewright.stages.predicates.learning.thesis_memory import THESIS, ThesisMemory
+from scenewright.stages.predicates.state import Seen, State
 
 
 def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from stages.kit.predicates.expressions import Predicate, Tree, read
-from stages.kit.predicates.room import ROOM_WORDS, RoomState
-from stages.kit.predicates.vocabulary import Perceived, Vocabulary
-from stages.predicates.state import KITCHEN_WORDS, TOLERANCE, State
-from stages.predicates.world.actions import ARITY
+from scenewright.stages.kit.predicates.expressions import Predicate, Tree, read
+from scenewright.stages.kit.predicates.room import ROOM_WORDS, RoomState
+from scenewright.stages.kit.predicates.vocabulary import Perceived, Vocabulary
+from scenewright.stages.predicates.state import KITCHEN_WORDS, TOLERANCE, State
+from scenewright.stages.predicates.world.actions import ARITY
 
 OWN_TOLERANCE, OWN_NUMBER = 2.5, 3.0
 """Costs of numbers that the phrase does not say: of the worked example, and of others."""
@@ -60,7 +60,7 @@ def _predicates(texts: Mapping[str, tuple[int, str]]) -> dict[str, Predicate]:
 
 
 def _kitchen_facts(state: Perceived, name: str) -> tuple[str, ...]:
-    from stages.kit.predicates.evaluating import Evaluator
+    from scenewright.stages.kit.predicates.evaluating import Evaluator
 
     assert isinstance(state, State)
     evaluator = Evaluator(state, KITCHEN.given)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Tree
-from stages.kit.predicates.vocabulary import Perceived
-from stages.predicates.learning.grammar import candidates
-from stages.predicates.learning.phrases import Phrase
-from stages.predicates.learning.setting import KITCHEN, Setting
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Tree
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.predicates.learning.grammar import candidates
+from scenewright.stages.predicates.learning.phrases import Phrase
+from scenewright.stages.predicates.learning.setting import KITCHEN, Setting
 
 VIOLATION = 6.0
 """What a label that a meaning contradicts adds to its cost, times the label's weight."""

@@ -14,24 +14,23 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic import Field
-
-from schemas.base import Model
-from schemas.errors import BadInput
-from stages.kit.language.backend import Request
-from stages.kit.language.chat import Chat
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import say
-from stages.kit.language.reply_schema import schema_of
-from stages.kit.language.reply_text import objects_in
-from stages.kit.predicates.expressions import Predicate, Tree, check, read, text_of
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom
-from stages.predicates.learning.grammar import candidates
-from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.phrases import Phrase, phrase_of
-from stages.predicates.learning.synthesis import Label
-from stages.predicates.learning.thesis_memory import THESIS, ThesisMemory
-from stages.predicates.teacher.simulated import Teacher
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.language.backend import Request
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import say
+from scenewright.stages.kit.language.reply_schema import schema_of
+from scenewright.stages.kit.language.reply_text import objects_in
+from scenewright.stages.kit.predicates.expressions import Predicate, Tree, check, read, text_of
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom
+from scenewright.stages.predicates.learning.grammar import candidates
+from scenewright.stages.predicates.learning.ours import OursLearner
+from scenewright.stages.predicates.learning.phrases import Phrase, phrase_of
+from scenewright.stages.predicates.learning.synthesis import Label
+from scenewright.stages.predicates.learning.thesis_memory import THESIS, ThesisMemory
+from scenewright.stages.predicates.teacher.simulated import Teacher
 
 ROUNDS = 3
 """Most repairs by the Corrector, and tries of the Coder."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.kit.predicates.expressions import Predicate
-from stages.kit.tasks.strips import Domain
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.thesis_operators import search_operators
+from scenewright.stages.kit.predicates.expressions import Predicate
+from scenewright.stages.kit.tasks.strips import Domain
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.thesis_operators import search_operators
 
 THESIS = "thesis"
 """How the label of this learner begins."""

@@ -12,8 +12,8 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 
-from stages.kit.tasks.strips import Atom, Domain, Schema
-from stages.predicates.learning.operators import Transition
+from scenewright.stages.kit.tasks.strips import Atom, Domain, Schema
+from scenewright.stages.predicates.learning.operators import Transition
 
 FALL = 1e-5
 MOST_OTHERS = 2

@@ -10,14 +10,13 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
-
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Predicate, Tree
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.setting import KITCHEN_GIVEN
-from stages.predicates.state import Seen, State
-from stages.predicates.truth import true_predicates, truth_of
-from stages.predicates.world.catalogue import DomainSetup, kitchen_file
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Predicate, Tree
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.setting import KITCHEN_GIVEN
+from scenewright.stages.predicates.state import Seen, State
+from scenewright.stages.predicates.truth import true_predicates, truth_of
+from scenewright.stages.predicates.world.catalogue import DomainSetup, kitchen_file
 
 HALVINGS = 7
 """Of the way between a state where a predicate holds and one where it does not."""

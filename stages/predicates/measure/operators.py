@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom, Domain, Problem, apply_action, ground
-from stages.predicates.execution import ARITY, Abstraction, action_atom
-from stages.predicates.truth import true_domain, truth_of
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom, Domain, Problem, apply_action, ground
+from scenewright.stages.predicates.execution import ARITY, Abstraction, action_atom
+from scenewright.stages.predicates.truth import true_domain, truth_of
 
 Done = tuple[Perceived, Atom, Perceived]
 """A state, an action that worked in it, and the state after it."""

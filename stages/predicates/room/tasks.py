@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput
-from schemas.interactive_scene import InteractiveSceneFile
-from stages.kit.predicates.room import Body, RoomState, perceive
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.tasks.strips import Atom, Problem, apply_action, ground
-from stages.predicates.room.world import RoomWorld
-from stages.predicates.tasks import Task
-from stages.predicates.truth import ROOM, truth_of
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.stages.kit.predicates.room import Body, RoomState, perceive
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.tasks.strips import Atom, Problem, apply_action, ground
+from scenewright.stages.predicates.room.world import RoomWorld
+from scenewright.stages.predicates.tasks import Task
+from scenewright.stages.predicates.truth import ROOM, truth_of
 
 ROBOT = "panda"
 ITEMS, SUPPORTS, CONTAINERS = 4, 3, 2

@@ -6,9 +6,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from stages.kit.predicates.room import Body, RoomState
-from stages.kit.tasks.strips import Atom
+from scenewright.stages.kit.predicates.room import Body, RoomState
+from scenewright.stages.kit.tasks.strips import Atom
 
 OPEN, SHUT = 1.0, 0.0
 HALF_OPEN = 0.5

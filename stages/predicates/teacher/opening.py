@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from schemas.errors import UsageError
-from stages.predicates.parameters import TeachParameters
-from stages.predicates.teacher.simulated import SimulatedTeacher, Teacher, TeacherLeft
-from stages.predicates.teacher.terminal import TerminalTeacher, read_dialogue
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.predicates.parameters import TeachParameters
+from scenewright.stages.predicates.teacher.simulated import SimulatedTeacher, Teacher, TeacherLeft
+from scenewright.stages.predicates.teacher.terminal import TerminalTeacher, read_dialogue
 
 
 def open_teacher(parameters: TeachParameters, domain: str, seed: int, dialogue: Path | None, log: Path) -> Teacher:

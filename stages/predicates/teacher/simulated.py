@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
-
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom, Problem, ground
-from stages.predicates.truth import action_of, truth_of
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom, Problem, ground
+from scenewright.stages.predicates.truth import action_of, truth_of
 
 Wording = Literal["plain", "diverse"]
 

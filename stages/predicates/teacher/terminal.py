@@ -12,13 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pydantic import ValidationError
-
-from schemas.base import Model
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom
-from stages.predicates.truth import truth_of
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.predicates.vocabulary import Perceived
+from scenewright.stages.kit.tasks.strips import Atom
+from scenewright.stages.predicates.truth import truth_of
 
 LARGEST_DIALOGUE, LONGEST_ANSWER = 16 * 2**20, 1000
 YES, NO = ("yes", "y", "ja", "true"), ("no", "n", "nein", "false")

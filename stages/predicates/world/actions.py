@@ -9,10 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
-from stages.kit.tasks.strips import Atom
-from stages.predicates.state import LARGEST_OPENING, TABLE_LEFT, TABLE_RIGHT
-from stages.predicates.world.kitchen import FAUCET_HEIGHT, FINGER, MARGIN, PUSH_SPEED, SINK_X, Kitchen, Thing
+from scenewright.stages.kit.tasks.strips import Atom
+from scenewright.stages.predicates.state import LARGEST_OPENING, TABLE_LEFT, TABLE_RIGHT
+from scenewright.stages.predicates.world.kitchen import (
+    FAUCET_HEIGHT,
+    FINGER,
+    MARGIN,
+    PUSH_SPEED,
+    SINK_X,
+    Kitchen,
+    Thing,
+)
 
 CLEARANCE = 2.0
 """Between things on the table."""

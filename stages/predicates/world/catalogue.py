@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, model_validator
-
-from schemas.base import Model
-from schemas.outside import LARGEST_SETTINGS, file_toml
+from scenewright.schemas.base import Model
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
 
 KITCHEN = Path(__file__).resolve().parents[3] / "data" / "kitchen" / "kitchen.toml"
 DOMAINS = ("store_objects", "set_table", "cook_meal")

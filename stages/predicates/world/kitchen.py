@@ -12,9 +12,8 @@ from collections.abc import Iterable
 
 import numpy as np
 import pymunk
-
-from stages.predicates.state import LARGEST_OPENING, TABLE_LEFT, TABLE_RIGHT, Seen, State
-from stages.predicates.world.catalogue import Kind
+from scenewright.stages.predicates.state import LARGEST_OPENING, TABLE_LEFT, TABLE_RIGHT, Seen, State
+from scenewright.stages.predicates.world.catalogue import Kind
 
 STEP = 0.01
 GRAVITY = -10.0

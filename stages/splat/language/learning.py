@@ -13,14 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import scaled
-from stages.kit.geometry.transforms import inverse
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.rasterizer import Rasterizer, View
-from stages.splat.language.field import LanguageField
-from stages.splat.language.pyramid import Level
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.rasterizer import Rasterizer, View
+from scenewright.stages.splat.language.field import LanguageField
+from scenewright.stages.splat.language.pyramid import Level
 
 DELTA = 1.25
 FIRST_RATE, LAST_RATE = 2.5e-3, 1e-3

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import apply
-from stages.kit.open_words.encoder import Encoder, unit
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.open_words.encoder import Encoder, unit
 
 MOST_LOOKS = 5
 """Squares of a region, those of most pixels."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
 from scipy.spatial import cKDTree
-
-from stages.kit.rendering.splatting.gaussians import Gaussians
 
 SEEN = 0.15
 """Opacity from which on a Gaussian belongs to a surface."""

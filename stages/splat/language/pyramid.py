@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.kit.open_words.encoder import Encoder
+from scenewright.stages.kit.open_words.encoder import Encoder
 
 LEVELS = 7
 SMALLEST, LARGEST = 0.10, 0.45

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.rendering.splatting.rasterizer import Picture
-from stages.splat.density import Density
-from stages.splat.losses import LossWeights
-from stages.splat.seeding import Seeds
-from stages.splat.views import PosedView
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture
+from scenewright.stages.splat.density import Density
+from scenewright.stages.splat.losses import LossWeights
+from scenewright.stages.splat.seeding import Seeds
+from scenewright.stages.splat.views import PosedView
 
 Seeding = Callable[[PosedView, Picture, np.ndarray, np.random.Generator], Seeds]
 """(new view, what the Gaussians so far show there, camera_from_world, random) -> Gaussians to add."""

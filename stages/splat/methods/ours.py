@@ -6,13 +6,12 @@ None are added by gradient: on the tuning log that made pictures that were learn
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.rendering.splatting.rasterizer import Picture
-from stages.splat.density import Density
-from stages.splat.losses import LossWeights
-from stages.splat.methods.method import Method, Rate
-from stages.splat.seeding import DEPTH_ERROR, Seeds, at_pixels, filled
-from stages.splat.views import PosedView
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture
+from scenewright.stages.splat.density import Density
+from scenewright.stages.splat.losses import LossWeights
+from scenewright.stages.splat.methods.method import Method, Rate
+from scenewright.stages.splat.seeding import DEPTH_ERROR, Seeds, at_pixels, filled
+from scenewright.stages.splat.views import PosedView
 
 SPACING = 4
 """A Gaussian is set in each unexplained square of so many pixels."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.rendering.splatting.rasterizer import Picture
-from stages.splat.density import Density
-from stages.splat.losses import LossWeights
-from stages.splat.methods.method import Method, Rate
-from stages.splat.seeding import Seeds, at_pixels
-from stages.splat.views import PosedView
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture
+from scenewright.stages.splat.density import Density
+from scenewright.stages.splat.losses import LossWeights
+from scenewright.stages.splat.methods.method import Method, Rate
+from scenewright.stages.splat.seeding import Seeds, at_pixels
+from scenewright.stages.splat.views import PosedView
 
 PIXELS, DEVIATION, OPACITY = 500, 0.02, 0.2
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-
-from schemas.base import Model
-from stages.suture.needle.filter import difference
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.rig import NeedlePose
+from scenewright.schemas.base import Model
+from scenewright.stages.suture.needle.filter import difference
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.rig import NeedlePose
 
 
 class TrueView(Protocol):

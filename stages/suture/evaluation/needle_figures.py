@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
-
-from stages.kit.measurement.proportions import wilson_interval
-from stages.suture.evaluation.judgement import Estimate
+from scenewright.stages.kit.measurement.proportions import wilson_interval
+from scenewright.stages.suture.evaluation.judgement import Estimate
 
 ARMS = ("thesis", "ours")
 """In this order; any others come after."""

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-
-from schemas.suture_trial import SutureRun
-from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
-from stages.suture.evaluation.judgement import Estimate
-from stages.suture.evaluation.needle_figures import by_arm
-from stages.suture.motion.constants import THROWS
+from scenewright.schemas.suture_trial import SutureRun
+from scenewright.stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
+from scenewright.stages.suture.evaluation.judgement import Estimate
+from scenewright.stages.suture.evaluation.needle_figures import by_arm
+from scenewright.stages.suture.motion.constants import THROWS
 
 COLORS = {"thesis": SERIES_COLORS[4], "ours": SERIES_COLORS[0]}
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-
-from schemas.suture_trial import SutureRun
-from stages.kit.measurement.bootstrap import Interval, bootstrap_interval
+from scenewright.schemas.suture_trial import SutureRun
+from scenewright.stages.kit.measurement.bootstrap import Interval, bootstrap_interval
 
 SEED_OF_INTERVALS, DRAWS = 0, 2000
 KINDS = "IEHT"

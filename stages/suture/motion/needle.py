@@ -7,9 +7,8 @@ Leading with the tip means turning about the normal by a negative angle.
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.rig import NEEDLE_RADIUS
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.rig import NEEDLE_RADIUS
 
 SAMPLES = 121
 ARC = np.linspace(0.0, np.pi, SAMPLES)

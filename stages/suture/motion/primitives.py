@@ -7,10 +7,9 @@ so that they close on the needle from both faces of its plane.
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.motion.constants import APPROACH_OFFSET, CORRECTION_TURN, EXTRACTION_TURN, INSERTION_TURN
-from stages.suture.motion.needle import UP_THE_WOUND, turned
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.motion.constants import APPROACH_OFFSET, CORRECTION_TURN, EXTRACTION_TURN, INSERTION_TURN
+from scenewright.stages.suture.motion.needle import UP_THE_WOUND, turned
 
 STEPS = 20
 

@@ -6,9 +6,8 @@ import textwrap
 
 import cv2
 import numpy as np
-
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.rig import NeedlePose, StereoRig
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 GREEN, YELLOW, RED, WHITE, VIOLET = (80, 220, 80), (250, 220, 40), (250, 60, 40), (255, 255, 255), (190, 110, 255)
 Color = tuple[int, int, int]

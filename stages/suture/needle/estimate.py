@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from stages.suture.needle.estimator import Estimator
-from stages.suture.needle.evidence import Evidence, evidence_of, left_over
-from stages.suture.needle.filter import difference, either_way, fuse
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.needle.presence import presence_features, presence_probability
-from stages.suture.needle.silhouette import Outline, Sheet, fit_outline, sheet_of
-from stages.suture.needle.starts import FARTHEST, NEAREST, starts
-from stages.suture.needle.windows import EyeMask, needle_masks, windows
-from stages.suture.rig import NeedlePose, StereoRig
+from scenewright.stages.suture.needle.estimator import Estimator
+from scenewright.stages.suture.needle.evidence import Evidence, evidence_of, left_over
+from scenewright.stages.suture.needle.filter import difference, either_way, fuse
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from scenewright.stages.suture.needle.presence import presence_features, presence_probability
+from scenewright.stages.suture.needle.silhouette import Outline, Sheet, fit_outline, sheet_of
+from scenewright.stages.suture.needle.starts import FARTHEST, NEAREST, starts
+from scenewright.stages.suture.needle.windows import EyeMask, needle_masks, windows
+from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 FEWEST_PIXELS = 30
 STARTS, MIRRORED, FINALISTS = 14, 3, 6

@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.rig import NeedlePose
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from scenewright.stages.suture.rig import NeedlePose
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.suture.needle import estimate, thesis
-from stages.suture.needle.estimator import Estimator
+from scenewright.stages.suture.needle import estimate, thesis
+from scenewright.stages.suture.needle.estimator import Estimator
 
 ESTIMATORS: dict[str, Estimator] = {"ours": estimate.OURS, "thesis": thesis.THESIS}

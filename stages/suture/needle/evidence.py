@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-
-from stages.suture.needle.silhouette import (
+from scenewright.stages.suture.needle.silhouette import (
     ANGLES,
     GROWTH,
     PIECES,
@@ -25,8 +24,8 @@ from stages.suture.needle.silhouette import (
     draw,
     trace,
 )
-from stages.suture.needle.windows import EyeMask
-from stages.suture.rig import NEEDLE_RADIUS, StereoRig
+from scenewright.stages.suture.needle.windows import EyeMask
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, StereoRig
 
 COVERED = 2.0
 """Mask within this many pixels of the outline is explained by it."""

@@ -9,10 +9,9 @@ covariance keeps a floor. Tip or swage is decided by the sum of the frames' log-
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.rig import NeedlePose
 from scipy.spatial.transform import Rotation
-
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.rig import NeedlePose
 
 STEP_SHIFT, STEP_TURN = 0.0002, np.radians(0.5)
 """What the kinematics' motion from frame to frame is off by: standard deviations [m], [rad]."""

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.suture.rig import NeedlePose, StereoRig
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 AROUND = 31
 """Side [px] of the square with whose mean a pixel is compared."""

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from stages.suture.needle.evidence import COVERED
-from stages.suture.needle.silhouette import Outline, Sheet, arc_at, draw, trace
-from stages.suture.rig import StereoRig
+from scenewright.stages.suture.needle.evidence import COVERED
+from scenewright.stages.suture.needle.silhouette import Outline, Sheet, arc_at, draw, trace
+from scenewright.stages.suture.rig import StereoRig
 
 FEWEST = 10
 """Pixels of a patch of mask within the outline for which the patch is held against it."""

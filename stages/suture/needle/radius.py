@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 
 def as_if_usual(rig: StereoRig, radius: float) -> StereoRig:

@@ -14,16 +14,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from stages.suture.needle.estimate import ALIKE, COARSE_LEVELS, NARROW_LEVELS, POLISH, SAME, SAMPLED, VARIANCE, estimate
-from stages.suture.needle.evidence import evidence_of
-from stages.suture.needle.filter import SHARED, difference, either_way
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.needle.radius import as_if_usual, in_metres, pose_scaled
-from stages.suture.needle.silhouette import GROWTH, Outline, Sheet, fit_outline, sheet_of
-from stages.suture.needle.starts import starts
-from stages.suture.needle.windows import EyeMask, windows
-from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
+from scenewright.stages.suture.needle.estimate import (
+    ALIKE,
+    COARSE_LEVELS,
+    NARROW_LEVELS,
+    POLISH,
+    SAME,
+    SAMPLED,
+    VARIANCE,
+    estimate,
+)
+from scenewright.stages.suture.needle.evidence import evidence_of
+from scenewright.stages.suture.needle.filter import SHARED, difference, either_way
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from scenewright.stages.suture.needle.radius import as_if_usual, in_metres, pose_scaled
+from scenewright.stages.suture.needle.silhouette import GROWTH, Outline, Sheet, fit_outline, sheet_of
+from scenewright.stages.suture.needle.starts import starts
+from scenewright.stages.suture.needle.windows import EyeMask, windows
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 TRIED = np.geomspace(0.006, 0.020, 10)
 """Radii of the grid [m]: those of suture needles for tissue, a seventh apart."""

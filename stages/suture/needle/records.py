@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.suture_needle import NeedleEstimateRecord
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.rig import NeedlePose
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.suture_needle import NeedleEstimateRecord
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.rig import NeedlePose
 
 
 def as_estimate_record(answer: NeedleEstimate) -> NeedleEstimateRecord:

@@ -16,9 +16,8 @@ from typing import NamedTuple
 import cv2
 import numba
 import numpy as np
-
-from stages.suture.needle.windows import EyeMask
-from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
+from scenewright.stages.suture.needle.windows import EyeMask
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 PIECES = 45
 ANGLES = np.linspace(0.0, np.pi, PIECES + 1)

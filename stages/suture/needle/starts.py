@@ -15,9 +15,8 @@ from typing import NamedTuple
 import cv2
 import numba
 import numpy as np
-
-from stages.suture.needle.windows import EyeMask
-from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
+from scenewright.stages.suture.needle.windows import EyeMask
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 NEAREST, FARTHEST = 0.04, 0.80
 TRIPLES = 6000

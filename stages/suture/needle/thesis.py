@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.stages.suture.needle.estimator import Estimator
+from scenewright.stages.suture.needle.filter import difference
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from scenewright.stages.suture.rig import NeedlePose
 from scipy.spatial.transform import Rotation
-
-from stages.suture.needle.estimator import Estimator
-from stages.suture.needle.filter import difference
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.rig import NeedlePose
 
 PLANE_THRESHOLD = 0.0010
 CIRCLE_THRESHOLD = 0.0010

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.suture.needle.observation import NeedleObservation
+from scenewright.stages.suture.needle.observation import NeedleObservation
 
 MARGIN = 40
 

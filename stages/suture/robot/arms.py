@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse, rotation_between, transform_from
-from stages.suture.robot.inverse import reachable
+from scenewright.stages.kit.geometry.transforms import inverse, rotation_between, transform_from
+from scenewright.stages.suture.robot.inverse import reachable
 
 REMOTE_CENTRES = {"right": np.array([-0.12, 0.0, 0.15]), "left": np.array([0.12, 0.0, 0.15])}
 AIM = np.array([0.0, 0.0, 0.02])

@@ -9,9 +9,8 @@ joints reach a direction in two ways: eight branches, and whole turns of the rol
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import wrapped
-from stages.suture.robot.psm import (
+from scenewright.stages.kit.geometry.transforms import wrapped
+from scenewright.stages.suture.robot.psm import (
     LOWER,
     PITCH_TO_YAW,
     REMOTE_CENTRE_TO_CARRIAGE,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from schemas.errors import BadInput
-from stages.kit.formats.network_file import put_tensors, write_network
-from stages.kit.formats.safetensors_file import read_safetensors
-from stages.suture.segmentation.model import CLASSES, SutureNetwork
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.network_file import put_tensors, write_network
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors
+from scenewright.stages.suture.segmentation.model import CLASSES, SutureNetwork
 
 FORMAT = "scenewright suture segmentation"
 VERSION = "1"

@@ -8,10 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-
-from schemas.errors import BadInput
-from stages.suture.segmentation.checkpoint import BUNDLED, load_network
-from stages.suture.segmentation.model import STRIDE, SutureNetwork
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.suture.segmentation.checkpoint import BUNDLED, load_network
+from scenewright.stages.suture.segmentation.model import STRIDE, SutureNetwork
 
 THRESHOLD = 0.5
 SMALLEST_NEEDLE, SMALLEST_THREAD, SMALLEST_DRIVER = 25, 8, 200

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.suture.rig import StereoRig
-from stages.suture.thread.skeleton import Stretch
+from scenewright.stages.suture.rig import StereoRig
+from scenewright.stages.suture.thread.skeleton import Stretch
 
 NEAREST, FARTHEST = 0.06, 0.8
 """Depths [m] between which a thread may lie."""

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from stages.suture.thread.strands import Strand
+from scenewright.stages.suture.thread.strands import Strand
 
 SHORTEST = 6.0
 """Strands of less length [px] are not followed."""

@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.suture.rig import StereoRig
-from stages.suture.thread.curve import fitted
-from stages.suture.thread.matching import directions_of, matched, places_of
-from stages.suture.thread.path import Path, followed
-from stages.suture.thread.skeleton import stretches
-from stages.suture.thread.strands import strands
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.suture.rig import StereoRig
+from scenewright.stages.suture.thread.curve import fitted
+from scenewright.stages.suture.thread.matching import directions_of, matched, places_of
+from scenewright.stages.suture.thread.path import Path, followed
+from scenewright.stages.suture.thread.skeleton import stretches
+from scenewright.stages.suture.thread.strands import strands
 
 CENTRE_SIGMA = 0.35
 """Standard deviation [px] of a skeleton's point across the line; its errors are alike over CORRELATED pixels."""

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.suture.thread.skeleton import Stretch
+from scenewright.stages.suture.thread.skeleton import Stretch
 
 NEAR = 9.0
 """Crossings joined by a stretch shorter than this [px] are one crossing."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse
-from stages.suture.motion.needle import UP_THE_WOUND
-from stages.suture.trials.perception import Seen
-from stages.suture.trials.wound import SPANNED
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.suture.motion.needle import UP_THE_WOUND
+from scenewright.stages.suture.trials.perception import Seen
+from scenewright.stages.suture.trials.wound import SPANNED
 
 START_ANGLE = SPANNED / 2
 """The tip lies this far past the needle's lowest point at the entry [rad], so that the arc spans entry and exit."""

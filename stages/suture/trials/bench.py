@@ -5,17 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse, transform_from
-from stages.suture.motion.needle import SWAGE, about, point_at, turned, upright
-from stages.suture.motion.primitives import jaws, straight
-from stages.suture.robot.arms import ARMS
-from stages.suture.trials.perception import Looking, Seen
-from stages.suture.trials.recording import Recorder
-from stages.suture.trials.rope import PARTICLES, drape, winding
-from stages.suture.trials.settings import World
-from stages.suture.trials.thread import Drawn, Thread, draw
-from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
+from scenewright.stages.suture.motion.needle import SWAGE, about, point_at, turned, upright
+from scenewright.stages.suture.motion.primitives import jaws, straight
+from scenewright.stages.suture.robot.arms import ARMS
+from scenewright.stages.suture.trials.perception import Looking, Seen
+from scenewright.stages.suture.trials.recording import Recorder
+from scenewright.stages.suture.trials.rope import PARTICLES, drape, winding
+from scenewright.stages.suture.trials.settings import World
+from scenewright.stages.suture.trials.thread import Drawn, Thread, draw
+from scenewright.stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
 
 HOME = {
     "right": transform_from(jaws(np.array([0.5, 0.0, -0.85])), np.array([-0.050, 0.0, 0.055])),

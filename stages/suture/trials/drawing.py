@@ -13,12 +13,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
-
-from stages.suture.motion.needle import ARC_POINTS  # noqa: E402
-from stages.suture.robot.arms import REMOTE_CENTRES  # noqa: E402
-from stages.suture.robot.psm import YAW_TO_TIP  # noqa: E402
-from stages.suture.trials.recording import ARM_ORDER  # noqa: E402
-from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT, SUTURES, entry, exit_  # noqa: E402
+from scenewright.stages.suture.motion.needle import ARC_POINTS  # noqa: E402
+from scenewright.stages.suture.robot.arms import REMOTE_CENTRES  # noqa: E402
+from scenewright.stages.suture.robot.psm import YAW_TO_TIP  # noqa: E402
+from scenewright.stages.suture.trials.recording import ARM_ORDER  # noqa: E402
+from scenewright.stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT, SUTURES, entry, exit_  # noqa: E402
 
 COLORS = {
     "right driver": "#2f6fb3",

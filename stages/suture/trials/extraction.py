@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.suture.motion import primitives
-from stages.suture.motion.constants import RETRIES
-from stages.suture.motion.needle import ARC_POINTS, UP_THE_WOUND, turned
-from stages.suture.rig import NEEDLE_RADIUS
-from stages.suture.trials.bench import Bench, Failed, Hold
-from stages.suture.trials.gripping import close, thread_between
-from stages.suture.trials.looking import trusted_look
-from stages.suture.trials.perception import Seen
-from stages.suture.trials.policy import Policy
-from stages.suture.trials.pulling import pull_to
-from stages.suture.trials.thread import pull_through
-from stages.suture.trials.wound import SPANNED, exit_
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.constants import RETRIES
+from scenewright.stages.suture.motion.needle import ARC_POINTS, UP_THE_WOUND, turned
+from scenewright.stages.suture.rig import NEEDLE_RADIUS
+from scenewright.stages.suture.trials.bench import Bench, Failed, Hold
+from scenewright.stages.suture.trials.gripping import close, thread_between
+from scenewright.stages.suture.trials.looking import trusted_look
+from scenewright.stages.suture.trials.perception import Seen
+from scenewright.stages.suture.trials.policy import Policy
+from scenewright.stages.suture.trials.pulling import pull_to
+from scenewright.stages.suture.trials.thread import pull_through
+from scenewright.stages.suture.trials.wound import SPANNED, exit_
 
 
 def extract(bench: Bench, policy: Policy) -> None:

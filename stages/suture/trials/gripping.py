@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse, transform_from
-from stages.suture.motion.needle import ARC_POINTS, ARC_TANGENTS, about
-from stages.suture.rig import NEEDLE_RADIUS
-from stages.suture.trials.settings import World
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
+from scenewright.stages.suture.motion.needle import ARC_POINTS, ARC_TANGENTS, about
+from scenewright.stages.suture.rig import NEEDLE_RADIUS
+from scenewright.stages.suture.trials.settings import World
 
 
 @dataclass(frozen=True)

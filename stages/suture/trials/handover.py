@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse, transform_from
-from stages.suture.motion import primitives
-from stages.suture.motion.constants import APPROACH_OFFSET, HANDOVER_OFFSET, RETRIES
-from stages.suture.motion.needle import turned
-from stages.suture.trials.bench import HOME, Bench, Failed, Hold
-from stages.suture.trials.gripping import close
-from stages.suture.trials.places import PRESENTING, TAKING
-from stages.suture.trials.policy import Coordination, Policy
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.constants import APPROACH_OFFSET, HANDOVER_OFFSET, RETRIES
+from scenewright.stages.suture.motion.needle import turned
+from scenewright.stages.suture.trials.bench import HOME, Bench, Failed, Hold
+from scenewright.stages.suture.trials.gripping import close
+from scenewright.stages.suture.trials.places import PRESENTING, TAKING
+from scenewright.stages.suture.trials.policy import Coordination, Policy
 
 PLACE = np.array([0.010, 0.0, 0.045])
 """Where the left driver presents the needle [m]."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.motion import primitives
-from stages.suture.motion.needle import TIP, turned
-from stages.suture.trials.belief import Belief, as_planned
-from stages.suture.trials.bench import Bench, Failed, travel_time
-from stages.suture.trials.places import beside_wound
-from stages.suture.trials.policy import Coordination
-from stages.suture.trials.wound import entry, exit_, passage
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.needle import TIP, turned
+from scenewright.stages.suture.trials.belief import Belief, as_planned
+from scenewright.stages.suture.trials.bench import Bench, Failed, travel_time
+from scenewright.stages.suture.trials.places import beside_wound
+from scenewright.stages.suture.trials.policy import Coordination
+from scenewright.stages.suture.trials.wound import entry, exit_, passage
 
 STAND_OFF = np.array([-0.008, 0.0, 0.0])
 """From the place of insertion to where the push begins [m]."""

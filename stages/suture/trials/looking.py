@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
-from stages.suture.trials.bench import Bench, Failed
-from stages.suture.trials.perception import Seen
-from stages.suture.trials.policy import Trust
+from scenewright.stages.suture.trials.bench import Bench, Failed
+from scenewright.stages.suture.trials.perception import Seen
+from scenewright.stages.suture.trials.policy import Trust
 
 LOOKS = 10
 TOO_MANY_LOOKS = 60

@@ -6,18 +6,17 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-
-from stages.suture.motion.constants import THROWS, cinch_length
-from stages.suture.trials.bench import CORNER, HOME, Bench, Failed, loaded
-from stages.suture.trials.extraction import cinch, extract
-from stages.suture.trials.handover import hand_over
-from stages.suture.trials.insertion import insert
-from stages.suture.trials.perception import FOLDER, Eyes, Looking, PerceptionModel, perception_model
-from stages.suture.trials.policy import Policy
-from stages.suture.trials.recording import Recorder
-from stages.suture.trials.settings import World
-from stages.suture.trials.thread import LEFT_IN_FIRST_HOLE, Thread
-from stages.suture.trials.wound import exit_
+from scenewright.stages.suture.motion.constants import THROWS, cinch_length
+from scenewright.stages.suture.trials.bench import CORNER, HOME, Bench, Failed, loaded
+from scenewright.stages.suture.trials.extraction import cinch, extract
+from scenewright.stages.suture.trials.handover import hand_over
+from scenewright.stages.suture.trials.insertion import insert
+from scenewright.stages.suture.trials.perception import FOLDER, Eyes, Looking, PerceptionModel, perception_model
+from scenewright.stages.suture.trials.policy import Policy
+from scenewright.stages.suture.trials.recording import Recorder
+from scenewright.stages.suture.trials.settings import World
+from scenewright.stages.suture.trials.thread import LEFT_IN_FIRST_HOLE, Thread
+from scenewright.stages.suture.trials.wound import exit_
 
 
 class Watching(Looking, Protocol):

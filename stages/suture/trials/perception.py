@@ -12,11 +12,10 @@ from typing import Protocol
 
 import numpy as np
 from pydantic import Field, ValidationError
-
-from schemas.base import Model
-from schemas.errors import BadInput, first_problem
-from schemas.outside import file_toml
-from stages.suture.motion.needle import SWAGE, TIP, from_ends
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import file_toml
+from scenewright.stages.suture.motion.needle import SWAGE, TIP, from_ends
 
 FOLDER = Path(__file__).resolve().parents[3] / "data" / "stitch"
 STILL = 1.5e-3

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.motion import primitives
-from stages.suture.motion.needle import UP_THE_WOUND, about
-from stages.suture.trials.wound import exit_
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.needle import UP_THE_WOUND, about
+from scenewright.stages.suture.trials.wound import exit_
 
 NOMINAL = primitives.jaws(np.array([0.0, 0.0, -1.0]))
 """The right driver's orientation when a needle that it holds by the swage as planned is ready for insertion."""

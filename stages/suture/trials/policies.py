@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stages.suture.motion.constants import INTERVENTIONS
-from stages.suture.trials.ours.coordination import BothAtOnce
-from stages.suture.trials.ours.extraction import AsInserted, OnTheWire
-from stages.suture.trials.ours.handover import TurnedAboutHolder
-from stages.suture.trials.ours.pose_correction import BySeenEnds
-from stages.suture.trials.ours.thread_handling import ByTheBooks, PullsOn, PushedSideways
-from stages.suture.trials.ours.trust import InPlace
-from stages.suture.trials.policy import Policy
-from stages.suture.trials.thesis.coordination import OneAtATime
-from stages.suture.trials.thesis.extraction import (
+from scenewright.stages.suture.motion.constants import INTERVENTIONS
+from scenewright.stages.suture.trials.ours.coordination import BothAtOnce
+from scenewright.stages.suture.trials.ours.extraction import AsInserted, OnTheWire
+from scenewright.stages.suture.trials.ours.handover import TurnedAboutHolder
+from scenewright.stages.suture.trials.ours.pose_correction import BySeenEnds
+from scenewright.stages.suture.trials.ours.thread_handling import ByTheBooks, PullsOn, PushedSideways
+from scenewright.stages.suture.trials.ours.trust import InPlace
+from scenewright.stages.suture.trials.policy import Policy
+from scenewright.stages.suture.trials.thesis.coordination import OneAtATime
+from scenewright.stages.suture.trials.thesis.extraction import (
     ByTheEnds,
     LinearPull,
     NoSweep,
@@ -22,9 +22,9 @@ from stages.suture.trials.thesis.extraction import (
     OverTheWound,
     ToCinchLength,
 )
-from stages.suture.trials.thesis.handover import NormalChanged, ThreadAsItHangs
-from stages.suture.trials.thesis.pose_correction import NinetyDegrees, NoCorrection
-from stages.suture.trials.thesis.trust import EveryEstimate
+from scenewright.stages.suture.trials.thesis.handover import NormalChanged, ThreadAsItHangs
+from scenewright.stages.suture.trials.thesis.pose_correction import NinetyDegrees, NoCorrection
+from scenewright.stages.suture.trials.thesis.trust import EveryEstimate
 
 THESIS = Policy(
     name="thesis",

@@ -10,11 +10,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-
-from stages.suture.motion.constants import OpenConstants
-from stages.suture.trials.belief import Belief
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.perception import Seen
+from scenewright.stages.suture.motion.constants import OpenConstants
+from scenewright.stages.suture.trials.belief import Belief
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.perception import Seen
 
 
 class Trust(Protocol):

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.motion.needle import point_at
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.wound import exit_
+from scenewright.stages.suture.motion.needle import point_at
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.wound import exit_
 
 OUTWARDS = np.array([0.249, 0.548, 0.798]) / np.linalg.norm([0.249, 0.548, 0.798])
 LONGEST_PULL = 0.115

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from stages.kit.geometry.transforms import inverse
-from stages.suture.robot.arms import ARMS
-from stages.suture.robot.inverse import solutions
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.suture.robot.arms import ARMS
+from scenewright.stages.suture.robot.inverse import solutions
 
 ARM_ORDER = ("right", "left")
 KEPT_OF_A_MOTION = 8

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.suture_trial import SutureRun
-from stages.suture.trials.machine import Outcome
+from scenewright.schemas.suture_trial import SutureRun
+from scenewright.stages.suture.trials.machine import Outcome
 
 
 def run_of(arm: str, seed: int, outcome: Outcome) -> SutureRun:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from stages.kit.geometry.transforms import wrapped
+from scenewright.stages.kit.geometry.transforms import wrapped
 
 PARTICLES = 48
 THREAD_RADIUS = 0.00019

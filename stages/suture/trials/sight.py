@@ -14,23 +14,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from
-from stages.suture.evaluation.judgement import Estimate, judged
-from stages.suture.masks import EyeMasks, learned_masks, open_segmenter, spoiled_masks
-from stages.suture.needle.estimators import ESTIMATORS
-from stages.suture.rig import TWO_CAMERAS, NeedlePose
-from stages.suture.robot.arms import REMOTE_CENTRES
-from stages.suture.robot.psm import YAW_TO_TIP
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.perception import PerceptionModel, Seen, ends_of, has_moved
-from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
-from stages.suture.world.corruption import noisy_disparity
-from stages.suture.world.pad import Ridge
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.scene import NeedleScene, make_scene
-from stages.suture.world.thread import THREAD_RADIUS
-from stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD, Tubes, chain, joined, needle_tube
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
+from scenewright.stages.suture.evaluation.judgement import Estimate, judged
+from scenewright.stages.suture.masks import EyeMasks, learned_masks, open_segmenter, spoiled_masks
+from scenewright.stages.suture.needle.estimators import ESTIMATORS
+from scenewright.stages.suture.rig import TWO_CAMERAS, NeedlePose
+from scenewright.stages.suture.robot.arms import REMOTE_CENTRES
+from scenewright.stages.suture.robot.psm import YAW_TO_TIP
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.perception import PerceptionModel, Seen, ends_of, has_moved
+from scenewright.stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
+from scenewright.stages.suture.world.corruption import noisy_disparity
+from scenewright.stages.suture.world.pad import Ridge
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.scene import NeedleScene, make_scene
+from scenewright.stages.suture.world.thread import THREAD_RADIUS
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD, Tubes, chain, joined, needle_tube
 
 PICTURED_FROM_TRIAL = transform_from(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
 """The needle world's wound runs away from the cameras, the trial's towards them."""

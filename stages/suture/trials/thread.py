@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from math import exp, pi
 
 import numpy as np
-
-from stages.suture.trials.settings import World
-from stages.suture.trials.wound import CHORD, entry, exit_
+from scenewright.stages.suture.trials.settings import World
+from scenewright.stages.suture.trials.wound import CHORD, entry, exit_
 
 LEFT_IN_FIRST_HOLE = 0.010
 """A tail shorter than this [m] slips out of the first hole."""

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from math import cos, pi, sin, sqrt
 
 import numpy as np
-
-from stages.suture.rig import NEEDLE_RADIUS
+from scenewright.stages.suture.rig import NEEDLE_RADIUS
 
 SPANNED = pi / 4
 CHORD = 2.0 * NEEDLE_RADIUS * sin(SPANNED / 2)

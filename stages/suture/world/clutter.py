@@ -9,10 +9,9 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-
-from stages.suture.rig import NEEDLE_RADIUS, StereoRig
-from stages.suture.world.render import Eye, StereoView
-from stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, StereoRig
+from scenewright.stages.suture.world.render import Eye, StereoView
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD
 
 BLOOD = np.array([96.0, 10.0, 12.0])
 MOST_GLINTS, MOST_BLOOD = 14, 4

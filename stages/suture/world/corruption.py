@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from stages.suture.world.render import Eye, StereoView
-from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
+from scenewright.stages.suture.world.render import Eye, StereoView
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
 
 
 def spoiled_mask(eye: Eye, random: np.random.Generator) -> np.ndarray:

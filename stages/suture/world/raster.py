@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-
-from stages.suture.world.pad import FLAT_FROM, Ridge, height, texture
-from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
+from scenewright.stages.suture.world.pad import FLAT_FROM, Ridge, height, texture
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
 SUBPIXELS = 3
 """Sub-pixels a side."""

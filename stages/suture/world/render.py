@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.suture.rig import NeedlePose, StereoRig
+from scenewright.stages.suture.world.raster import SUBPIXELS, Cones, Lighting, View, draw, hide_below_pad, label, shade
+from scenewright.stages.suture.world.scene import NeedleScene
+from scenewright.stages.suture.world.tubes import NEEDLE, Tubes
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import inverse
-from stages.suture.rig import NeedlePose, StereoRig
-from stages.suture.world.raster import SUBPIXELS, Cones, Lighting, View, draw, hide_below_pad, label, shade
-from stages.suture.world.scene import NeedleScene
-from stages.suture.world.tubes import NEEDLE, Tubes
 
 SHADOW_SIZE, SHADOW_SCALE, SHADOW_ORIGIN = 800, 2000.0, -0.20
 NEAR = 70

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stages.suture.rig import TWO_CAMERAS, StereoRig
-from stages.suture.world.render import StereoView, render
-from stages.suture.world.scene import NeedleScene, make_scene
+from scenewright.stages.suture.rig import TWO_CAMERAS, StereoRig
+from scenewright.stages.suture.world.render import StereoView, render
+from scenewright.stages.suture.world.scene import NeedleScene, make_scene
 
 LEAST_SEEN = 0.4
 """The least share of the arc that each eye sees."""

@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from
-from stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose, StereoRig
-from stages.suture.world.pad import RIDGE_HEIGHT, ROUNDED, Ridge
-from stages.suture.world.thread import THREAD_RADIUS, loose_thread
-from stages.suture.world.tubes import (
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
+from scenewright.stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose, StereoRig
+from scenewright.stages.suture.world.pad import RIDGE_HEIGHT, ROUNDED, Ridge
+from scenewright.stages.suture.world.thread import THREAD_RADIUS, loose_thread
+from scenewright.stages.suture.world.tubes import (
     LEFT_DRIVER,
     RIGHT_DRIVER,
     THREAD,
@@ -28,6 +26,7 @@ from stages.suture.world.tubes import (
     joined,
     needle_tube,
 )
+from scipy.spatial.transform import Rotation
 
 HOLDERS = ("air", "left", "right", "both", "tissue")
 PLACES = {

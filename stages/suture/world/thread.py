@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.world.pad import ROUNDED, height
+from scenewright.stages.suture.world.pad import ROUNDED, height
 
 THREAD_RADIUS = 0.00019
 """Half the thickness of a 2-0 thread [m]: it is 0.35 to 0.4 mm thick."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.suture.rig import NEEDLE_RADIUS, NeedlePose
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose
 
 NEEDLE, THREAD, LEFT_DRIVER, RIGHT_DRIVER = 1, 2, 3, 4
 WIRE_RADIUS = 0.0005

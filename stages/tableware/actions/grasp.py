@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
 
-from schemas.tableware_plan import GraspFields
-from stages.tableware.planning.action import POINT, Primitive
-from stages.tableware.planning.rules import grasp_centre
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.items import Item, Table
+from scenewright.schemas.tableware_plan import GraspFields
+from scenewright.stages.tableware.planning.action import POINT, Primitive
+from scenewright.stages.tableware.planning.rules import grasp_centre
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.items import Item, Table
 
 BITE = 0.005
 """How far [m] the fingertips reach below the lowest lip that they hold (ours)."""

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import atan2, pi
 
-from schemas.tableware_plan import PullFields
-from stages.tableware.planning.action import POINT, Primitive
-from stages.tableware.planning.rules import Rules, pull_end
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.items import Table
+from scenewright.schemas.tableware_plan import PullFields
+from scenewright.stages.tableware.planning.action import POINT, Primitive
+from scenewright.stages.tableware.planning.rules import Rules, pull_end
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.items import Table
 
 
 @dataclass(frozen=True)

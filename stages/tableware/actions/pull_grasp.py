@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.tableware_plan import PullGraspFields
-from stages.tableware.actions.grasp import Grasp, grasp_two
-from stages.tableware.actions.pull import Pull, pull
-from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.planning.rules import Rules
-from stages.tableware.world.items import Table
+from scenewright.schemas.tableware_plan import PullGraspFields
+from scenewright.stages.tableware.actions.grasp import Grasp, grasp_two
+from scenewright.stages.tableware.actions.pull import Pull, pull
+from scenewright.stages.tableware.planning.action import Action, Primitive
+from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.world.items import Table
 
 
 @dataclass(frozen=True)

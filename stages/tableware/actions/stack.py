@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from schemas.tableware_plan import StackFields
-from stages.tableware.actions.grasp import Grasp, grasp, jaws_close
-from stages.tableware.planning.action import POINT, Primitive
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.items import Item, Table, stand_height
+from scenewright.schemas.tableware_plan import StackFields
+from scenewright.stages.tableware.actions.grasp import Grasp, grasp, jaws_close
+from scenewright.stages.tableware.planning.action import POINT, Primitive
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.items import Item, Table, stand_height
 
 
 @dataclass(frozen=True)

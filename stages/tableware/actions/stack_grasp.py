@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.tableware_plan import StackGraspFields
-from stages.tableware.actions.grasp import Grasp, grasp
-from stages.tableware.actions.stack import Stack, bottom_of, stack
-from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.world.items import Table
+from scenewright.schemas.tableware_plan import StackGraspFields
+from scenewright.stages.tableware.actions.grasp import Grasp, grasp
+from scenewright.stages.tableware.actions.stack import Stack, bottom_of, stack
+from scenewright.stages.tableware.planning.action import Action, Primitive
+from scenewright.stages.tableware.world.items import Table
 
 
 @dataclass(frozen=True)

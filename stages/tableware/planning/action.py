@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from schemas.tableware_plan import ActionFields
-from stages.tableware.planning.rules import letters
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.items import Item, Table
+from scenewright.schemas.tableware_plan import ActionFields
+from scenewright.stages.tableware.planning.rules import letters
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.items import Item, Table
 
 POINT = tuple[float, float, float]
 

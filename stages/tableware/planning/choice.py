@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from schemas.tableware_plan import TimesOfActions
-from stages.tableware import policies
-from stages.tableware.found_by_place import module_named
-from stages.tableware.options import ActionTimes
-from stages.tableware.planning.policy import STANDARD_SETTING, DeclaredPolicy, Policy
-from stages.tableware.planning.time_model import WORLDS, Chances, TimeModel, fitted
-from stages.tableware.world.setting import Setting
+from scenewright.schemas.tableware_plan import TimesOfActions
+from scenewright.stages.tableware import policies
+from scenewright.stages.tableware.found_by_place import module_named
+from scenewright.stages.tableware.options import ActionTimes
+from scenewright.stages.tableware.planning.policy import STANDARD_SETTING, DeclaredPolicy, Policy
+from scenewright.stages.tableware.planning.time_model import WORLDS, Chances, TimeModel, fitted
+from scenewright.stages.tableware.world.setting import Setting
 
 
 def chances_of(name: str) -> Chances:

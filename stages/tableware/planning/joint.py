@@ -12,15 +12,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from stages.tableware.actions.grasp import grasp, grasp_two
-from stages.tableware.actions.pull import pull
-from stages.tableware.actions.stack import stack
-from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
-from stages.tableware.planning.policy import liftable
-from stages.tableware.planning.rules import Rules, can_grasp_two
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.items import Table
+from scenewright.stages.tableware.actions.grasp import grasp, grasp_two
+from scenewright.stages.tableware.actions.pull import pull
+from scenewright.stages.tableware.actions.stack import stack
+from scenewright.stages.tableware.planning.action import Action, Primitive
+from scenewright.stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
+from scenewright.stages.tableware.planning.policy import liftable
+from scenewright.stages.tableware.planning.rules import Rules, can_grasp_two
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.items import Table
 
 OFF = 0.3
 """How far off, as a share of it, the time of a trip with its delay is reckoned to be."""

@@ -16,12 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
-from schemas.errors import UsageError
-from stages.tableware.planning.rules import Rules, pile_order, split_over_two
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.planning.trip_options import Part, TripOptions, trip_options
-from stages.tableware.world.items import Table
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.tableware.planning.rules import Rules, pile_order, split_over_two
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.planning.trip_options import Part, TripOptions, trip_options
+from scenewright.stages.tableware.world.items import Table
 
 MOST_ITEMS = 16
 SAME_PLACE = 1e-6

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.rules import Rules, can_hold, letters
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.items import Item, Table
-from stages.tableware.world.setting import Setting
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.rules import Rules, can_hold, letters
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.items import Item, Table
+from scenewright.stages.tableware.world.setting import Setting
 
 THESIS = replace(Rules(), utensils_in_cups=True, both_piles=False)
 """What section 6.2 (Srinivas 2024) allows."""

@@ -13,10 +13,9 @@ from math import cos, pi, sin, sqrt
 from typing import Literal
 
 import numpy as np
-
-from stages.tableware.simulation.push_place import PULL_SPEED, Push, push_place
-from stages.tableware.world.items import DishSizes, Kind, Measures, Table, make_item, stand_height
-from stages.tableware.world.setting import Setting
+from scenewright.stages.tableware.simulation.push_place import PULL_SPEED, Push, push_place
+from scenewright.stages.tableware.world.items import DishSizes, Kind, Measures, Table, make_item, stand_height
+from scenewright.stages.tableware.world.setting import Setting
 
 FRICTION = 0.5
 """Coefficient of friction between a foot and a table that is reckoned with: plastic and china on wood have 0.2 to 0.5;

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.tableware_plan import ImpossiblePair
-from stages.tableware.planning.rules import (
+from scenewright.schemas.tableware_plan import ImpossiblePair
+from scenewright.stages.tableware.planning.rules import (
     Rules,
     can_hold,
     can_hold_two,
@@ -18,8 +18,8 @@ from stages.tableware.planning.rules import (
     why_not_pulled,
     within_jaws,
 )
-from stages.tableware.world.footprints import Footprint, footprint, gap
-from stages.tableware.world.items import Item, Table
+from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap
+from scenewright.stages.tableware.world.items import Item, Table
 
 NOT_PULLED = {
     "loaded": "carries others and loaded pulls are off",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from schemas.tableware_plan import TablewareAction
-from stages.tableware import actions
-from stages.tableware.found_by_place import module_named
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.items import Table
+from scenewright.schemas.tableware_plan import TablewareAction
+from scenewright.stages.tableware import actions
+from scenewright.stages.tableware.found_by_place import module_named
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.items import Table
 
 
 def as_record(action: Action, table: Table, model: TimeModel, chances: Chances) -> TablewareAction:

@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.errors import BadInput
-from schemas.tableware_plan import RefusedItem
-from schemas.tableware_scene import MOST_ITEMS
-from stages.tableware.planning.rules import Rules, can_hold, letters
-from stages.tableware.world.footprints import Footprint, footprint
-from stages.tableware.world.items import Item, Table
-from stages.tableware.world.setting import Setting
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.tableware_plan import RefusedItem
+from scenewright.schemas.tableware_scene import MOST_ITEMS
+from scenewright.stages.tableware.planning.rules import Rules, can_hold, letters
+from scenewright.stages.tableware.world.footprints import Footprint, footprint
+from scenewright.stages.tableware.world.items import Item, Table
+from scenewright.stages.tableware.world.setting import Setting
 
 EDGE = 0.005
 """What stands on the table may be seen to hang over its edge by this [m]; what lies on a dish goes with the dish."""

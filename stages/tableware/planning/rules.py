@@ -13,12 +13,11 @@ from math import atan2, cos, hypot, pi, sin
 from typing import Literal
 
 import numpy as np
-
-from stages.tableware.planning import pulled_load
-from stages.tableware.planning.pulled_load import NotPulled
-from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
-from stages.tableware.world.items import Item, Kind, Measures, Table, rise
-from stages.tableware.world.setting import Setting
+from scenewright.stages.tableware.planning import pulled_load
+from scenewright.stages.tableware.planning.pulled_load import NotPulled
+from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
+from scenewright.stages.tableware.world.items import Item, Kind, Measures, Table, rise
+from scenewright.stages.tableware.world.setting import Setting
 
 LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
 _KINDS: dict[str, Kind] = {"p": "plate", "b": "bowl", "c": "cup", "u": "fork"}

@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
-
-from schemas.base import Model
-from stages.tableware.options import THESIS_TIMES
+from scenewright.schemas.base import Model
+from scenewright.stages.tableware.options import THESIS_TIMES
 
 FILE = Path(__file__).resolve().parents[3] / "data" / THESIS_TIMES
 PLACEMENT_KINDS = ("cup", "bowl")

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
-from stages.tableware.planning.rules import (
+from scenewright.stages.tableware.planning.rules import (
     Rules,
     can_hold,
     can_pile,
@@ -27,9 +26,9 @@ from stages.tableware.planning.rules import (
     why_not_pulled,
     within_jaws,
 )
-from stages.tableware.planning.time_model import Chances, TimeModel
-from stages.tableware.world.footprints import Footprint, footprint, overlapped
-from stages.tableware.world.items import Item, Table
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
+from scenewright.stages.tableware.world.footprints import Footprint, footprint, overlapped
+from scenewright.stages.tableware.world.items import Item, Table
 
 MOST_DISHES = 6
 """In one grasp: three in each of two piles (section 6.4)."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stages.tableware.planning.joint import JointPolicy
-from stages.tableware.planning.policy import DeclaredPolicy
-from stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.planning.joint import JointPolicy
+from scenewright.stages.tableware.planning.policy import DeclaredPolicy
+from scenewright.stages.tableware.planning.rules import Rules
 
 RIVALS = ("pull", "stack")
 _BOWLS = ("b", "bb", "bc", "bcc", "bbc")

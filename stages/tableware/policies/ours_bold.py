@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from stages.tableware.planning.joint import JointPolicy
-from stages.tableware.planning.policy import DeclaredPolicy
-from stages.tableware.planning.rules import Rules
-from stages.tableware.policies import ours
+from scenewright.stages.tableware.planning.joint import JointPolicy
+from scenewright.stages.tableware.planning.policy import DeclaredPolicy
+from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.policies import ours
 
 RULES = Rules(steady_pulls=True)
 POLICY = DeclaredPolicy(JointPolicy, RULES, rivals=ours.RIVALS)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stages.tableware.planning.joint import JointPolicy
-from stages.tableware.planning.policy import DeclaredPolicy
-from stages.tableware.policies import ours
+from scenewright.stages.tableware.planning.joint import JointPolicy
+from scenewright.stages.tableware.planning.policy import DeclaredPolicy
+from scenewright.stages.tableware.policies import ours
 
 RULES = replace(ours.RULES, loaded_pulls=False)
 POLICY = DeclaredPolicy(JointPolicy, RULES, rivals=ours.RIVALS)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from itertools import permutations
 
-from stages.tableware.actions.grasp import grasp, grasp_two
-from stages.tableware.actions.pull_grasp import pull_grasp
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
-from stages.tableware.planning.rules import Rules, can_grasp_two, can_pull
-from stages.tableware.world.items import Table
+from scenewright.stages.tableware.actions.grasp import grasp, grasp_two
+from scenewright.stages.tableware.actions.pull_grasp import pull_grasp
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
+from scenewright.stages.tableware.planning.rules import Rules, can_grasp_two, can_pull
+from scenewright.stages.tableware.world.items import Table
 
 
 class PullPolicy:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-
-from stages.tableware.actions.grasp import Grasp, grasp
-from stages.tableware.planning.policy import DeclaredPolicy
-from stages.tableware.world.items import Table
+from scenewright.stages.tableware.actions.grasp import Grasp, grasp
+from scenewright.stages.tableware.planning.policy import DeclaredPolicy
+from scenewright.stages.tableware.world.items import Table
 
 
 class RandomOne:

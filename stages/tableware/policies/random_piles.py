@@ -5,11 +5,10 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-
-from stages.tableware.actions.grasp import Grasp, grasp
-from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
-from stages.tableware.planning.rules import Rules
-from stages.tableware.world.items import Table
+from scenewright.stages.tableware.actions.grasp import Grasp, grasp
+from scenewright.stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
+from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.world.items import Table
 
 
 class RandomPile:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from stages.tableware.actions.grasp import grasp
-from stages.tableware.actions.stack_grasp import stack_grasp
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
-from stages.tableware.planning.rules import Rules, can_put
-from stages.tableware.world.items import Table
+from scenewright.stages.tableware.actions.grasp import grasp
+from scenewright.stages.tableware.actions.stack_grasp import stack_grasp
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
+from scenewright.stages.tableware.planning.rules import Rules, can_put
+from scenewright.stages.tableware.world.items import Table
 
 
 class StackPolicy:

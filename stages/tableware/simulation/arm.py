@@ -10,15 +10,14 @@ from __future__ import annotations
 from math import asin, atan2, hypot, pi
 
 import numpy as np
-
-from stages.kit.motion.cartesian import follow, straight_poses
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics
-from stages.kit.motion.timing import sample_times, time_path
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.kit.motion.cartesian import follow, straight_poses
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics
+from scenewright.stages.kit.motion.timing import sample_times, time_path
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 BASE = np.array([0.0, -0.46, 0.15])
 """Where the arm stands, higher than the table top: else the upper arm sweeps dishes off it when it reaches far [m]."""

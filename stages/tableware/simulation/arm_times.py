@@ -8,10 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from pydantic import Field
-
-from schemas.base import Model
-from stages.tableware.options import PHYSICS_TIMES
-from stages.tableware.planning.time_model import TimeModel
+from scenewright.schemas.base import Model
+from scenewright.stages.tableware.options import PHYSICS_TIMES
+from scenewright.stages.tableware.planning.time_model import TimeModel
 
 FILE = Path(__file__).resolve().parents[3] / "data" / PHYSICS_TIMES
 

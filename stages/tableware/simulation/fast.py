@@ -16,18 +16,17 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
-
-from stages.tableware.actions.grasp import Grasp, taken
-from stages.tableware.actions.pull import Pull, after_pull
-from stages.tableware.actions.stack import Stack, after_stack
-from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.planning.policy import STANDARD_SETTING, Policy
-from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, letters
-from stages.tableware.planning.time_model import Chances, TimeModel, placement_error
-from stages.tableware.simulation.trial import Trial, run_in
-from stages.tableware.world.footprints import footprint, gap, overlapped
-from stages.tableware.world.items import TABLE_SIDES, Item, Table
-from stages.tableware.world.setting import Setting
+from scenewright.stages.tableware.actions.grasp import Grasp, taken
+from scenewright.stages.tableware.actions.pull import Pull, after_pull
+from scenewright.stages.tableware.actions.stack import Stack, after_stack
+from scenewright.stages.tableware.planning.action import Action, Primitive
+from scenewright.stages.tableware.planning.policy import STANDARD_SETTING, Policy
+from scenewright.stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, letters
+from scenewright.stages.tableware.planning.time_model import Chances, TimeModel, placement_error
+from scenewright.stages.tableware.simulation.trial import Trial, run_in
+from scenewright.stages.tableware.world.footprints import footprint, gap, overlapped
+from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Table
+from scenewright.stages.tableware.world.setting import Setting
 
 
 class FastWorld:

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from math import atan2, cos, pi, sin
 
 import numpy as np
-
-from stages.tableware.simulation.pieces import solid
-from stages.tableware.world.footprints import Footprint, footprint, gap
-from stages.tableware.world.items import Item, Table
-from stages.tableware.world.setting import Gripper
+from scenewright.stages.tableware.simulation.pieces import solid
+from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap
+from scenewright.stages.tableware.world.items import Item, Table
+from scenewright.stages.tableware.world.setting import Gripper
 
 JAW_HEIGHT, PAD, PAD_WIDTH, KNUCKLE = 0.045, 0.007, 0.022, 0.014
 """Height of the fingertips, their thickness and width, thickness of the knuckles above them [m]; see ur5.urdf."""

@@ -11,15 +11,14 @@ from math import cos, hypot, pi, sin
 from typing import Any
 
 import numpy as np
-
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.simulation.world import PhysicsWorld
-from stages.tableware.actions.grasp import Grasp
-from stages.tableware.actions.pull import Pull
-from stages.tableware.actions.stack import Stack
-from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
-from stages.tableware.simulation.holds import (
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.tableware.actions.grasp import Grasp
+from scenewright.stages.tableware.actions.pull import Pull
+from scenewright.stages.tableware.actions.stack import Stack
+from scenewright.stages.tableware.planning.action import Action, Primitive
+from scenewright.stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
+from scenewright.stages.tableware.simulation.holds import (
     FREE,
     Hold,
     bar_hold,
@@ -30,11 +29,11 @@ from stages.tableware.simulation.holds import (
     tool_pose,
     walls,
 )
-from stages.tableware.simulation.push_place import PULL_SPEED, push_place
-from stages.tableware.simulation.tabletop import BIN_CENTER, Tabletop
-from stages.tableware.simulation.trial import Trial
-from stages.tableware.world.items import Item, Table, rise
-from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
+from scenewright.stages.tableware.simulation.push_place import PULL_SPEED, push_place
+from scenewright.stages.tableware.simulation.tabletop import BIN_CENTER, Tabletop
+from scenewright.stages.tableware.simulation.trial import Trial
+from scenewright.stages.tableware.world.items import Item, Table, rise
+from scenewright.stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
 
 TRAVEL = 0.17
 """Height of the fingertips on the way above everything [m]."""

@@ -9,20 +9,19 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from PIL import Image
-
-from schemas.scene_parts import Camera
-from stages.kit.formats.link_poses import link_poses
-from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.geometry.transforms import look_at
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.shapes import link_shapes, paint
-from stages.tableware.simulation.arm import BASE
-from stages.tableware.simulation.tabletop import BIN_CENTER, BIN_SIDE
-from stages.tableware.table_pictures import captioned
-from stages.tableware.world.dish_shapes import item_mesh
-from stages.tableware.world.items import TABLE_SIDES, Item, Measures
-from stages.tableware.world.shape_files import COLORS
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.link_poses import link_poses
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.shapes import link_shapes, paint
+from scenewright.stages.tableware.simulation.arm import BASE
+from scenewright.stages.tableware.simulation.tabletop import BIN_CENTER, BIN_SIDE
+from scenewright.stages.tableware.table_pictures import captioned
+from scenewright.stages.tableware.world.dish_shapes import item_mesh
+from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Measures
+from scenewright.stages.tableware.world.shape_files import COLORS
 
 EYE, TARGET = np.array([0.62, 1.02, 0.80]), np.array([0.14, -0.12, 0.0])
 FIELD_OF_VIEW = np.deg2rad(58.0)

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from math import hypot, pi
 from typing import Literal
 
-from stages.tableware.actions.grasp import grasp
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.policy import Policy, liftable
-from stages.tableware.planning.rules import Rules
-from stages.tableware.sight import Eyes
-from stages.tableware.simulation.physics import PhysicsTable
-from stages.tableware.simulation.trial import Done, Trial, most_actions, run_in, truth
-from stages.tableware.world.items import Item, Table
+from scenewright.stages.tableware.actions.grasp import grasp
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.policy import Policy, liftable
+from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware.sight import Eyes
+from scenewright.stages.tableware.simulation.physics import PhysicsTable
+from scenewright.stages.tableware.simulation.trial import Done, Trial, most_actions, run_in, truth
+from scenewright.stages.tableware.world.items import Item, Table
 
 NEAR = 0.015
 """An item that is seen within this [m] of where one of its kind stands is seen rightly."""

@@ -12,9 +12,8 @@ from functools import lru_cache
 from math import cos, pi
 
 import numpy as np
-
-from stages.tableware.world.dish_shapes import shell_mesh, utensil_mesh
-from stages.tableware.world.items import Kind, Measures
+from scenewright.stages.tableware.world.dish_shapes import shell_mesh, utensil_mesh
+from scenewright.stages.tableware.world.items import Kind, Measures
 
 OUTER = 3
 """Facets of a wedge's outer face: nearly round, while the inner face is one facet."""

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from math import atan2, pi
 
 import numpy as np
-
-from stages.tableware.simulation.holds import HAND, PAD, cargo, jaw_clearance, tool_pose, walls
-from stages.tableware.world.items import Table
-from stages.tableware.world.setting import Gripper
+from scenewright.stages.tableware.simulation.holds import HAND, PAD, cargo, jaw_clearance, tool_pose, walls
+from scenewright.stages.tableware.world.items import Table
+from scenewright.stages.tableware.world.setting import Gripper
 
 SPREAD = 0.72
 """Share of a dish's inner radius to which the fingers open when they pull it from inside."""

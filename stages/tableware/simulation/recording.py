@@ -6,9 +6,8 @@ from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
-
-from stages.tableware.simulation.physics import PhysicsTable
-from stages.tableware.world.items import Item
+from scenewright.stages.tableware.simulation.physics import PhysicsTable
+from scenewright.stages.tableware.world.items import Item
 
 
 class Recording:

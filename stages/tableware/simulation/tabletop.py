@@ -9,12 +9,11 @@ from math import atan2, hypot, sqrt
 from pathlib import Path
 
 import numpy as np
-
-from stages.kit.geometry.transforms import quaternion_of, transform_from_quaternion, transform_from_yaw
-from stages.kit.simulation.engine import engine, native_output_to_stderr
-from stages.kit.simulation.world import GRAVITY, PhysicsWorld
-from stages.tableware.simulation.pieces import Solid, obj_text, solid, urdf_text
-from stages.tableware.world.items import TABLE_SIDES, Item, Table
+from scenewright.stages.kit.geometry.transforms import quaternion_of, transform_from_quaternion, transform_from_yaw
+from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
+from scenewright.stages.kit.simulation.world import GRAVITY, PhysicsWorld
+from scenewright.stages.tableware.simulation.pieces import Solid, obj_text, solid, urdf_text
+from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Table
 
 TABLE_FRICTION, ITEM_FRICTION = 0.7, 0.5
 """Bullet multiplies the two of a contact: 0.35 on the table, 0.25 dish on dish, 0.8 under rubber."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Literal, Protocol
 
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.policy import Policy
-from stages.tableware.world.items import Table
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.policy import Policy
+from scenewright.stages.tableware.world.items import Table
 
 MOST_ACTIONS, MOST_IDLE = 400, 8
 STILL = 0.004

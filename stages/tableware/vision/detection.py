@@ -13,23 +13,22 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.dish_reading import cover_stack, dishes_of
-from stages.tableware.vision.foreground import rising, unlike_table
-from stages.tableware.vision.height_map import TALLEST, HeightMap, height_map
-from stages.tableware.vision.rim_finding import find_rims, overlapping
-from stages.tableware.vision.stack_reading import read_stacks
-from stages.tableware.vision.utensil_finding import Bar
-from stages.tableware.vision.utensil_reading import (
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.dish_reading import cover_stack, dishes_of
+from scenewright.stages.tableware.vision.foreground import rising, unlike_table
+from scenewright.stages.tableware.vision.height_map import TALLEST, HeightMap, height_map
+from scenewright.stages.tableware.vision.rim_finding import find_rims, overlapping
+from scenewright.stages.tableware.vision.stack_reading import read_stacks
+from scenewright.stages.tableware.vision.utensil_finding import Bar
+from scenewright.stages.tableware.vision.utensil_reading import (
     SAME_PLACE,
     UNKNOWN_AREA,
     as_detection,
     utensils_on_dish,
     utensils_on_table,
 )
-from stages.tableware.world.items import STANDARD, TABLE_SIDES, UTENSILS, DishSizes
-from stages.tableware.world.overhead import OverheadCamera
+from scenewright.stages.tableware.world.items import STANDARD, TABLE_SIDES, UTENSILS, DishSizes
+from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 UNKNOWN_HEIGHT = 0.010
 """What rises over this [m] on more than UNKNOWN_AREA without being an item is unknown."""

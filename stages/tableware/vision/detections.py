@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.tableware.world.items import STANDARD, DishSizes, Item, Kind, Measures, Table
+from scenewright.stages.tableware.world.items import STANDARD, DishSizes, Item, Kind, Measures, Table
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from schemas.base import as_transform
-from schemas.errors import BadInput
-from schemas.tableware_detections import DetectedSize, TablePlane, TablewareDetection, TablewareDetectionsFile
-from schemas.tableware_dishes import TablewareDishes
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.seeing import Sight, Sizes
-from stages.tableware.world.items import Measures
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.tableware_detections import (
+    DetectedSize,
+    TablePlane,
+    TablewareDetection,
+    TablewareDetectionsFile,
+)
+from scenewright.schemas.tableware_dishes import TablewareDishes
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.seeing import Sight, Sizes
+from scenewright.stages.tableware.world.items import Measures
 
 
 def to_file(sight: Sight, sizes: Sizes, dishes: TablewareDishes | None = None) -> TablewareDetectionsFile:

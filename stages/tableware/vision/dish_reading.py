@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.height_map import HeightMap
-from stages.tableware.vision.rim_finding import Rim
-from stages.tableware.vision.stack_reading import LIP_TOLERANCE, Stack
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.height_map import HeightMap
+from scenewright.stages.tableware.vision.rim_finding import Rim
+from scenewright.stages.tableware.vision.stack_reading import LIP_TOLERANCE, Stack
 
 LEAST_DEPTH, MOST_GLARE = 0.45, 0.10
 """Shares of a lip's pixels with depth, and of a dish's pixels at full white, at which there is doubt."""

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
-
-from schemas.base import Model
-from stages.tableware.vision.detections import Detection
-from stages.tableware.world.items import TABLE_SIDES, UTENSILS, Kind, Table
+from scenewright.schemas.base import Model
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.world.items import TABLE_SIDES, UTENSILS, Kind, Table
 
 FILE = Path(__file__).resolve().parents[3] / "data" / "tableware" / "error_model.json"
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.height_map import HeightMap
+from scenewright.stages.tableware.vision.height_map import HeightMap
 
 DARKER, BRIGHTER = 0.82, 1.25
 """Grey against the table's nearby, beyond which it may be no table."""

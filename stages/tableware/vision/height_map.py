@@ -8,10 +8,9 @@ from typing import Any
 import cv2
 import numpy as np
 from numba import njit
-
-from schemas.errors import BadInput
-from stages.tableware.world.items import TABLE_SIDES
-from stages.tableware.world.overhead import OverheadCamera
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.tableware.world.items import TABLE_SIDES
+from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 TALLEST = 0.20
 """Nothing on the table reaches higher [m]."""

@@ -15,13 +15,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pydantic import ValidationError
-
-from schemas.base import Model, Transform
-from schemas.errors import BadInput, first_problem
-from schemas.outside import file_json
-from schemas.scene_parts import Camera
-from schemas.tableware_dishes import TablewareDishes
-from stages.kit.formats.numpy_files import read_array, read_arrays
+from scenewright.schemas.base import Model, Transform
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import file_json
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.tableware_dishes import TablewareDishes
+from scenewright.stages.kit.formats.numpy_files import read_array, read_arrays
 
 COLORS = ("color.png", "color.jpg", "rgb.png", "rgb.jpg")
 DEPTHS = ("depth.npz", "depth.npy", "depth.png")

@@ -7,11 +7,10 @@ import textwrap
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.photographs import Outline
-from stages.tableware.vision.seeing import Sight
-from stages.tableware.world.items import DishSizes
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.photographs import Outline
+from scenewright.stages.tableware.vision.seeing import Sight
+from scenewright.stages.tableware.world.items import DishSizes
 
 COLORS = {
     "cup": (235, 70, 60),

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.tableware.world.items import STANDARD, DishSizes, Kind
+from scenewright.stages.tableware.world.items import STANDARD, DishSizes, Kind
 
 WIDTH = 960
 """Pictures are looked at in this width [px]."""

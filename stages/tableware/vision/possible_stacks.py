@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from itertools import product
 
-from stages.tableware.world.items import DishSizes, Kind, rise
+from scenewright.stages.tableware.world.items import DishSizes, Kind, rise
 
 MOST = 4
 """Dishes in a stack."""

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numba import njit
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.kit.geometry.planes import ransac_plane
-from stages.tableware.world.overhead import OverheadCamera, overhead_camera
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.planes import ransac_plane
+from scenewright.stages.tableware.world.overhead import OverheadCamera, overhead_camera
 
 POINTS = 20_000
 """Points that planes are looked for in."""

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.height_map import HeightMap
-from stages.tableware.vision.possible_stacks import lip_range
-from stages.tableware.vision.rim_fitting import RAYS, SoughtLip, fit_circle
-from stages.tableware.vision.rim_votes import cast_votes
-from stages.tableware.world.items import DishSizes, Kind
+from scenewright.stages.tableware.vision.height_map import HeightMap
+from scenewright.stages.tableware.vision.possible_stacks import lip_range
+from scenewright.stages.tableware.vision.rim_fitting import RAYS, SoughtLip, fit_circle
+from scenewright.stages.tableware.vision.rim_votes import cast_votes
+from scenewright.stages.tableware.world.items import DishSizes, Kind
 
 LEAST_SLOPE = 0.0012
 """Of an edge [m/px]."""

@@ -14,16 +14,15 @@ from typing import Literal
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.tableware.vision.detection import items_in
-from stages.tableware.vision.detections import Detection, statement
-from stages.tableware.vision.height_map import HeightMap, check_color, check_depth, height_map
-from stages.tableware.vision.rectifying import rectify, table_plane
-from stages.tableware.vision.size_estimation import estimated_dishes
-from stages.tableware.world.items import DISHES, STANDARD, TABLE_SIDES, DishSizes
-from stages.tableware.world.overhead import OverheadCamera
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.tableware.vision.detection import items_in
+from scenewright.stages.tableware.vision.detections import Detection, statement
+from scenewright.stages.tableware.vision.height_map import HeightMap, check_color, check_depth, height_map
+from scenewright.stages.tableware.vision.rectifying import rectify, table_plane
+from scenewright.stages.tableware.vision.size_estimation import estimated_dishes
+from scenewright.stages.tableware.world.items import DISHES, STANDARD, TABLE_SIDES, DishSizes
+from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 Sizes = Literal["known", "estimated"]
 LEAST_SIZE = (240, 180)

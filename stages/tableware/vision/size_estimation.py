@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.height_map import TALLEST, HeightMap
-from stages.tableware.world.items import Kind, dish_measures
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.height_map import TALLEST, HeightMap
+from scenewright.stages.tableware.world.items import Kind, dish_measures
 
 LEAST_HEIGHT, LEAST_AREA = 0.010, 0.0006
 """What stands on the table rises over the first [m] on more than the second [m^2]."""

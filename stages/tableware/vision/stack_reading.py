@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.tableware.vision.possible_stacks import possible_stacks
-from stages.tableware.vision.rim_finding import Rim
-from stages.tableware.world.items import DishSizes, Kind, Measures
+from scenewright.stages.tableware.vision.possible_stacks import possible_stacks
+from scenewright.stages.tableware.vision.rim_finding import Rim
+from scenewright.stages.tableware.world.items import DishSizes, Kind, Measures
 
 CONCENTRIC = 0.016
 """Rims of one stack lie this near to each other [m]."""

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.height_map import HeightMap, height_map
-from stages.tableware.vision.rim_finding import Rim
-from stages.tableware.vision.stack_reading import read_stacks
-from stages.tableware.world.items import STANDARD as SIZES
-from stages.tableware.world.items import Kind
-from stages.tableware.world.overhead import OverheadCamera
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.height_map import HeightMap, height_map
+from scenewright.stages.tableware.vision.rim_finding import Rim
+from scenewright.stages.tableware.vision.stack_reading import read_stacks
+from scenewright.stages.tableware.world.items import STANDARD as SIZES
+from scenewright.stages.tableware.world.items import Kind
+from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 CANNY = (60.0, 150.0)
 VOTES = 26.0

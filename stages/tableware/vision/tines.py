@@ -6,9 +6,8 @@ from functools import cache
 
 import numpy as np
 from numba import njit
-
-from stages.tableware.world.dish_shapes import GAP_SHARE, HEAD_SHARE, TINES
-from stages.tableware.world.items import Measures
+from scenewright.stages.tableware.world.dish_shapes import GAP_SHARE, HEAD_SHARE, TINES
+from scenewright.stages.tableware.world.items import Measures
 
 
 @cache

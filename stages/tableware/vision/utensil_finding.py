@@ -13,10 +13,9 @@ from functools import cache
 import cv2
 import numpy as np
 from numba import njit
-
-from stages.tableware.vision.bar_search import bar_candidates
-from stages.tableware.world.dish_shapes import utensil_parts
-from stages.tableware.world.items import DishSizes, Kind
+from scenewright.stages.tableware.vision.bar_search import bar_candidates
+from scenewright.stages.tableware.world.dish_shapes import utensil_parts
+from scenewright.stages.tableware.world.items import DishSizes, Kind
 
 LEAST_SCORE = 0.55
 """Cover of an outline less that of its border, each -1..1 and halved: 1 is perfect."""

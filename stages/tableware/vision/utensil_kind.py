@@ -10,11 +10,10 @@ from math import exp
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.height_map import HeightMap
-from stages.tableware.vision.tines import tine_difference
-from stages.tableware.vision.utensil_finding import Bar
-from stages.tableware.world.items import DishSizes, Kind
+from scenewright.stages.tableware.vision.height_map import HeightMap
+from scenewright.stages.tableware.vision.tines import tine_difference
+from scenewright.stages.tableware.vision.utensil_finding import Bar
+from scenewright.stages.tableware.world.items import DishSizes, Kind
 
 RANGE = 0.006
 """Heights are cut to this much above and below the utensil's underside [m]: floors of dishes are far below."""

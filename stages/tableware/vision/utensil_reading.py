@@ -7,11 +7,10 @@ from math import exp
 
 import cv2
 import numpy as np
-
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.height_map import HeightMap
-from stages.tableware.vision.stack_reading import Stack
-from stages.tableware.vision.utensil_finding import (
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.height_map import HeightMap
+from scenewright.stages.tableware.vision.stack_reading import Stack
+from scenewright.stages.tableware.vision.utensil_finding import (
     LEAST_SCORE,
     LEAST_VISIBLE,
     Bar,
@@ -20,8 +19,8 @@ from stages.tableware.vision.utensil_finding import (
     outline,
     search_bars,
 )
-from stages.tableware.vision.utensil_kind import fork_chance, kind_features, told_apart
-from stages.tableware.world.items import STANDARD, DishSizes
+from scenewright.stages.tableware.vision.utensil_kind import fork_chance, kind_features, told_apart
+from scenewright.stages.tableware.world.items import STANDARD, DishSizes
 
 AREA_SHARE = 0.5163
 """Plan area of a fork or a spoon over its length times its width."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-
-from stages.tableware.world.items import Item, Measures
+from scenewright.stages.tableware.world.items import Item, Measures
 
 SIDES = 64
 HEAD_SHARE = 0.36

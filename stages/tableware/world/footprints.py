@@ -8,8 +8,7 @@ from math import cos, hypot, sin
 
 import numpy as np
 from numba import njit
-
-from stages.tableware.world.items import TABLE_SIDES, Item
+from scenewright.stages.tableware.world.items import TABLE_SIDES, Item
 
 POINT = tuple[float, float]
 

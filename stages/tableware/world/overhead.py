@@ -8,14 +8,13 @@ from typing import Literal
 
 import numpy as np
 import trimesh
-
-from schemas.scene_parts import Camera
-from stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
-from stages.kit.rendering.light_map import AreaLight
-from stages.kit.rendering.patterns import Material
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.tableware.world.dish_shapes import item_mesh
-from stages.tableware.world.items import TABLE_SIDES, Table
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
+from scenewright.stages.kit.rendering.light_map import AreaLight
+from scenewright.stages.kit.rendering.patterns import Material
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.tableware.world.dish_shapes import item_mesh
+from scenewright.stages.tableware.world.items import TABLE_SIDES, Table
 
 CAMERA_HEIGHT = 0.83
 """Height of the camera above the table [m] (Srinivas 2024, section 7.1)."""

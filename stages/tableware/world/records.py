@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from schemas.tableware_scene import TablewareItem
-from stages.tableware.world.items import STANDARD, DishSizes, Item, Table
+from scenewright.schemas.tableware_scene import TablewareItem
+from scenewright.stages.tableware.world.items import STANDARD, DishSizes, Item, Table
 
 
 def as_records(table: Table) -> tuple[TablewareItem, ...]:

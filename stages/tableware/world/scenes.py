@@ -12,10 +12,18 @@ from dataclasses import dataclass, replace
 from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
-
-from schemas.errors import UsageError
-from stages.tableware.world.footprints import Footprint, footprint, gap
-from stages.tableware.world.items import STANDARD, DishSizes, Item, Kind, Table, make_item, radius, stand_height
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap
+from scenewright.stages.tableware.world.items import (
+    STANDARD,
+    DishSizes,
+    Item,
+    Kind,
+    Table,
+    make_item,
+    radius,
+    stand_height,
+)
 
 ORDER: tuple[Kind, ...] = ("plate", "bowl", "cup", "fork", "spoon")
 APART = 0.002

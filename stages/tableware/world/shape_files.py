@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from stages.kit.formats.ply_files import ColoredMesh, write_ply
-from stages.tableware.world.dish_shapes import item_mesh
-from stages.tableware.world.items import STANDARD, DishSizes, Kind, make_item
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
+from scenewright.stages.tableware.world.dish_shapes import item_mesh
+from scenewright.stages.tableware.world.items import STANDARD, DishSizes, Kind, make_item
 
 COLORS: dict[Kind, tuple[int, int, int]] = {
     "bowl": (91, 143, 201),

@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from stages.kit.formats.link_meshes import Surface
-from stages.kit.formats.link_poses import joint_motion
-from stages.kit.formats.urdf_file import Urdf, UrdfJoint
-from stages.kit.formats.written_scene import WrittenScene
-from stages.kit.geometry.transforms import quaternion_of
-from stages.urdf.exports import SceneExporter
+from scenewright.stages.kit.formats.link_meshes import Surface
+from scenewright.stages.kit.formats.link_poses import joint_motion
+from scenewright.stages.kit.formats.urdf_file import Urdf, UrdfJoint
+from scenewright.stages.kit.formats.written_scene import WrittenScene
+from scenewright.stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.urdf.exports import SceneExporter
 
 FLOAT, UNSIGNED_INT, UNSIGNED_SHORT = 5126, 5125, 5123
 VERTICES, INDICES = 34962, 34963

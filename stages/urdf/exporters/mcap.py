@@ -13,13 +13,12 @@ from google.protobuf.message import Message
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import build_file_descriptor_set
-
-from stages.kit.formats import foxglove
-from stages.kit.formats.link_meshes import Surface
-from stages.kit.formats.link_poses import joint_motion
-from stages.kit.formats.urdf_file import Urdf
-from stages.kit.formats.written_scene import WrittenScene
-from stages.urdf.exports import SceneExporter
+from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.link_meshes import Surface
+from scenewright.stages.kit.formats.link_poses import joint_motion
+from scenewright.stages.kit.formats.urdf_file import Urdf
+from scenewright.stages.kit.formats.written_scene import WrittenScene
+from scenewright.stages.urdf.exports import SceneExporter
 
 TRANSFORMS, SCENE = "/tf", "/scene"
 

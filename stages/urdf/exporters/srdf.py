@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
-from stages.kit.formats.urdf_file import Urdf, number
-from stages.kit.formats.written_scene import WrittenScene
-from stages.urdf.exports import SceneExporter
-from stages.urdf.resting_contacts import resting_contacts
+from scenewright.stages.kit.formats.urdf_file import Urdf, number
+from scenewright.stages.kit.formats.written_scene import WrittenScene
+from scenewright.stages.urdf.exports import SceneExporter
+from scenewright.stages.urdf.resting_contacts import resting_contacts
 
 GROUP, STATE = "doors_and_drawers", "reconstructed"
 

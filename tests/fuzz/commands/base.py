@@ -89,7 +89,16 @@ def make(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for run in RUNS:
         words = [str(folder / word[1:]) if word.startswith("@") else word for word in run.options.split()]
-        command = [sys.executable, "-m", "cli", *run.step.split(), *words, "--out", str(folder / run.name), "--quiet"]
+        command = [
+            sys.executable,
+            "-m",
+            "scenewright",
+            *run.step.split(),
+            *words,
+            "--out",
+            str(folder / run.name),
+            "--quiet",
+        ]
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
         done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True)
         if done.returncode not in (0, 4):
@@ -203,7 +212,7 @@ def _masks(folder: Path, foreign: Path) -> None:
             scores=np.array([0.9, 0.8]),
         )
     (masks / "classes.json").write_text(json.dumps({"1": "chair", "2": "floor"}))
-    from stages.engine.loading import load, payload
+    from scenewright.stages.engine.loading import load, payload
 
     sequence = load(folder / "needle_scene")
     with payload(sequence, "frames.mcap") as reader:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from stages.engine.discovery import all_stages
+from scenewright.stages.engine.discovery import all_stages
 
 
 @dataclass(frozen=True)

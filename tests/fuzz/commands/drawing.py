@@ -12,11 +12,11 @@ from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 import numpy as np
+from scenewright.schemas.artifact import KINDS, Artifact
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.kit.stage import External, Optionally, Stage
 
-from schemas.artifact import KINDS, Artifact
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.discovery import all_stages
-from stages.kit.stage import External, Optionally, Stage
 from tests.fuzz.commands.base import FOREIGN, names_of, place_of
 from tests.fuzz.commands.case import Case, Edit
 from tests.fuzz.commands.values import FLOATS, INTEGERS, STRINGS, any_value, instead_of
@@ -107,8 +107,7 @@ def commands() -> dict[str, Callable[[str, random.Random, Path], tuple[list[str]
 def _housekeeping() -> dict[str, Any]:
     """Return the commands that are no steps: name -> click's command."""
     import typer
-
-    from cli import housekeeping
+    from scenewright.cli import housekeeping
 
     application = typer.Typer()
     for function, _ in housekeeping.COMMANDS:

@@ -226,8 +226,7 @@ def swap(path: Path, other: str) -> None:
 def mesh(path: Path, what: str, value: float = 0.0) -> None:
     """Change the shape in a mesh file."""
     import trimesh
-
-    from stages.kit.formats.ply_files import ColoredMesh, read_ply, write_ply
+    from scenewright.stages.kit.formats.ply_files import ColoredMesh, read_ply, write_ply
 
     ours = path.suffix == ".ply" and b"uchar red" in path.read_bytes()[:400]
     if ours:
@@ -305,8 +304,8 @@ def picture(path: Path, what: str) -> None:
 
 def frames(path: Path, what: str, value: float = 0.0) -> None:
     """Change the frames of a sequence, in the file format of ours."""
-    from schemas.scene_parts import Camera
-    from stages.kit.formats.frames import FrameReader, FrameWriter
+    from scenewright.schemas.scene_parts import Camera
+    from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
 
     with FrameReader(path) as reader:
         read, baselines = list(reader.frames(("color", "depth", "labels", "right"))), reader.baselines
@@ -359,7 +358,7 @@ def frames(path: Path, what: str, value: float = 0.0) -> None:
 
 def masks(path: Path, what: str, value: int = 0) -> None:
     """Change the images of panoptic.zip."""
-    from stages.kit.formats.masks import PanopticReader, write_panoptic_zip
+    from scenewright.stages.kit.formats.masks import PanopticReader, write_panoptic_zip
 
     with PanopticReader(path) as reader:
         images = [(index, reader.read(index)) for index in reader.frame_indices()]
@@ -394,7 +393,7 @@ MISFITS = (
 
 def apply(how: str, path: Path, arguments: tuple[Any, ...]) -> bool:
     """Apply an edit. Returns whether it fitted."""
-    from schemas.errors import ScenewrightError
+    from scenewright.schemas.errors import ScenewrightError
 
     try:
         EDITS[how](path, *copy.deepcopy(arguments))

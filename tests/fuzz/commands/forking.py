@@ -26,7 +26,7 @@ MEMORY_BYTES = 5 * 2**29
 """What a command may take: 2 GiB, and half of one for the libraries."""
 ADDRESS_SPACE_BYTES = 6 * 2**30
 """What it can take at all: the machine is left working."""
-LEFT_OUT = ("stages.segment.backends.onnx", "stages.segment.backends.huggingface")
+LEFT_OUT = ("scenewright.stages.segment.backends.onnx", "scenewright.stages.segment.backends.huggingface")
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class Ended:
 
 def import_everything() -> None:
     """Import the command line and every step's code, on one thread."""
-    import schemas
-    import stages
-    from cli.application import build_application
+    import scenewright.schemas
+    import scenewright.stages
+    from scenewright.cli.application import build_application
 
     build_application()
-    for package in (schemas, stages):
+    for package in (scenewright.schemas, scenewright.stages):
         for entry in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             if not entry.name.startswith(LEFT_OUT):
                 with contextlib.suppress(ImportError, SystemExit):
@@ -90,7 +90,7 @@ def _child(words: list[str], folder: Path, scratch: Path, cpu_seconds: int) -> N
         sys.argv = ["scenewright", *words]
         sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
         sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
-        from cli.main import main
+        from scenewright.cli.main import main
 
         try:
             main()

@@ -7,9 +7,10 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import ScenewrightError
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.reading import check_hashes, open_artifact
+from scenewright.schemas.errors import ScenewrightError
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.reading import check_hashes, open_artifact
+
 from tests.fuzz.commands import forking
 from tests.fuzz.commands.case import Case
 from tests.fuzz.commands.workspace import OUT, prepare, stamps_of, whole_copy

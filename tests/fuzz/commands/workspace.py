@@ -10,10 +10,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from schemas.artifact import KINDS
-from schemas.manifest import MANIFEST_NAME, FileRecord
-from stages.engine.digests import content_digest
-from stages.kit.digests import sha256_of_file
+from scenewright.schemas.artifact import KINDS
+from scenewright.schemas.manifest import MANIFEST_NAME, FileRecord
+from scenewright.stages.engine.digests import content_digest
+from scenewright.stages.kit.digests import sha256_of_file
+
 from tests.fuzz.commands.base import place_of
 from tests.fuzz.commands.case import Case
 from tests.fuzz.commands.edits import apply

@@ -6,24 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from schemas.apartment import Apartment, Furniture, Thing
-from schemas.apartment import Room as Walls
-from stages.agent.arms.stations import around
-from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.scene_map import Region
-from stages.agent.senses import Base, Position, SeenFurniture, Sweep
-from stages.agent.world.failures import Rates
-from stages.agent.world.physics.before_fronts import bases_outside
-from stages.agent.world.physics.body import PhysicsBody
-from stages.agent.world.physics.doors import doored
-from stages.agent.world.physics.eyes import HEAD, Mask, Surface
-from stages.agent.world.physics.fronts import Front, edges, front_seen
-from stages.agent.world.physics.looking import is_thing
-from stages.agent.world.physics.room import Room
-from stages.kit.geometry.transforms import apply, look_at
-from stages.kit.motion.doors import body_from_moved
-from stages.kit.rendering.object_views import Picture
+from scenewright.schemas.apartment import Apartment, Furniture, Thing
+from scenewright.schemas.apartment import Room as Walls
+from scenewright.stages.agent.arms.stations import around
+from scenewright.stages.agent.obstacle_map import ObstacleMap
+from scenewright.stages.agent.scene_map import Region
+from scenewright.stages.agent.senses import Base, Position, SeenFurniture, Sweep
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.before_fronts import bases_outside
+from scenewright.stages.agent.world.physics.body import PhysicsBody
+from scenewright.stages.agent.world.physics.doors import doored
+from scenewright.stages.agent.world.physics.eyes import HEAD, Mask, Surface
+from scenewright.stages.agent.world.physics.fronts import Front, edges, front_seen
+from scenewright.stages.agent.world.physics.looking import is_thing
+from scenewright.stages.agent.world.physics.room import Room
+from scenewright.stages.kit.geometry.transforms import apply, look_at
+from scenewright.stages.kit.motion.doors import body_from_moved
+from scenewright.stages.kit.rendering.object_views import Picture
 
 NO_ERRORS = Rates().with_true_eyes()
 FRIDGE = Furniture(name="fridge_0", label="fridge", centre=(2.0, 4.575), size=(0.65, 0.65), height=0.9, door=True)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from stages.agent.language.interpreter import Interpreter, Ran
-from stages.agent.language.program import PlanError, parse_program
-from stages.agent.language.values import ObjectMap, Outcome, SceneObject, Value
+from scenewright.stages.agent.language.interpreter import Interpreter, Ran
+from scenewright.stages.agent.language.program import PlanError, parse_program
+from scenewright.stages.agent.language.values import ObjectMap, Outcome, SceneObject, Value
 
 CUPS = ObjectMap((SceneObject("cup_0", "cup", "table_0", "blue"), SceneObject("cup_1", "cup", "table_0", "red")))
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.agent.arms.next_view import (
+from scenewright.stages.agent.arms.next_view import (
     ahead_of,
     best_floor_view,
     entropy,
@@ -14,9 +13,9 @@ from stages.agent.arms.next_view import (
     vote_information,
     worth,
 )
-from stages.agent.arms.stations import around
-from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.senses import Base, SeenFurniture, Sweep
+from scenewright.stages.agent.arms.stations import around
+from scenewright.stages.agent.obstacle_map import ObstacleMap
+from scenewright.stages.agent.senses import Base, SeenFurniture, Sweep
 
 CENTRE, SIZE = (3.0, 3.0), (1.4, 0.8)
 

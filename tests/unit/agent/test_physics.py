@@ -7,19 +7,18 @@ from typing import cast
 
 import numpy as np
 import pytest
-
-from schemas.apartment import Apartment, Furniture, Room, Thing
-from stages.agent.body import Body
-from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.scene_map import SceneMap, classes_not_of
-from stages.agent.senses import Base, Detection, SeenFurniture, Sweep
-from stages.agent.world.failures import Rates
-from stages.agent.world.physics.body import PhysicsBody
-from stages.agent.world.physics.eyes import Surface, fuse
-from stages.agent.world.physics.grasps import FORWARD_PITCHES, antipodal_grasps, within_reach
-from stages.agent.world.physics.hands import Target, whole_box
-from stages.agent.world.physics.head import SeenPiece, enter, steady
-from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
+from scenewright.schemas.apartment import Apartment, Furniture, Room, Thing
+from scenewright.stages.agent.body import Body
+from scenewright.stages.agent.obstacle_map import ObstacleMap
+from scenewright.stages.agent.scene_map import SceneMap, classes_not_of
+from scenewright.stages.agent.senses import Base, Detection, SeenFurniture, Sweep
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.body import PhysicsBody
+from scenewright.stages.agent.world.physics.eyes import Surface, fuse
+from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, antipodal_grasps, within_reach
+from scenewright.stages.agent.world.physics.hands import Target, whole_box
+from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
+from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 
 NO_ERRORS = Rates().with_true_eyes()
 TABLE = Furniture(name="table_0", label="table", centre=(2.0, 2.4), size=(1.4, 0.75), height=0.74)

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.Grid_pb2 import Grid
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from scenewright.schemas.agent_episode import AgentEpisode
+from scenewright.schemas.apartment import Apartment
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Box, Joint
+from scenewright.stages.agent.brains.words import understood
+from scenewright.stages.agent.episode_log import LOG, MAP, SCENE, TRANSFORMS
+from scenewright.stages.agent.episodes import write_episode
+from scenewright.stages.agent.parameters import ReplayParameters
+from scenewright.stages.agent.replay_stage import run as replay
+from scenewright.stages.agent.trials import Setting, rules_brain, run_trial
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.reconstructed import apartment_of
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.kit.formats.indexed_mcap import IndexedMcap
 
-from schemas.agent_episode import AgentEpisode
-from schemas.apartment import Apartment
-from schemas.errors import BadInput
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Box, Joint
-from stages.agent.brains.words import understood
-from stages.agent.episode_log import LOG, MAP, SCENE, TRANSFORMS
-from stages.agent.episodes import write_episode
-from stages.agent.parameters import ReplayParameters
-from stages.agent.replay_stage import run as replay
-from stages.agent.trials import Setting, rules_brain, run_trial
-from stages.agent.world.failures import Rates
-from stages.agent.world.reconstructed import apartment_of
-from stages.engine.digests import content_digest, record_files
-from stages.kit.formats.indexed_mcap import IndexedMcap
 from tests.unit.agent.test_sessions import NOTHING_FAILS, context
 
 WORDS = "bring the bottle from the fridge to the table"

@@ -11,18 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput, MissingDependency, UsageError
-from stages.agent import replay_stage, run_stage
-from stages.agent.parameters import ReplayParameters, RunParameters, check_run
-from stages.agent.segmenter_identity import versions
-from stages.agent.world.physics import looking
-from stages.agent.world.physics.asked import AskedSegmenter, word_of
-from stages.agent.world.physics.body import PhysicsBody
-from stages.kit.progress import SilentProgress
-from stages.kit.rendering.object_views import Picture
-from stages.kit.services.receiving import BoundedHandler, BoundedServer
-from stages.kit.services.segmentation_protocol import (
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.stages.agent import replay_stage, run_stage
+from scenewright.stages.agent.parameters import ReplayParameters, RunParameters, check_run
+from scenewright.stages.agent.segmenter_identity import versions
+from scenewright.stages.agent.world.physics import looking
+from scenewright.stages.agent.world.physics.asked import AskedSegmenter, word_of
+from scenewright.stages.agent.world.physics.body import PhysicsBody
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.rendering.object_views import Picture
+from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedServer
+from scenewright.stages.kit.services.segmentation_protocol import (
     INFO_PATH,
     SEGMENT_PATH,
     Category,
@@ -33,7 +32,8 @@ from stages.kit.services.segmentation_protocol import (
     encode_reply,
     parse_request,
 )
-from stages.kit.stage import Context
+from scenewright.stages.kit.stage import Context
+
 from tests.unit.agent.test_physics import ABOVE, APARTMENT, NO_ERRORS, TABLE, THINGS
 
 CHROMA = {"apple": (1.0, 0.16, 0.13), "cup": (0.13, 0.3, 1.0), "dining table": (1.0, 0.79, 0.54)}

@@ -8,36 +8,35 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from schemas.agent_episode import AgentEpisode
-from schemas.apartment import Apartment, Furniture, Room, Thing
-from schemas.errors import UsageError
-from stages.agent import body
-from stages.agent.arms.registry import ARMS
-from stages.agent.brains.brain import Reply
-from stages.agent.brains.language import LanguageBrain
-from stages.agent.brains.prompt import feedback_text
-from stages.agent.brains.rules import RulesBrain, Style
-from stages.agent.brains.slips import Slips
-from stages.agent.episodes import write_episode
-from stages.agent.evaluate_stage import run as evaluate
-from stages.agent.judging import score
-from stages.agent.language.interpreter import Ran
-from stages.agent.language.values import SceneObject
-from stages.agent.parameters import EvaluateParameters, ReplayParameters, RunParameters, check_run
-from stages.agent.replay_stage import run as replay
-from stages.agent.run_stage import run as run_step
-from stages.agent.senses import Detection
-from stages.agent.session import Limits, Session, run_session
-from stages.agent.tasks import TASKS, make_apartment
-from stages.agent.trials import Setting, goals_of, rules_brain, run_trial
-from stages.agent.world.failures import Rates
-from stages.agent.world.fast import FastWorld
-from stages.engine.digests import content_digest, record_files
-from stages.kit.language.chat import Chat, ChatSettings
-from stages.kit.language.scripted import ScriptedBackend
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
+from scenewright.schemas.agent_episode import AgentEpisode
+from scenewright.schemas.apartment import Apartment, Furniture, Room, Thing
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.agent import body
+from scenewright.stages.agent.arms.registry import ARMS
+from scenewright.stages.agent.brains.brain import Reply
+from scenewright.stages.agent.brains.language import LanguageBrain
+from scenewright.stages.agent.brains.prompt import feedback_text
+from scenewright.stages.agent.brains.rules import RulesBrain, Style
+from scenewright.stages.agent.brains.slips import Slips
+from scenewright.stages.agent.episodes import write_episode
+from scenewright.stages.agent.evaluate_stage import run as evaluate
+from scenewright.stages.agent.judging import score
+from scenewright.stages.agent.language.interpreter import Ran
+from scenewright.stages.agent.language.values import SceneObject
+from scenewright.stages.agent.parameters import EvaluateParameters, ReplayParameters, RunParameters, check_run
+from scenewright.stages.agent.replay_stage import run as replay
+from scenewright.stages.agent.run_stage import run as run_step
+from scenewright.stages.agent.senses import Detection
+from scenewright.stages.agent.session import Limits, Session, run_session
+from scenewright.stages.agent.tasks import TASKS, make_apartment
+from scenewright.stages.agent.trials import Setting, goals_of, rules_brain, run_trial
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.fast import FastWorld
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.kit.language.chat import Chat, ChatSettings
+from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
 AGENT = Path(body.__file__).parent
 NOTHING_FAILS = Rates().scaled(0.0, 0.0)

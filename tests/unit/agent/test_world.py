@@ -5,19 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pydantic import ValidationError
-
-from schemas.apartment import Apartment, Furniture, Room, Thing
-from stages.agent.brains.words import NotUnderstood, understood
-from stages.agent.exploration import explore
-from stages.agent.fast_marching import distances
-from stages.agent.goals import Move, Shut, kind
-from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.scene_map import SceneMap
-from stages.agent.senses import Base, Sweep
-from stages.agent.tasks import TASKS, make_apartment
-from stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Rates
-from stages.agent.world.fast import FastWorld
-from stages.kit.rendering.segmenter_errors import Luck
+from scenewright.schemas.apartment import Apartment, Furniture, Room, Thing
+from scenewright.stages.agent.brains.words import NotUnderstood, understood
+from scenewright.stages.agent.exploration import explore
+from scenewright.stages.agent.fast_marching import distances
+from scenewright.stages.agent.goals import Move, Shut, kind
+from scenewright.stages.agent.obstacle_map import ObstacleMap
+from scenewright.stages.agent.scene_map import SceneMap
+from scenewright.stages.agent.senses import Base, Sweep
+from scenewright.stages.agent.tasks import TASKS, make_apartment
+from scenewright.stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Rates
+from scenewright.stages.agent.world.fast import FastWorld
+from scenewright.stages.kit.rendering.segmenter_errors import Luck
 
 NOTHING_FAILS = Rates().scaled(0.0, 0.0)
 

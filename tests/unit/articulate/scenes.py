@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 import trimesh
-
-from schemas.base import as_transform
-from schemas.scene_parts import Camera
-from schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import look_at
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import look_at
 
 CAMERA = Camera(width=320, height=240, fx=262.0, fy=262.0, cx=159.5, cy=119.5)
 WIDTH, DEEP, HIGH, THICK = 0.6, 0.5, 0.8, 0.02

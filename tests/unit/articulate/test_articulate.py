@@ -6,14 +6,14 @@ import json
 
 import numpy as np
 import pytest
+from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.articulate.parameters import ArticulateParameters
+from scenewright.stages.articulate.stage import run
+from scenewright.stages.fuse.outdated import Outdated
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.articulations import Articulations
-from schemas.errors import BadInput
-from stages.articulate.parameters import ArticulateParameters
-from stages.articulate.stage import run
-from stages.fuse.outdated import Outdated
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.unit.articulate.scenes import (
     CAMERA,
     FRONT,

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from stages.engine.batch.expansion import Batch, PlannedRun, read_batch
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.expansion import Batch, PlannedRun, read_batch
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
 
 PROGRAM = Path(__file__).with_name("scene_program.py")
 PROGRAM_MODULE = "tests.unit.batch.scene_program"

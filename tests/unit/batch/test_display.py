@@ -6,9 +6,9 @@ import io
 from pathlib import Path
 
 from rich.console import Console
+from scenewright.stages.engine.batch.display import Count, LineDisplay, TableDisplay, describe, display_for
+from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower
 
-from stages.engine.batch.display import Count, LineDisplay, TableDisplay, describe, display_for
-from stages.engine.batch.scene_log import LOG_NAME, LogFollower
 from tests.unit.batch.batches import job, result
 
 

@@ -10,10 +10,18 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.engine.batch.expansion import make_jobs, read_batch, shuffled
+from scenewright.stages.engine.batch.spec import (
+    BatchSpec,
+    DataSpec,
+    Limits,
+    LocalOptions,
+    RayOptions,
+    SlurmOptions,
+    check_spec,
+)
 
-from schemas.errors import UsageError
-from stages.engine.batch.expansion import make_jobs, read_batch, shuffled
-from stages.engine.batch.spec import BatchSpec, DataSpec, Limits, LocalOptions, RayOptions, SlurmOptions, check_spec
 from tests.unit.batch.batches import batch_of, write_batch
 
 SETS = '[[parameters]]\nname = "fine"\nset = { every = 1 }\n[[parameters]]\nname = "coarse"\nset = { every = 5 }\n'

@@ -7,8 +7,13 @@ from pathlib import Path, PurePath
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from stages.engine.batch.names import as_folder_name, distinct, is_folder_name, matched_part, names_from_paths
+from scenewright.stages.engine.batch.names import (
+    as_folder_name,
+    distinct,
+    is_folder_name,
+    matched_part,
+    names_from_paths,
+)
 
 
 @pytest.mark.parametrize(

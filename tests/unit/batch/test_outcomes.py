@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-
-from stages.engine.batch.outcomes import MEANINGS, classify, is_explained, worst_exit_code
+from scenewright.stages.engine.batch.outcomes import MEANINGS, classify, is_explained, worst_exit_code
 
 
 @pytest.mark.parametrize(

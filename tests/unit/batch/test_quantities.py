@@ -5,8 +5,13 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from stages.engine.batch.quantities import format_bytes, format_seconds, parse_bytes, parse_seconds, parse_seed_range
+from scenewright.stages.engine.batch.quantities import (
+    format_bytes,
+    format_seconds,
+    parse_bytes,
+    parse_seconds,
+    parse_seed_range,
+)
 
 
 def test_units() -> None:

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from scenewright.schemas.errors import MissingDependency, UsageError
+from scenewright.stages.engine.batch.ray_executor import RayExecutor, fitting
+from scenewright.stages.engine.batch.spec import RayOptions
 
-from schemas.errors import MissingDependency, UsageError
-from stages.engine.batch.ray_executor import RayExecutor, fitting
-from stages.engine.batch.spec import RayOptions
 from tests.unit.batch.batches import job, result
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenewright.schemas.base import LARGEST_NUMBER
+from scenewright.schemas.errors import BadInput, MachineFailure
+from scenewright.stages.engine.batch.results import ResultsFile, SceneResult, latest_by_job, parse_line, read_results
 
-from schemas.base import LARGEST_NUMBER
-from schemas.errors import BadInput, MachineFailure
-from stages.engine.batch.results import ResultsFile, SceneResult, latest_by_job, parse_line, read_results
 from tests.unit.batch.batches import result
 
 

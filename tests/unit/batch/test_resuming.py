@@ -6,9 +6,9 @@ import shutil
 from pathlib import Path
 
 import pytest
+from scenewright.stages.engine.batch.resuming import missing_jobs, reason_to_run
+from scenewright.stages.engine.reading import read_manifest
 
-from stages.engine.batch.resuming import missing_jobs, reason_to_run
-from stages.engine.reading import read_manifest
 from tests.unit.batch.batches import job, result
 
 

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import psutil
 import pytest
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.processes import created_at, descendants, resident_memory
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scene_log import LOG_NAME
+from scenewright.stages.engine.batch.scene_run import LAUNCHER, PROCESS_NAME, run_scene, this_host
+from scenewright.stages.engine.batch.warm import WarmScenes
 
-from stages.engine.batch.job import Job
-from stages.engine.batch.processes import created_at, descendants, resident_memory
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scene_log import LOG_NAME
-from stages.engine.batch.scene_run import LAUNCHER, PROCESS_NAME, run_scene, this_host
-from stages.engine.batch.warm import WarmScenes
 from tests.unit.batch.batches import PROGRAM_MODULE, job
 
 Run = Callable[..., SceneResult | None]

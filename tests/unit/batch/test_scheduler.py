@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 
 import pytest
+from scenewright.stages.engine.batch.job import Job
+from scenewright.stages.engine.batch.results import SceneResult
+from scenewright.stages.engine.batch.scheduler import run_jobs
 
-from stages.engine.batch.job import Job
-from stages.engine.batch.results import SceneResult
-from stages.engine.batch.scheduler import run_jobs
 from tests.unit.batch.batches import FakeExecutor, job, result
 
 JOBS = [job(f"s{k}") for k in range(10)]

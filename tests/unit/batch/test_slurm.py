@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from schemas.errors import UsageError
-from stages.engine.batch.results import ResultsFile, read_results
-from stages.engine.batch.slurm_executor import (
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.engine.batch.results import ResultsFile, read_results
+from scenewright.stages.engine.batch.slurm_executor import (
     merge_parts,
     parse_task,
     part_of,
@@ -20,7 +19,8 @@ from stages.engine.batch.slurm_executor import (
     task_count,
     write_scripts,
 )
-from stages.engine.batch.spec import SlurmOptions
+from scenewright.stages.engine.batch.spec import SlurmOptions
+
 from tests.unit.batch.batches import job, result
 
 

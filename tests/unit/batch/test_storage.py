@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from fsspec import register_implementation
 from fsspec.implementations.memory import MemoryFileSystem
+from scenewright.schemas.errors import MachineFailure, UsageError
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.batch.session import run_batch
+from scenewright.stages.engine.batch.storage import check_storage, send, stored_digest
 
-from schemas.errors import MachineFailure, UsageError
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.batch.session import run_batch
-from stages.engine.batch.storage import check_storage, send, stored_digest
 from tests.unit.batch.batches import batch_of, program_command
 
 
@@ -91,7 +91,9 @@ def test_a_storage_that_is_not_there_stops_the_batch_before_its_first_scene(tmp_
 def test_a_storage_that_goes_away_costs_no_artifact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store, out = tmp_path / "store", tmp_path / "out"
     batch = batch_of(tmp_path, {"a": "write"}, stored_in(f"file://{store}"))
-    monkeypatch.setattr("stages.engine.batch.session.check_storage", lambda url, timeout: store.write_text("no folder"))
+    monkeypatch.setattr(
+        "scenewright.stages.engine.batch.session.check_storage", lambda url, timeout: store.write_text("no folder")
+    )
     (result,) = run_batch(batch, out, command=program_command).ran
     assert result.outcome == "machine failure" and str(store) in result.reason and result.exit_code == 6
     assert (out / "a" / "sequence" / "data.txt").is_file()

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.errors import MachineFailure
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.batch.session import run_batch
+from scenewright.stages.engine.batch.storage import check_storage, send, stored_digest
 
-from schemas.errors import MachineFailure
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.batch.session import run_batch
-from stages.engine.batch.storage import check_storage, send, stored_digest
 from tests.unit.batch.batches import batch_of, program_command
 
 BUCKET = "rooms"

@@ -9,9 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.stages.engine.batch.summary import (
+    cost_table,
+    count_table,
+    group_table,
+    reason_table,
+    without_particulars,
+)
+from scenewright.stages.engine.batch.summary_files import summary_texts, write_summary
 
-from stages.engine.batch.summary import cost_table, count_table, group_table, reason_table, without_particulars
-from stages.engine.batch.summary_files import summary_texts, write_summary
 from tests.unit.batch.batches import job, result
 
 JOBS = [job(name) for name in ("a", "b", "c", "d", "e", "f")]

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import psutil
 import pytest
+from scenewright.stages.engine.batch.local_executor import LocalExecutor
+from scenewright.stages.engine.batch.session import run_batch
+from scenewright.stages.engine.batch.warm import WORKER, WarmScenes
 
-from stages.engine.batch.local_executor import LocalExecutor
-from stages.engine.batch.session import run_batch
-from stages.engine.batch.warm import WORKER, WarmScenes
 from tests.unit.batch.batches import batch_of, module_command
 from tests.unit.batch.test_scene_run import scene
 

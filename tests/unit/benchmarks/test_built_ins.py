@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.contact_graph import GraphNode
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
 
 from benchmarks.experiments.built_ins import EXPERIMENT, Judge, Stood
-from schemas.contact_graph import GraphNode
-from stages.kit.geometry.boxes import box_from_bounds
 
 LOW, HIGH = np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.6, 0.9])
 

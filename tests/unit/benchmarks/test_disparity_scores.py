@@ -7,6 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.engine.pipelines import resolve_variables, step_arguments
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
 from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.disparity.arms import CLASSICAL, DERIVED, WORDS, arms_of
@@ -14,10 +18,6 @@ from benchmarks.experiments.disparity.cases import Pair
 from benchmarks.experiments.disparity.experiment import EXPERIMENT, DisparityParameters, measured, scores
 from benchmarks.experiments.stereo_rooms import depth_figures, pipeline_of
 from benchmarks.results import write_results
-from schemas.scene_parts import Camera
-from stages.engine.pipelines import resolve_variables, step_arguments
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.stereo.disparity_map import DisparityMap
 
 
 def test_scores_are_the_closed_form() -> None:

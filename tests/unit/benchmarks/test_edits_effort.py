@@ -5,10 +5,10 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+from scenewright.stages.truth.support_annotation import SupportAnnotation
 
 from benchmarks.experiments.edits.effort import Told, supports_right
 from benchmarks.experiments.edits_effort import told_by
-from stages.truth.support_annotation import SupportAnnotation
 
 
 def annotated() -> SupportAnnotation:

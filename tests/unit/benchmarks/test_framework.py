@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from pydantic import Field
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.stage import Parameters
 
 from benchmarks import code_digest as digesting
 from benchmarks import command, discovery, keeping
@@ -18,8 +20,6 @@ from benchmarks.command import run
 from benchmarks.discovery import experiment_files, load_experiment
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean, share
 from benchmarks.tabulation import Figure
-from schemas.errors import UsageError
-from stages.kit.stage import Parameters
 
 
 class Options(Parameters):

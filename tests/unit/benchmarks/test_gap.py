@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.scene_parts import Camera, Joint
+from scenewright.stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape
+from scenewright.stages.kit.formats.frames import Frame
 
 from benchmarks.experiments.gap import (
     GENERATED,
@@ -22,9 +25,6 @@ from benchmarks.experiments.gap import (
     seeds_of,
     surface_of,
 )
-from schemas.scene_parts import Camera, Joint
-from stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape
-from stages.kit.formats.frames import Frame
 
 CAMERA = Camera(width=40, height=40, fx=40.0, fy=40.0, cx=19.5, cy=19.5)
 

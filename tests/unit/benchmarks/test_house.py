@@ -7,6 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.cad.alignment import turn_about_z
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import look_at
 
 from benchmarks.experiments.house.furnishing import House, Recipe, Thing, Wish, furnish, placed_at, scene_of
 from benchmarks.experiments.house.models import MODELS, Model, mesh_of
@@ -15,11 +20,6 @@ from benchmarks.experiments.house.recording import DISPARITY, disturbed, walk
 from benchmarks.experiments.house.tiny_renderer import TinyRenderer
 from benchmarks.experiments.surface.scenes import camera_of
 from benchmarks.nested_furniture import nested
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Box
-from stages.cad.alignment import turn_about_z
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import look_at
 from tests.unit.cad.models import chair, write_library
 
 

@@ -8,6 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.measurement.average_precision import Candidates, average_precision
+from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality
+from scenewright.stages.synthesize.recipes import load_recipe
 
 from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.mapping.arms import EVERYWHERE, SHOWN, all_arms
@@ -19,10 +23,6 @@ from benchmarks.experiments.mapping.figures_of_merit import MEASURES, pooled_cur
 from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, ranked
 from benchmarks.generated_rooms import DRAWS, REPORTING, TUNING, error_seed, room_of, with_draws
 from benchmarks.results import figures_of, table
-from schemas.scene_parts import Camera
-from stages.kit.measurement.average_precision import Candidates, average_precision
-from stages.kit.measurement.panoptic_quality import ClassQuality
-from stages.synthesize.recipes import load_recipe
 
 
 def straight_walk(steps: int, length: float) -> np.ndarray:

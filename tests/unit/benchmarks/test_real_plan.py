@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.truth.support_annotation import AnnotatedNode
 
 from benchmarks.experiments.real_plan import is_behind
-from stages.truth.support_annotation import AnnotatedNode
 
 
 @pytest.mark.parametrize(("place", "behind"), [((0.5, 2.9), False), ((0.5, 3.1), True), ((4.0, 3.1), False)])

@@ -6,6 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.urdf.scene_penetration import Overlap
+from scenewright.stages.urdf.settle_report import BodyMotion, SettleReport
 
 from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.scene import measuring
@@ -17,12 +23,6 @@ from benchmarks.experiments.scene.shown import shown_and_named
 from benchmarks.experiments.scene.stand_ins import lacking, off_by, without_styles
 from benchmarks.generated_rooms import INDEPENDENT_RECIPES, RoomFolder, recipe_of
 from benchmarks.results import figures_of, table
-from schemas.cad_library import CadModel
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import Relation
-from stages.segment.panoptic import PanopticFrame, PanopticMask
-from stages.urdf.scene_penetration import Overlap
-from stages.urdf.settle_report import BodyMotion, SettleReport
 
 GRAPH = {"edit_distance": 4.0, "wrong_support": 1.0, "missing_detection": 2.0, "wrong_detection": 0.0}
 

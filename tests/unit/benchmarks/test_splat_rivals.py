@@ -7,6 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
+from scenewright.stages.kit.open_words.relevancy import margins, query_rows
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.rasterizer import View
+from scenewright.stages.splat.language.looks import Sight
+from scenewright.stages.splat.language.pieces import pieces
+from scenewright.stages.splat.language.pyramid import pyramid
+from scenewright.stages.splat.views import PosedView
 from scipy.spatial import cKDTree
 
 from benchmarks.experiment import Bench, Results, Trial
@@ -14,16 +24,6 @@ from benchmarks.experiments import legs
 from benchmarks.splats import lerf
 from benchmarks.splats.langsplat import CODE, fitted, langsplat, segmented
 from benchmarks.splats.lerf import Lerf, Rays, rays_of
-from stages.kit.geometry.cameras import scaled
-from stages.kit.geometry.transforms import apply, inverse, look_at
-from stages.kit.open_words.relevancy import margins, query_rows
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.rasterizer import View
-from stages.splat.language.looks import Sight
-from stages.splat.language.pieces import pieces
-from stages.splat.language.pyramid import pyramid
-from stages.splat.views import PosedView
 from tests.unit.open_words.stand_ins import ColorEncoder
 from tests.unit.splat.test_language import BALLS, CAMERA, gaussians, poses
 

@@ -6,14 +6,14 @@ import json
 
 import numpy as np
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Camera, Relation
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply, look_at
+from scenewright.stages.truth.support_annotation import SupportAnnotation
 
 from benchmarks.experiments.mosd_supports.support_score import f1, levels_of, score_graph
 from benchmarks.experiments.mosd_supports.tabletop_maps import upright_pose
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import Camera, Relation
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply, look_at
-from stages.truth.support_annotation import SupportAnnotation
 
 NAMES = ("table", "a", "b", "c", "d")
 TOLD = SupportAnnotation.model_validate_json(

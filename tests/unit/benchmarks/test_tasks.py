@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenewright.schemas.errors import BadInput
 
 from benchmarks.discovery import load_experiment
 from benchmarks.experiment import Bench, Results, Trial, shown
@@ -19,7 +20,6 @@ from benchmarks.experiments.tidy_seen import Run as Seen
 from benchmarks.gather import gather
 from benchmarks.keeping import keep_record, kept_records
 from benchmarks.results import figures_of
-from schemas.errors import BadInput
 
 PHYSICS = Run(70.0, 12, 12, 0, 0, 0, 0, 6, 0, 0, 0, (), (), 1.0)
 

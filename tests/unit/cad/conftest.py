@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.stage import run as run_cad
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run as run_graph
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from stages.cad.parameters import CadParameters
-from stages.cad.stage import run as run_cad
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run as run_graph
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.panoptic_maps import write_map
 from tests.unit.cad.models import block, chair, fridge, table, write_library
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_library import CadLibrary, CadModel, LibraryFile, ModelState
+from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.kit.formats.cad_models import part_transforms
 
-from schemas.cad_library import CadLibrary, CadModel, LibraryFile, ModelState
-from schemas.scene_parts import Joint, SurfacePlane
-from stages.kit.formats.cad_models import part_transforms
 from tests.panoptic_maps import box_mesh
 
 OPENINGS = (0.0, 1.0, 2.0)

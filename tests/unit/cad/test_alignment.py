@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
-
-from stages.cad.alignment import (
+from scenewright.stages.cad.alignment import (
     AlignmentWeights,
     align,
     box_errors,
@@ -21,9 +18,11 @@ from stages.cad.alignment import (
     rectangle,
     residual_function,
 )
-from stages.cad.matching import Match
-from stages.cad.shapes import Observed, Planes, shape_of_state
-from stages.kit.geometry.boxes import clip_polygon, polygon_area
+from scenewright.stages.cad.matching import Match
+from scenewright.stages.cad.shapes import Observed, Planes, shape_of_state
+from scenewright.stages.kit.geometry.boxes import clip_polygon, polygon_area
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 WEIGHTS = AlignmentWeights(support=8.0, offset=5.0, angle=5.0, containment=0.5, height=2.0)
 

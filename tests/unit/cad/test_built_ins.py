@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.articulations import Articulation
+from scenewright.stages.cad.building_in import hovers
+from scenewright.stages.cad.built_in_leaves import leaves_of
+from scenewright.stages.cad.carcasses import Cells, Patches, cells_of, own_yaw, patches_of
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, read_model
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.transforms import apply
 
-from schemas.articulations import Articulation
-from stages.cad.building_in import hovers
-from stages.cad.built_in_leaves import leaves_of
-from stages.cad.carcasses import Cells, Patches, cells_of, own_yaw, patches_of
-from stages.kit.formats.cad_models import load_collision_parts, read_model
-from stages.kit.formats.entity_meshes import EntityMesh
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.geometry.transforms import apply
 from tests.panoptic_maps import floor_mesh, placed, seen_surface
 from tests.unit.cad.test_cad_stage import placement_at
 

@@ -7,18 +7,18 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.cad.fitting import fitted, refine, shape_at, solve_within_limits
+from scenewright.stages.cad.model_surfaces import alignment_error, load_surface
+from scenewright.stages.cad.placing import facing_wall, free_height, placed_box, supporting_surface, wall_depth
+from scenewright.stages.cad.settling import shift_onto
+from scenewright.stages.cad.shapes import Placement, shape_of_state
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh
+from scenewright.stages.kit.geometry.boxes import bottom, box_from_bounds, box_iou, gravity_aligned_box
+from scenewright.stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import UsageError
-from schemas.scene_parts import SurfacePlane
-from stages.cad.fitting import fitted, refine, shape_at, solve_within_limits
-from stages.cad.model_surfaces import alignment_error, load_surface
-from stages.cad.placing import facing_wall, free_height, placed_box, supporting_surface, wall_depth
-from stages.cad.settling import shift_onto
-from stages.cad.shapes import Placement, shape_of_state
-from stages.kit.formats.cad_models import model_folder, posed_mesh
-from stages.kit.geometry.boxes import bottom, box_from_bounds, box_iou, gravity_aligned_box
-from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
 from tests.panoptic_maps import box_mesh, floor_mesh, placed, seen_surface
 
 EYES = [(-1.4, -1.8, 1.5), (1.4, -1.8, 1.6), (0.1, 1.7, 1.7)]
@@ -307,7 +307,7 @@ def test_shift_onto_moves_no_farther_than_needed():
 
 
 def test_walls_reject_and_turn_fronts(library):
-    from schemas.contact_graph import GraphNode
+    from scenewright.schemas.contact_graph import GraphNode
 
     corners = ((0.0, -2.0, 0.0), (0.0, 2.0, 0.0), (0.0, 2.0, 2.5), (0.0, -2.0, 2.5))
     plane = SurfacePlane(normal=(1, 0, 0), offset=0.0, area=10, center=(0, 0, 1.25), corners=corners)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.stages.cad.conflicts import min_conflicts
+from scenewright.stages.kit.geometry.convex_solids import convex_solid, penetration
 
-from stages.cad.conflicts import min_conflicts
-from stages.kit.geometry.convex_solids import convex_solid, penetration
 from tests.panoptic_maps import box_mesh
 
 

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
+from scenewright.stages.cad.model_surfaces import load_surface
+from scenewright.stages.cad.shapes import Placement, shape_of_state
+from scenewright.stages.cad.stage import as_fitted
+from scenewright.stages.kit.formats.cad_models import model_folder
+from scenewright.stages.kit.formats.scene_links import model_links
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
-from schemas.errors import UsageError
-from schemas.scene_parts import Joint
-from stages.cad.joint_evidence import Looked, joint_evidence
-from stages.cad.model_surfaces import load_surface
-from stages.cad.shapes import Placement, shape_of_state
-from stages.cad.stage import as_fitted
-from stages.kit.formats.cad_models import model_folder
-from stages.kit.formats.scene_links import model_links
-from stages.kit.geometry.transforms import transform_from_yaw
 from tests.panoptic_maps import floor_mesh, seen_surface
 from tests.unit.cad.models import write_library
 from tests.unit.cad.test_cad_stage import decisions, mesh_of, model_named

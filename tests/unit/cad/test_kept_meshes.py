@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.cad.obstacles import obstacles_of
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.geometry.convex_solids import penetration
 
-from stages.cad.obstacles import obstacles_of
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.geometry.convex_solids import penetration
 from tests.panoptic_maps import box_mesh, floor_mesh
 from tests.unit.cad.test_standing import solid
 

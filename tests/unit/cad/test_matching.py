@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
-
-from stages.cad.matching import (
+from scenewright.stages.cad.matching import (
     CUBE_ROTATIONS,
     SUPPORTING_UNMATCHED,
     assign_planes,
@@ -20,7 +18,8 @@ from stages.cad.matching import (
     size_error,
     upright_error,
 )
-from stages.cad.shapes import Observed, Planes, shape_of_state
+from scenewright.stages.cad.shapes import Observed, Planes, shape_of_state
+from scipy.spatial.transform import Rotation
 
 
 def observed(size, planes=((), ()), yaw=0.0, supporting=None, center=(0, 0, 0)):

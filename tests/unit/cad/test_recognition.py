@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from scenewright.schemas.edits import AppliedEdit, AppliedEditsFile
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.stage import run as run_cad
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run as run_graph
 
-from schemas.edits import AppliedEdit, AppliedEditsFile
-from schemas.panoptic_map import PanopticMap
-from stages.cad.parameters import CadParameters
-from stages.cad.stage import run as run_cad
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run as run_graph
 from tests.panoptic_maps import floor_mesh, seen_surface, write_map
 from tests.unit.cad.conftest import context
 from tests.unit.cad.test_cad_stage import EYES, decisions, mesh_of

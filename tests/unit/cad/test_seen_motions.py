@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.schemas.articulations import Articulation
+from scenewright.stages.cad.joint_evidence import joint_evidence
+from scenewright.stages.cad.model_surfaces import load_surface
+from scenewright.stages.cad.seen_motions import seen_motions
+from scenewright.stages.cad.shapes import Placement, shape_of_state
+from scenewright.stages.kit.formats.cad_models import model_folder
+from scenewright.stages.kit.formats.scene_links import model_links
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.urdf.bodies import as_it_moved
 
-from schemas.articulations import Articulation
-from stages.cad.joint_evidence import joint_evidence
-from stages.cad.model_surfaces import load_surface
-from stages.cad.seen_motions import seen_motions
-from stages.cad.shapes import Placement, shape_of_state
-from stages.kit.formats.cad_models import model_folder
-from stages.kit.formats.scene_links import model_links
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.urdf.bodies import as_it_moved
 from tests.unit.cad.models import write_library
 from tests.unit.cad.test_cad_stage import model_named
 from tests.unit.cad.test_joint_evidence import FRONT, HEIGHT, WIDTH, cupboard, looked_at, write_urdf_of

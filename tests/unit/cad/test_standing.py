@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.cad.apart import stays_on
+from scenewright.stages.cad.bearing import borne_share, shift_to_bearing
+from scenewright.stages.cad.coloring import part_colors
+from scenewright.stages.cad.free_space import NOTHING_KNOWN, load_free_space
+from scenewright.stages.cad.free_spots import free_spot
+from scenewright.stages.cad.model_surfaces import Look
+from scenewright.stages.cad.scoring import balance_margin, filled_space
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.convex_solids import convex_solid, penetration
 
-from schemas.panoptic_map import PanopticMap
-from stages.cad.apart import stays_on
-from stages.cad.bearing import borne_share, shift_to_bearing
-from stages.cad.coloring import part_colors
-from stages.cad.free_space import NOTHING_KNOWN, load_free_space
-from stages.cad.free_spots import free_spot
-from stages.cad.model_surfaces import Look
-from stages.cad.scoring import balance_margin, filled_space
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.geometry.convex_solids import convex_solid, penetration
 from tests.panoptic_maps import box_mesh, write_map
 from tests.unit.cad.test_cad_stage import mesh_of, placement_at, surface_points
 

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.stages.cad.model_surfaces import load_surface
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.stretching import (
+    anisotropy,
+    factors_for,
+    source_of,
+    stretched,
+    stretched_surface,
+    write_stretched,
+)
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
+from scenewright.stages.kit.formats.urdf_check import require_sound
 
-from schemas.cad_library import CadLibrary
-from stages.cad.model_surfaces import load_surface
-from stages.cad.parameters import CadParameters
-from stages.cad.stretching import anisotropy, factors_for, source_of, stretched, stretched_surface, write_stretched
-from stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
-from stages.kit.formats.urdf_check import require_sound
 from tests.panoptic_maps import floor_mesh, seen_surface
 from tests.unit.cad.test_cad_stage import EYES, decisions, mesh_of
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-
-from stages.cad.surroundings import convex_of, footing, nameless_surface, near_any
-from stages.kit.formats.entity_meshes import EntityMesh
+from scenewright.stages.cad.surroundings import convex_of, footing, nameless_surface, near_any
+from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 
 LIMITS = {"clearance": 0.03, "smallest_area": 0.02, "tolerance": 0.002}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.cad.variety import varied
+from scenewright.stages.cad.variety import varied
 
 
 def model_of(entry: tuple[str, int]) -> str:

@@ -9,22 +9,21 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-
-from cli.main import run
-from schemas.cutting_demonstrations import CuttingDemonstrationsFile
-from schemas.cutting_plan import CuttingPlanFile, CuttingTrialFile
-from schemas.errors import BadInput, UsageError
-from stages.cutting.demonstrations.cutter import follow
-from stages.cutting.demonstrations.trials import make_trial
-from stages.cutting.measure.scores import score, volume_error
-from stages.cutting.ours.grammar import Grammar, learn
-from stages.cutting.ours.imagining import imagine
-from stages.cutting.ours.items import Item, item_of
-from stages.cutting.ours.policy import OursPolicy
-from stages.cutting.policy import Stop, carry_out
-from stages.cutting.words import read_words
-from stages.cutting.world.foods import make_food
-from stages.cutting.world.mending import read_body
+from scenewright.cli.main import run
+from scenewright.schemas.cutting_demonstrations import CuttingDemonstrationsFile
+from scenewright.schemas.cutting_plan import CuttingPlanFile, CuttingTrialFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.cutting.demonstrations.cutter import follow
+from scenewright.stages.cutting.demonstrations.trials import make_trial
+from scenewright.stages.cutting.measure.scores import score, volume_error
+from scenewright.stages.cutting.ours.grammar import Grammar, learn
+from scenewright.stages.cutting.ours.imagining import imagine
+from scenewright.stages.cutting.ours.items import Item, item_of
+from scenewright.stages.cutting.ours.policy import OursPolicy
+from scenewright.stages.cutting.policy import Stop, carry_out
+from scenewright.stages.cutting.words import read_words
+from scenewright.stages.cutting.world.foods import make_food
+from scenewright.stages.cutting.world.mending import read_body
 
 SMALL = ["--image-width", "300", "--quiet"]
 

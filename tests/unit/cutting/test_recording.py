@@ -12,14 +12,14 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from scenewright.cli.main import run
+from scenewright.schemas.cutting_demonstrations import CuttingDemonstrationsFile, CuttingRecording
+from scenewright.schemas.cutting_model import CuttingModelFile
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.recording.panels import HEIGHT, WIDTH, NoCut
+from scenewright.stages.cutting.recording.server import RecordingServer
+from scenewright.stages.cutting.recording.session import Session, object_of, read_recording
 
-from cli.main import run
-from schemas.cutting_demonstrations import CuttingDemonstrationsFile, CuttingRecording
-from schemas.cutting_model import CuttingModelFile
-from schemas.errors import BadInput
-from stages.cutting.recording.panels import HEIGHT, WIDTH, NoCut
-from stages.cutting.recording.server import RecordingServer
-from stages.cutting.recording.session import Session, object_of, read_recording
 from tests.browser import browser, needs_browser
 
 MIDDLE = 0.5 * WIDTH

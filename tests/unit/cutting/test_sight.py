@@ -10,25 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-
-from cli.main import run
-from schemas.cutting_plan import CuttingPlanFile, CuttingTrialFile
-from schemas.errors import BadInput
-from stages.cutting.demonstrations.trials import make_trial
-from stages.cutting.evaluate_stage import attempt
-from stages.cutting.measure.scores import score
-from stages.cutting.methods import Learned
-from stages.cutting.ours.grammar import learn
-from stages.cutting.ours.imagining import imagine
-from stages.cutting.policy import carry_out
-from stages.cutting.sight.laying import Hand, in_rows
-from stages.cutting.sight.pictured import read_pictures, write_pictures
-from stages.cutting.sight.seeing import see
-from stages.cutting.sight.surface import zero_surface
-from stages.cutting.sight.views import look
-from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import box_edges
-from stages.cutting.world.foods import make_food
+from scenewright.cli.main import run
+from scenewright.schemas.cutting_plan import CuttingPlanFile, CuttingTrialFile
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.demonstrations.trials import make_trial
+from scenewright.stages.cutting.evaluate_stage import attempt
+from scenewright.stages.cutting.measure.scores import score
+from scenewright.stages.cutting.methods import Learned
+from scenewright.stages.cutting.ours.grammar import learn
+from scenewright.stages.cutting.ours.imagining import imagine
+from scenewright.stages.cutting.policy import carry_out
+from scenewright.stages.cutting.sight.laying import Hand, in_rows
+from scenewright.stages.cutting.sight.pictured import read_pictures, write_pictures
+from scenewright.stages.cutting.sight.seeing import see
+from scenewright.stages.cutting.sight.surface import zero_surface
+from scenewright.stages.cutting.sight.views import look
+from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting.world.canonical import box_edges
+from scenewright.stages.cutting.world.foods import make_food
 
 
 @pytest.fixture(scope="module")

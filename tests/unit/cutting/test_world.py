@@ -7,14 +7,13 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.stages.cutting.world.body import Body, Plane
+from scenewright.stages.cutting.world.canonical import box_edges, canonical
+from scenewright.stages.cutting.world.foods import FAMILIES, make_food
+from scenewright.stages.cutting.world.knife import Knife, Refused, cut
+from scenewright.stages.cutting.world.voxels import Grid, occupancy
+from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
-
-from stages.cutting.world.body import Body, Plane
-from stages.cutting.world.canonical import box_edges, canonical
-from stages.cutting.world.foods import FAMILIES, make_food
-from stages.cutting.world.knife import Knife, Refused, cut
-from stages.cutting.world.voxels import Grid, occupancy
-from stages.kit.geometry.transforms import transform_from
 
 
 def block(x: float, y: float, z: float) -> Body:

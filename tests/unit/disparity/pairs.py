@@ -7,8 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 CAMERA = Camera(width=240, height=160, fx=220.0, fy=220.0, cx=119.5, cy=79.5)
 BASELINE = 0.1

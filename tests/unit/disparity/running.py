@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.disparity import Disparity
-from schemas.sequence import Sequence
-from stages.disparity.parameters import DisparityParameters
-from stages.disparity.stage import run
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
+from scenewright.schemas.disparity import Disparity
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.disparity.parameters import DisparityParameters
+from scenewright.stages.disparity.stage import run
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
 
 def matched(sequence: Sequence, output: Path, **options: object) -> Disparity:

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput
-from stages.kit.formats.disparity_file import DisparityReader, DisparityWriter
-from stages.kit.stereo.disparity_map import DisparityMap
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.disparity_file import DisparityReader, DisparityWriter
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
 
 def written(path: Path) -> tuple[Path, DisparityMap]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.disparity.consistency import confidence_of, left_right_difference, same_surface
+from scenewright.stages.disparity.search_range import search_range, usual_range
+from scenewright.stages.disparity.semi_global import Effort, SemiGlobalSettings, match
+from scenewright.stages.disparity.subpixel import UNLOCKED, smoothed, unlocked
+from scenewright.stages.kit.stereo.disparity_map import depth_of
 
-from stages.disparity.consistency import confidence_of, left_right_difference, same_surface
-from stages.disparity.search_range import search_range, usual_range
-from stages.disparity.semi_global import Effort, SemiGlobalSettings, match
-from stages.disparity.subpixel import UNLOCKED, smoothed, unlocked
-from stages.kit.stereo.disparity_map import depth_of
 from tests.unit.disparity.pairs import BASELINE, BOX_DISPARITY, CAMERA, pair
 
 LEFT, RIGHT, TRUTH, SEEN = pair()

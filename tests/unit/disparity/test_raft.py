@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from scenewright.cli.weights_command import convert_weights
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.stages.disparity.raft import matching
+from scenewright.stages.disparity.raft.architecture import SMALL as TRAINED_HERE
+from scenewright.stages.disparity.raft.architecture import Architecture, architecture_of
+from scenewright.stages.disparity.raft.checkpoint import convert, load_network, network_of, save_network
+from scenewright.stages.disparity.raft.correlation import RowCorrelation
+from scenewright.stages.disparity.raft.network import RaftStereo, padded, upsampled
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
-from cli.weights_command import convert_weights
-from schemas.errors import BadInput, MissingDependency, UsageError
-from stages.disparity.raft import matching
-from stages.disparity.raft.architecture import SMALL as TRAINED_HERE
-from stages.disparity.raft.architecture import Architecture, architecture_of
-from stages.disparity.raft.checkpoint import convert, load_network, network_of, save_network
-from stages.disparity.raft.correlation import RowCorrelation
-from stages.disparity.raft.network import RaftStereo, padded, upsampled
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
-from stages.kit.stereo.disparity_map import DisparityMap
 from tests.unit.disparity.pairs import pair
 
 SMALL = Architecture(

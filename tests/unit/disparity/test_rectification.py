@@ -5,9 +5,15 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from scenewright.stages.disparity.rectification import (
+    check_rows,
+    fitted_turn,
+    matched_features,
+    row_shift,
+    straightened,
+)
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
 
-from stages.disparity.rectification import check_rows, fitted_turn, matched_features, row_shift, straightened
-from stages.kit.geometry.cameras import intrinsic_matrix
 from tests.unit.disparity.pairs import CAMERA, pair
 
 PITCH, ROLL = 0.012, -0.02

@@ -9,15 +9,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.disparity import Disparity
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.disparity.parameters import DisparityParameters, check_inputs
+from scenewright.stages.ingest.preflight.steps import step_reports
+from scenewright.stages.kit.formats.disparity_file import DisparityReader
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter, require_depth
+from scenewright.stages.report.sections.stereo.view import stereo_view
 
-from schemas.disparity import Disparity
-from schemas.errors import BadInput, UsageError
-from schemas.sequence import Sequence
-from stages.disparity.parameters import DisparityParameters, check_inputs
-from stages.ingest.preflight.steps import step_reports
-from stages.kit.formats.disparity_file import DisparityReader
-from stages.kit.formats.frames import FrameReader, FrameWriter, require_depth
-from stages.report.sections.stereo.view import stereo_view
 from tests.unit.disparity.pairs import BASELINE, CAMERA, pair, write_folder
 from tests.unit.disparity.running import matched
 from tests.unit.disparity.test_rectification import turned

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.panoptic_map import PanopticMap
 
-from schemas.panoptic_map import PanopticMap
 from tests.panoptic_maps import box_mesh, floor_mesh, table_mesh, write_map
 from tests.unit.viewing.artifacts import seal
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scenewright.stages.cad.parameters import CadParameters
+from scenewright.stages.cad.stage import run as run_cad
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run as run_graph
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, read_model
+from scenewright.stages.kit.formats.model_writer import PartGeometry, write_model_folder
+from scenewright.stages.kit.geometry.solids import hull, mass_properties
 
-from stages.cad.parameters import CadParameters
-from stages.cad.stage import run as run_cad
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run as run_graph
-from stages.kit.formats.cad_models import load_collision_parts, read_model
-from stages.kit.formats.model_writer import PartGeometry, write_model_folder
-from stages.kit.geometry.solids import hull, mass_properties
 from tests.panoptic_maps import box_mesh, floor_mesh, seen_surface, write_map
 from tests.unit.cad.conftest import context
 from tests.unit.cad.models import block, chair, fridge, table, write_library

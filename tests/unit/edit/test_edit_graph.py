@@ -6,15 +6,15 @@ import json
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run as scenewright
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile
+from scenewright.schemas.edits import AppliedEdit, GraphEdit
+from scenewright.stages.edit.anchoring import Fitting, anchor_of_node
+from scenewright.stages.edit.applying import apply_edits
+from scenewright.stages.edit.edits_file import read_edits
+from scenewright.stages.edit.graph_edits import GRAPH_EDITS, GraphState
+from scenewright.stages.edit.parameters import EditMapParameters
 
-from cli.main import run as scenewright
-from schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile
-from schemas.edits import AppliedEdit, GraphEdit
-from stages.edit.anchoring import Fitting, anchor_of_node
-from stages.edit.applying import apply_edits
-from stages.edit.edits_file import read_edits
-from stages.edit.graph_edits import GRAPH_EDITS, GraphState
-from stages.edit.parameters import EditMapParameters
 from tests.unit.edit.maps import room_map
 
 FITTING = Fitting(**EditMapParameters().model_dump())
@@ -41,13 +41,13 @@ def edit(what: type[GraphEdit], graph: ContactGraph, name: str, **values: object
 
 
 def support(graph: ContactGraph, name: str, on: str | None, **values: object) -> GraphEdit:
-    from schemas.edits import Support
+    from scenewright.schemas.edits import Support
 
     return edit(Support, graph, name, on=on, **values)
 
 
 def mark(graph: ContactGraph, name: str, as_: str) -> GraphEdit:
-    from schemas.edits import Mark
+    from scenewright.schemas.edits import Mark
 
     return edit(Mark, graph, name, **{"as": as_})
 

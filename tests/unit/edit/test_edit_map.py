@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
+from scenewright.cli.main import run as scenewright
+from scenewright.schemas.edits import AppliedEdit, MapEdit
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.edit.anchoring import Fitting, anchor_of
+from scenewright.stages.edit.applying import apply_edits
+from scenewright.stages.edit.edits_file import append_edits, line_of, read_edits
+from scenewright.stages.edit.map_edits import MAP_EDITS, box_surface
+from scenewright.stages.edit.map_state import MapState, read_state
+from scenewright.stages.edit.parameters import EditMapParameters
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.geometry.boxes import gravity_aligned_box
+from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from cli.main import run as scenewright
-from schemas.edits import AppliedEdit, MapEdit
-from schemas.errors import BadInput
-from schemas.panoptic_map import PanopticMap
-from stages.edit.anchoring import Fitting, anchor_of
-from stages.edit.applying import apply_edits
-from stages.edit.edits_file import append_edits, line_of, read_edits
-from stages.edit.map_edits import MAP_EDITS, box_surface
-from stages.edit.map_state import MapState, read_state
-from stages.edit.parameters import EditMapParameters
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.geometry.boxes import gravity_aligned_box
-from stages.kit.geometry.transforms import transform_from
 from tests.unit.edit.maps import room_map
 from tests.unit.viewing.artifacts import seal
 

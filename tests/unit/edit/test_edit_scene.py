@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.cli.main import run as scenewright
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.edit.edits_file import read_edits
+from scenewright.stages.edit.scene_edits import joint_anchors
+from scenewright.stages.edit.scene_state import SceneState
+from scenewright.stages.kit.formats.cad_models import read_model
+from scenewright.stages.kit.formats.mesh_files import read_mesh
 
-from cli.main import run as scenewright
-from schemas.cad_scene import CadScene
-from schemas.interactive_scene import InteractiveScene
-from stages.edit.edits_file import read_edits
-from stages.edit.scene_edits import joint_anchors
-from stages.edit.scene_state import SceneState
-from stages.kit.formats.cad_models import read_model
-from stages.kit.formats.mesh_files import read_mesh
 from tests.unit.edit.scenes import scene_room
 
 

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.cli.main import run as scenewright
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
+from scenewright.stages.kit.formats.masks import PanopticReader
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
-from cli.main import run as scenewright
-from schemas.evaluation import Evaluation
-from schemas.ground_truth import GroundTruth
-from schemas.segments import Segments
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.frames import FrameReader, FrameWriter
-from stages.kit.formats.masks import PanopticReader
-from stages.kit.geometry.transforms import look_at
-from stages.kit.rendering.ray_casting import SceneRenderer
 from tests.unit.edit.maps import ROOM, dense, room_map
 from tests.unit.ingest.tiny_room import CAMERA
 

@@ -8,22 +8,21 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.base import as_transform
-from schemas.cad_scene import CadCandidate, CadScene, CadSceneFile, Replacement
-from schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile, GraphNode
-from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
-from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile, SceneBody
-from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
-from schemas.plan import Check, Failure, Plan, PlanFile, PlannedAction
-from schemas.scene_parts import Box, Camera, Joint, Relation
-from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
-from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.masks import write_panoptic_zip
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.geometry.transforms import look_at
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_scene import CadCandidate, CadScene, CadSceneFile, Replacement
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile, GraphNode
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from scenewright.schemas.interactive_scene import InteractiveScene, InteractiveSceneFile, SceneBody
+from scenewright.schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
+from scenewright.schemas.plan import Check, Failure, Plan, PlanFile, PlannedAction
+from scenewright.schemas.scene_parts import Box, Camera, Joint, Relation
+from scenewright.schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
+from scenewright.schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.transforms import look_at
 
 CAMERA = Camera(width=64, height=48, fx=60.0, fy=60.0, cx=31.5, cy=23.5)
 LABEL = "ground-truth masks, corruption 0.2"

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-
-from schemas.scene_parts import Joint
-from stages.evaluate.model_shapes import ModelShape, PartShape
-from stages.kit.measurement.convex_overlap import convex_piece
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.evaluate.model_shapes import ModelShape, PartShape
+from scenewright.stages.kit.measurement.convex_overlap import convex_piece
 
 
 def part(low, high, color=(200.0, 100.0, 50.0)) -> PartShape:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.evaluate.alignment_errors import alignment_error
+from scenewright.stages.evaluate.joint_errors import joint_errors, placed_joints
+from scenewright.stages.evaluate.model_shapes import PlacedShape, supporting_area
+from scenewright.stages.kit.geometry.transforms import transform_from, transform_from_yaw
+from scenewright.stages.kit.measurement.room_penetrations import room_penetrations
 from scipy.spatial.transform import Rotation
 
-from stages.evaluate.alignment_errors import alignment_error
-from stages.evaluate.joint_errors import joint_errors, placed_joints
-from stages.evaluate.model_shapes import PlacedShape, supporting_area
-from stages.kit.geometry.transforms import transform_from, transform_from_yaw
-from stages.kit.measurement.room_penetrations import room_penetrations
 from tests.unit.evaluate.shapes import box_model, cupboard
 
 TABLE = box_model("table_a", "table", (1.2, 0.8, 0.7))

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.schemas.scene_parts import Box
+from scenewright.schemas.sequence import Gravity
+from scenewright.stages.evaluate.correspondence import merge_stuff_nodes
+from scenewright.stages.evaluate.parameters import STAGE, EvaluateParameters, check_inputs
+from scenewright.stages.evaluate.stage import run
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.base import as_transform
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput, UsageError
-from schemas.evaluation import Evaluation
-from schemas.scene_parts import Box
-from schemas.sequence import Gravity
-from stages.evaluate.correspondence import merge_stuff_nodes
-from stages.evaluate.parameters import STAGE, EvaluateParameters, check_inputs
-from stages.evaluate.stage import run
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.unit.evaluate.handmade import (
     LABEL,
     ROOM,

@@ -7,20 +7,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from schemas.base import as_transform
-from schemas.cad_scene import CadCandidate, Replacement
-from stages.evaluate.functional_equivalence import (
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_scene import CadCandidate, Replacement
+from scenewright.stages.evaluate.functional_equivalence import (
     affordance_agreement,
     affordance_of,
     look_of,
     same_relation,
     similar_size,
 )
-from stages.evaluate.model_shapes import PlacedShape
-from stages.evaluate.replacement_measures import measure_replacements, retrieval_rank, room_summary, with_best_single
-from stages.evaluate.shape_loading import true_shapes
-from stages.evaluate.truth import load_truth
+from scenewright.stages.evaluate.model_shapes import PlacedShape
+from scenewright.stages.evaluate.replacement_measures import (
+    measure_replacements,
+    retrieval_rank,
+    room_summary,
+    with_best_single,
+)
+from scenewright.stages.evaluate.shape_loading import true_shapes
+from scenewright.stages.evaluate.truth import load_truth
+
 from tests.unit.evaluate.handmade import ROOM, Thing, graph_of, make_cad_scene, make_ground_truth, model_pose
 from tests.unit.evaluate.shapes import box_model, cupboard
 

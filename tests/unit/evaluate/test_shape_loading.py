@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadCandidate, CadScene, CadSceneFile, Replacement
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from scenewright.stages.evaluate.replacement_measures import RoomReplacements, replacements_of
+from scenewright.stages.evaluate.replacement_record import record_replacements
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.shape_loading import true_shapes
+from scenewright.stages.evaluate.truth import load_truth
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
-from schemas.base import as_transform
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadCandidate, CadScene, CadSceneFile, Replacement
-from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
-from stages.evaluate.replacement_measures import RoomReplacements, replacements_of
-from stages.evaluate.replacement_record import record_replacements
-from stages.evaluate.results import Part
-from stages.evaluate.shape_loading import true_shapes
-from stages.evaluate.truth import load_truth
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.geometry.transforms import transform_from_yaw
 from tests.unit.evaluate.handmade import CAMERA
 from tests.unit.urdf.small_room import graph_of, placed, room, small_library
 

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.sequence import Gravity
+from scenewright.schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.stage import run
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.base import as_transform
-from schemas.sequence import Gravity
-from schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.stage import run
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.unit.poses.textured_room import round_walk, write_sequence
 
 COUNT = 30

@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scenewright.schemas.exported_sequence import ExportedSequence
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
+from scenewright.stages.export.parameters import ExportParameters
+from scenewright.stages.export.stage import run
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.exported_sequence import ExportedSequence
-from schemas.scene_parts import Camera
-from schemas.segments import Segments
-from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
-from stages.export.parameters import ExportParameters
-from stages.export.stage import run
-from stages.kit.formats.frames import FrameReader, FrameWriter
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.unit.ingest.tiny_room import CAMERA, camera_poses, color_image, jpeg, png, room_depth
 
 OTHER = Camera(width=64, height=48, fx=60.0, fy=61.0, cx=31.0, cy=24.5)

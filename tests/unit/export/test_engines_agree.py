@@ -12,13 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pybullet
 import pytest
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.export.parameters import SceneExportParameters
+from scenewright.stages.export.scene_stage import run
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.exports import write_exports
 
-from schemas.interactive_scene import InteractiveScene
-from stages.export.parameters import SceneExportParameters
-from stages.export.scene_stage import run
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.simulation.world import load_scene
-from stages.urdf.exports import write_exports
 from tests.unit.urdf.small_room import context, find, graph_of, placed, room, small_library, surface_height
 
 STANDING = ("cup_5", "bottle_6", "cup_8")

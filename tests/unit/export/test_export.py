@@ -13,19 +13,19 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.engine.runner import run_stage
+from scenewright.stages.engine.verification import verify
+from scenewright.stages.export.formats.tum import LARGEST_MILLIMETRES
+from scenewright.stages.export.formats.tum.writer import depth_units, stamp_text
+from scenewright.stages.export.parameters import ExportParameters, check
+from scenewright.stages.kit.formats.frames import FrameReader
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import UsageError
-from schemas.manifest import MANIFEST_NAME, Manifest
-from schemas.sequence import Sequence
-from stages.engine.digests import content_digest, record_files
-from stages.engine.discovery import all_stages
-from stages.engine.runner import run_stage
-from stages.engine.verification import verify
-from stages.export.formats.tum import LARGEST_MILLIMETRES
-from stages.export.formats.tum.writer import depth_units, stamp_text
-from stages.export.parameters import ExportParameters, check
-from stages.kit.formats.frames import FrameReader
 from tests.unit.export.sequences import CAMERA, OTHER, export, png, write_sequence
 from tests.unit.ingest.tiny_room import camera_poses
 

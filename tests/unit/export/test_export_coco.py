@@ -8,17 +8,17 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.exported_sequence import ExportedSequence
+from scenewright.schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.segment.backends.masks.formats.coco_panoptic import open_source
+from scenewright.stages.segment.backends.masks.given import ReadSettings
+from scenewright.stages.segment.backends.masks.listing import Listing
 
-from schemas.errors import BadInput, UsageError
-from schemas.exported_sequence import ExportedSequence
-from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
-from schemas.sequence import Sequence
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.masks import write_panoptic_zip
-from stages.segment.backends.masks.formats.coco_panoptic import open_source
-from stages.segment.backends.masks.given import ReadSettings
-from stages.segment.backends.masks.listing import Listing
 from tests.unit.export.sequences import CAMERA, LABELS, export, write_sequence
 
 CLASSES = {entry.name: entry for entry in load_vocabulary().classes}

@@ -12,23 +12,23 @@ import numpy as np
 import pybullet
 import pytest
 from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.exported_scene import ExportedScene
+from scenewright.schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
+from scenewright.stages.export import scene_registry
+from scenewright.stages.export.parameters import SceneExportParameters
+from scenewright.stages.export.scene_bodies import BodyToExport, SceneToExport
+from scenewright.stages.export.scene_formats.usd.writer import _x_onto
+from scenewright.stages.export.scene_stage import run
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.kit.formats.written_scene import WrittenScene
+from scenewright.stages.kit.geometry.transforms import apply, transform_from
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.exports import write_exports
 from scipy.spatial.transform import Rotation
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput, MissingDependency
-from schemas.exported_scene import ExportedScene
-from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
-from stages.export import scene_registry
-from stages.export.parameters import SceneExportParameters
-from stages.export.scene_bodies import BodyToExport, SceneToExport
-from stages.export.scene_formats.usd.writer import _x_onto
-from stages.export.scene_stage import run
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.formats.written_scene import WrittenScene
-from stages.kit.geometry.transforms import apply, transform_from
-from stages.kit.simulation.world import load_scene
-from stages.urdf.exports import write_exports
 from tests.unit.urdf.small_room import context, graph_of, layout, placed, room, small_library
 
 MOVABLE = ("cup_5", "bottle_6", "cup_7")

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenewright.stages.kit.formats.frames import FrameReader
 
-from stages.kit.formats.frames import FrameReader
 from tests.unit.export.sequences import CAMERA, OTHER, assert_same_frames, export, png, write_sequence
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import jpeg

@@ -8,9 +8,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
+from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of, transform_from
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from
 
 
 def world_from_prim(prim: Usd.Prim) -> np.ndarray:

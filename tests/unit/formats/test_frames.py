@@ -12,13 +12,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry
-from stages.kit.formats.foxglove import depth_to_millimetres, millimetres_to_depth
-from stages.kit.formats.frames import FrameReader, FrameWriter
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import LabelEntry
+from scenewright.stages.kit.formats.foxglove import depth_to_millimetres, millimetres_to_depth
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 CAMERA = Camera(width=40, height=30, fx=50.0, fy=51.0, cx=19.5, cy=14.5)
 

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
-
-from stages.kit.formats.image_headers import LARGEST_IMAGE, image_size, may_be_decoded
+from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, image_size, may_be_decoded
 
 
 def _encoded(suffix: str, shape: tuple[int, ...], kind: type = np.uint8) -> bytes:

@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
-
-from schemas.errors import BadInput
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 
 KINDS = st.sampled_from(["f4", "f2", "i8", "i4", "u1", "?"])
 ARRAYS = KINDS.flatmap(lambda kind: arrays(kind, array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.formats.trajectories import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.trajectories import (
     number_rows,
     read_matrix,
     read_open3d_log,
@@ -19,6 +17,7 @@ from stages.kit.formats.trajectories import (
     write_open3d_log,
     write_tum,
 )
+from scipy.spatial.transform import Rotation
 
 FILES = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

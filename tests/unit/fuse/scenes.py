@@ -6,16 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
-from schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.masks import write_panoptic_zip
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.transforms import look_at
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
+from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.transforms import look_at
 
 CAMERA = Camera(width=160, height=120, fx=130.0, fy=130.0, cx=79.5, cy=59.5)
 THINGS = frozenset(entry.id for entry in load_vocabulary().classes if entry.kind == "thing")

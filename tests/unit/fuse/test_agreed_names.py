@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.fuse.agreed_names import said_of, with_agreed_names, without_claimed
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.kit.formats.ply_files import ColoredMesh
 
-from schemas.vocabulary import load_vocabulary
-from stages.fuse.agreed_names import said_of, with_agreed_names, without_claimed
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import class_id
 
 WALL, CHAIR, TABLE, OBJECT = (class_id(name) for name in ("wall", "chair", "table", "object"))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.fuse.association import (
+from scenewright.stages.fuse.association import (
     Overlap,
     Prediction,
     associate_instances,
@@ -14,10 +13,11 @@ from stages.fuse.association import (
     measure_overlap,
     overlapping_labels,
 )
-from stages.fuse.counts import TripleCounts
-from stages.fuse.integration import integrate
-from stages.fuse.voxel_blocks import VoxelBlocks
-from stages.kit.geometry.transforms import look_at
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.integration import integrate
+from scenewright.stages.fuse.voxel_blocks import VoxelBlocks
+from scenewright.stages.kit.geometry.transforms import look_at
+
 from tests.unit.fuse.scenes import CAMERA, SCENE, render
 
 CHAIR, TABLE = 4, 5

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.stages.fuse.extraction import ExtractionSettings, confidence_of, extract_entities, label_of_segments
+from scenewright.stages.fuse.merging import Grouping
+from scenewright.stages.fuse.parts import absorb_pieces, absorb_specks, connected_parts, drop_far_parts, spread_labels
+from scenewright.stages.fuse.surface import Surface
+from scenewright.stages.kit.formats.map_files import face_labels
 
-from stages.fuse.extraction import ExtractionSettings, confidence_of, extract_entities, label_of_segments
-from stages.fuse.merging import Grouping
-from stages.fuse.parts import absorb_pieces, absorb_specks, connected_parts, drop_far_parts, spread_labels
-from stages.fuse.surface import Surface
-from stages.kit.formats.map_files import face_labels
 from tests.unit.fuse.test_association import CHAIR, TABLE, counted
 
 THINGS = frozenset({CHAIR, TABLE})

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.segments import FrameSegment
+from scenewright.stages.fuse import ours
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.mapping import PanopticMapper
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.regularization import PairEvidence
 
-from schemas.segments import FrameSegment
-from stages.fuse import ours
-from stages.fuse.counts import TripleCounts
-from stages.fuse.mapping import PanopticMapper
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.regularization import PairEvidence
 from tests.unit.fuse.scenes import CAMERA, class_id
 
 triples = st.lists(st.tuples(st.integers(1, 4), st.integers(1, 3), st.integers(1, 3)), max_size=25)

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.fuse import from_mesh
+from scenewright.stages.fuse.annotated_scan import read_scan
+from scenewright.stages.fuse.parameters import FuseParameters, check
+from scenewright.stages.fuse.stage import run
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run as graph
+from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.errors import BadInput, UsageError
-from schemas.panoptic_map import PanopticMap
-from stages.fuse import from_mesh
-from stages.fuse.annotated_scan import read_scan
-from stages.fuse.parameters import FuseParameters, check
-from stages.fuse.stage import run
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run as graph
-from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.panoptic_maps import box_mesh, floor_mesh, table_mesh
 from tests.real_data import real_data
 
@@ -181,7 +181,7 @@ def test_a_fine_mesh_is_thinned(
     assert "more than 1000: thinned to" in caplog.text
     assert coarse.summary["faces"] < whole.summary["faces"] / 3
     assert {e.class_name for e in coarse.info.entities} == {e.class_name for e in whole.info.entities}
-    monkeypatch.setattr("stages.fuse.annotated_scan.MOST_FACES", 100)
+    monkeypatch.setattr("scenewright.stages.fuse.annotated_scan.MOST_FACES", 100)
     with pytest.raises(BadInput, match="at most 100 are read"):
         read_scan(tmp_path / "scan")
 

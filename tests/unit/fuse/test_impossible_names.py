@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import trimesh
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.impossible_names import BELIEVED, UNUSUAL, without_impossible_names
+from scenewright.stages.kit.formats.ply_files import ColoredMesh
 
-from schemas.vocabulary import load_vocabulary
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.fuse.impossible_names import BELIEVED, UNUSUAL, without_impossible_names
-from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import class_id
 
 CHAIR, PLANT, OBJECT = class_id("chair"), class_id("plant"), class_id("object")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numba
 import numpy as np
 import pytest
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.fuse.integration import integrate
+from scenewright.stages.fuse.surface import extract_surface
+from scenewright.stages.fuse.voxel_blocks import SIDE, VoxelBlocks
+from scenewright.stages.kit.geometry.transforms import look_at
 
-from schemas.scene_parts import Camera
-from stages.fuse.integration import integrate
-from stages.fuse.surface import extract_surface
-from stages.fuse.voxel_blocks import SIDE, VoxelBlocks
-from stages.kit.geometry.transforms import look_at
 from tests.unit.fuse.scenes import CAMERA, SCENE, color_of, orbit, render, sphere_depth
 
 VOXEL = 0.02

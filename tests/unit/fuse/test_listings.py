@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from schemas.segments import FrameSegment, FrameSegments, SegmentsFile
-from stages.fuse.listings import Listings
+from scenewright.schemas.segments import FrameSegment, FrameSegments, SegmentsFile
+from scenewright.stages.fuse.listings import Listings
 
 segment = st.builds(
     FrameSegment,

@@ -6,10 +6,9 @@ from itertools import combinations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.fuse.class_scores import ClassScores
-from stages.fuse.counts import TripleCounts
-from stages.fuse.partition import (
+from scenewright.stages.fuse.class_scores import ClassScores
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.partition import (
     APART_WEIGHT,
     LEAST_WEIGHT,
     NOTHING,
@@ -20,7 +19,7 @@ from stages.fuse.partition import (
     name_groups,
     pair_weights,
 )
-from stages.fuse.regularization import PairEvidence
+from scenewright.stages.fuse.regularization import PairEvidence
 
 CABINET, BOX, WALL, OBJECT = 5, 9, 2, 40
 THINGS = frozenset({CABINET, BOX})

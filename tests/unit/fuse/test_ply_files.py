@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.errors import BadInput
-from stages.kit.formats.ply_files import ColoredMesh, canonical_order, read_ply, write_ply
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.ply_files import ColoredMesh, canonical_order, read_ply, write_ply
 
 
 def mesh(seed: int = 0) -> ColoredMesh:

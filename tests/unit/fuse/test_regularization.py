@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.fuse.counts import TripleCounts
-from stages.fuse.merging import SharedSegment
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.regularization import (
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.merging import SharedSegment
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.regularization import (
     MergedLabels,
     PairEvidence,
     merge_evident_instances,
@@ -18,8 +17,9 @@ from stages.fuse.regularization import (
     pairs_of_one_class,
     shared_share,
 )
-from stages.fuse.separate import Separate
-from stages.fuse.thesis import Thesis
+from scenewright.stages.fuse.separate import Separate
+from scenewright.stages.fuse.thesis import Thesis
+
 from tests.unit.fuse.test_association import CHAIR, TABLE, counted
 
 WALL = 2

@@ -7,9 +7,8 @@ from itertools import combinations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.fuse.counts import TripleCounts
-from stages.fuse.regularization import (
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.regularization import (
     MergedLabels,
     PairEvidence,
     merge_evident_instances,

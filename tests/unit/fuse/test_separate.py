@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.fuse.association import Prediction, associate_instances
-from stages.fuse.counts import TripleCounts
-from stages.fuse.extraction import class_of_instances
-from stages.fuse.separate import SeparateCounts, associate_separately
+from scenewright.stages.fuse.association import Prediction, associate_instances
+from scenewright.stages.fuse.counts import TripleCounts
+from scenewright.stages.fuse.extraction import class_of_instances
+from scenewright.stages.fuse.separate import SeparateCounts, associate_separately
 
 CHAIR, TABLE = 3, 4
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.fuse.smoothing import smoothed_tsdf
+from scenewright.stages.fuse.surface import extract_surface
 
-from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.surface import extract_surface
 from tests.unit.fuse.test_surface import VOXEL, filled
 
 

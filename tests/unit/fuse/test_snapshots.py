@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.panoptic_map import SNAPSHOTS, PanopticMap
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.stage import run
+from scenewright.stages.kit.formats.trajectories import read_tum, write_tum
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.panoptic_map import SNAPSHOTS, PanopticMap
-from schemas.trajectory import Trajectory
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.stage import run
-from stages.kit.formats.trajectories import read_tum, write_tum
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.unit.fuse.scenes import write_scene
 
 

@@ -11,21 +11,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.manifest import InputRecord, Manifest
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.segments import FrameSegments, Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.fuse.inputs import check_origin
+from scenewright.stages.fuse.parameters import STAGE, FuseParameters
+from scenewright.stages.fuse.stage import run
+from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.kit.formats.ply_files import read_ply
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.errors import BadInput, UsageError
-from schemas.manifest import InputRecord, Manifest
-from schemas.panoptic_map import PanopticMap
-from schemas.segments import FrameSegments, Segments
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.fuse.inputs import check_origin
-from stages.fuse.parameters import STAGE, FuseParameters
-from stages.fuse.stage import run
-from stages.kit.formats.masks import write_panoptic_zip
-from stages.kit.formats.ply_files import read_ply
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.unit.fuse.scenes import CUP, SCENE, TABLE, class_id, orbit, write_scene
 
 
@@ -118,9 +118,12 @@ def test_same_bytes_twice_and_with_another_number_of_threads(
     assert digest(tmp_path / "again") == digest(panoptic_map.root)
     (tmp_path / "one").mkdir()
     program = (
-        "from pathlib import Path; from schemas.sequence import Sequence; from schemas.segments import Segments;"
-        "from stages.fuse.parameters import STAGE, FuseParameters; from stages.fuse.stage import run;"
-        "from stages.kit.progress import SilentProgress; from stages.kit.stage import Context; import sys;"
+        "from pathlib import Path; from scenewright.schemas.sequence import Sequence;"
+        "from scenewright.schemas.segments import Segments;"
+        "from scenewright.stages.fuse.parameters import STAGE, FuseParameters;"
+        "from scenewright.stages.fuse.stage import run;"
+        "from scenewright.stages.kit.progress import SilentProgress;"
+        "from scenewright.stages.kit.stage import Context; import sys;"
         "run(Sequence(root=Path(sys.argv[1])), Segments(root=Path(sys.argv[2])), None, parameters=FuseParameters(),"
         "context=Context(output=Path(sys.argv[3]), seed=0, device='cpu', progress=SilentProgress()))"
     )

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.fuse.closing import MaskSource, is_strange
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.parameters import FuseParameters
+from scenewright.stages.fuse.piece_entities import Classes, by_geometry
+from scenewright.stages.fuse.strange_places import (
+    LEAST_THING_SCORE,
+    SURE,
+    share_told,
+    sure_things,
+    thing_score,
+    without_names,
+)
+from scenewright.stages.fuse.surface import Surface
+from scenewright.stages.kit.formats.ply_files import ColoredMesh
 
-from stages.fuse.closing import MaskSource, is_strange
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.piece_entities import Classes, by_geometry
-from stages.fuse.strange_places import LEAST_THING_SCORE, SURE, share_told, sure_things, thing_score, without_names
-from stages.fuse.surface import Surface
-from stages.kit.formats.ply_files import ColoredMesh
 from tests.unit.fuse.scenes import THINGS, class_id
 from tests.unit.fuse.test_unnamed_pieces import COUNTER, ON_IT, VOXEL, room
 

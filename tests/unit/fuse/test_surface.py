@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.fuse.integration import integrate
+from scenewright.stages.fuse.surface import Surface, extract_surface
+from scenewright.stages.fuse.voxel_blocks import SIDE, VoxelBlocks, _insert, pack
+from scenewright.stages.kit.geometry.cameras import back_project
 from scipy.spatial import cKDTree
-
-from schemas.scene_parts import Camera
-from stages.fuse.integration import integrate
-from stages.fuse.surface import Surface, extract_surface
-from stages.fuse.voxel_blocks import SIDE, VoxelBlocks, _insert, pack
-from stages.kit.geometry.cameras import back_project
 
 VOXEL = 0.05
 CAMERA = Camera(width=320, height=240, fx=262.0, fy=262.0, cx=159.5, cy=119.5)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
+from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.piece_entities import Classes, with_unnamed_pieces
+from scenewright.stages.fuse.surface import Surface
+from scenewright.stages.fuse.unnamed_pieces import FLOOR, TOLD, unnamed_pieces
+from scenewright.stages.fuse.walls import of_walls
+from scenewright.stages.kit.formats.ply_files import ColoredMesh
+from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.fuse.piece_entities import Classes, with_unnamed_pieces
-from stages.fuse.surface import Surface
-from stages.fuse.unnamed_pieces import FLOOR, TOLD, unnamed_pieces
-from stages.fuse.walls import of_walls
-from stages.kit.formats.ply_files import ColoredMesh
-from stages.kit.geometry.point_clouds import vertex_normals
 from tests.unit.fuse.scenes import class_id
 
 VOXEL = 0.02

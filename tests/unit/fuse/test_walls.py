@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.fuse.unnamed_pieces import FLOOR
+from scenewright.stages.fuse.walls import of_walls
+from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 
-from stages.fuse.unnamed_pieces import FLOOR
-from stages.fuse.walls import of_walls
-from stages.kit.geometry.point_clouds import vertex_normals
 from tests.unit.fuse.test_unnamed_pieces import COUNTER, VOXEL, Corners, room
 
 

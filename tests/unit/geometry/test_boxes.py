@@ -10,8 +10,7 @@ import shapely
 import shapely.affinity
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.kit.geometry import boxes
+from scenewright.stages.kit.geometry import boxes
 
 lengths = st.floats(0.05, 3.0)
 positions = st.floats(-2.0, 2.0)

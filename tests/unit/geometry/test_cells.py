@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-
-from stages.kit.geometry.cells import row_keys
+from scenewright.stages.kit.geometry.cells import row_keys
 
 NUMBERS = st.one_of(st.integers(-3, 3), st.integers(-(2**50), 2**50))
 

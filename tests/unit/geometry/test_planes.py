@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.kit.geometry import planes
+from scenewright.stages.kit.geometry import planes
 
 
 def sheet(random, center, first, second, count, noise=0.0):

@@ -6,8 +6,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 import trimesh
-
-from stages.kit.geometry.ray_scenes import LIVE_SCENES, triangles_of
+from scenewright.stages.kit.geometry.ray_scenes import LIVE_SCENES, triangles_of
 
 BEYOND_ANY_PROCESS = 1100
 """Scenes alive at once at which the process used to crash."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.contact_graph import ContactGraphFile
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.panoptic_maps import write_map
 
 

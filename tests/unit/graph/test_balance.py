@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scenewright.stages.graph.balance import footing_seen, is_unbalanced, leaning_relation
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
 
-from stages.graph.balance import footing_seen, is_unbalanced, leaning_relation
-from stages.kit.geometry.boxes import box_from_bounds
 from tests.unit.graph.test_support import entity, solid
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.contact_graph import ContactGraphFile
 
-from schemas.contact_graph import ContactGraphFile
 from tests.panoptic_maps import box_mesh, floor_mesh, placed, seen_surface
 
 EYES = [(-0.5, -1.9, 1.5), (0.6, -1.8, 1.4), (0.0, -1.5, 1.6)]

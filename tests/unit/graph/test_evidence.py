@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.graph.evidence import EVERY, Surfaces, polygon_middle, share_inside, shared_middle
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.scene_parts import Relation
-from stages.graph.evidence import EVERY, Surfaces, polygon_middle, share_inside, shared_middle
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.panoptic_maps import box_mesh, floor_mesh, placed, table_mesh, write_map
 
 TILT = 0.3

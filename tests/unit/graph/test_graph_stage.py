@@ -6,9 +6,8 @@ import networkx as nx
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.contact_graph import ContactGraphFile
-from stages.kit.geometry.boxes import (
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.geometry.boxes import (
     bottom,
     box_iou,
     box_yaw,
@@ -17,6 +16,7 @@ from stages.kit.geometry.boxes import (
     refined_box,
     top,
 )
+
 from tests.panoptic_maps import box_mesh, chair_mesh, floor_mesh, placed, seen_surface, table_mesh
 
 EYES = [(-1.5, -2.0, 1.5), (1.5, -2.0, 1.6), (0.0, 1.8, 1.7)]
@@ -201,10 +201,11 @@ def test_missing_floor_is_supposed_only_where_the_map_shows_one(build_graph, tmp
     assert parents(graph) == {"chair_2": ("scene", "supports")} and build_graph.summary["floor"] == "none"
 
     # The same with a floor in the whole mesh that no entity owns.
-    from stages.graph.parameters import GraphParameters
-    from stages.graph.stage import run
-    from stages.kit.progress import SilentProgress
-    from stages.kit.stage import Context
+    from scenewright.stages.graph.parameters import GraphParameters
+    from scenewright.stages.graph.stage import run
+    from scenewright.stages.kit.progress import SilentProgress
+    from scenewright.stages.kit.stage import Context
+
     from tests.panoptic_maps import write_map
 
     panoptic_map = write_map(tmp_path / "other", meshes, {2: "chair"})

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.graph.balance import footing, overhang
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.contact_graph import ContactGraphFile
-from stages.graph.balance import footing, overhang
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.panoptic_maps import box_mesh, chair_mesh, floor_mesh, placed, table_mesh, write_map
 
 FLOOR = ("floor", floor_mesh((-2, -2), (2, 2)))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.graph.observed_box import BoxFit, observed_box, side_yaw, trimmed_extent
-from stages.kit.geometry.boxes import box_iou, box_yaw, gravity_aligned_box
+from scenewright.stages.graph.observed_box import BoxFit, observed_box, side_yaw, trimmed_extent
+from scenewright.stages.kit.geometry.boxes import box_iou, box_yaw, gravity_aligned_box
 
 TRUE_YAW = 0.3
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from scenewright.schemas.scene_parts import Camera, Relation
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run
+from scenewright.stages.kit.geometry.boxes import box_from_bounds, box_iou, minimum_box
+from scenewright.stages.kit.measurement.edge_agreement import edge_agreement
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from schemas.base import as_transform
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
-from schemas.scene_parts import Camera, Relation
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run
-from stages.kit.geometry.boxes import box_from_bounds, box_iou, minimum_box
-from stages.kit.measurement.edge_agreement import edge_agreement
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.panoptic_maps import box_mesh, chair_mesh, floor_mesh, perfect_map, placed, seen_surface, table_mesh
 
 ROOM = {

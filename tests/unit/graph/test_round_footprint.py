@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.graph.observed_box import BoxFit, observed_box
-from stages.graph.round_footprint import round_footprint
-from stages.kit.geometry.boxes import box_yaw
+from scenewright.stages.graph.observed_box import BoxFit, observed_box
+from scenewright.stages.graph.round_footprint import round_footprint
+from scenewright.stages.kit.geometry.boxes import box_yaw
 
 
 def side_of_cylinder(radius: float, seen: float, center: tuple[float, float], noise: float = 0.0, seed: int = 0):

@@ -6,17 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from schemas.scene_parts import SurfacePlane
-from stages.graph import thesis
-from stages.graph.corrected_support import candidates_for, hull_overlap, prefer_the_highest
-from stages.graph.nodes import Entity, Patch, is_horizontal, level_patch
-from stages.graph.ours import fragments
-from stages.graph.parameters import GraphParameters
-from stages.graph.support import Candidate, height_gap, support_score
-from stages.graph.touching import seam_share, smaller_share
-from stages.kit.geometry.boxes import box_from_bounds, gravity_aligned_box
-from stages.kit.geometry.planes import plane_height
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.graph import thesis
+from scenewright.stages.graph.corrected_support import candidates_for, hull_overlap, prefer_the_highest
+from scenewright.stages.graph.nodes import Entity, Patch, is_horizontal, level_patch
+from scenewright.stages.graph.ours import fragments
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.support import Candidate, height_gap, support_score
+from scenewright.stages.graph.touching import seam_share, smaller_share
+from scenewright.stages.kit.geometry.boxes import box_from_bounds, gravity_aligned_box
+from scenewright.stages.kit.geometry.planes import plane_height
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 

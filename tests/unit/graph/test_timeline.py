@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scenewright.cli.timeline_command import timeline as timeline_command
+from scenewright.schemas.contact_graph import ContactGraph, TimelineFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.panoptic_map import SNAPSHOTS, EntitiesFile, PanopticMap
+from scenewright.stages.engine import reading
+from scenewright.stages.graph import entities as entities_module
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.stage import run
+from scenewright.stages.graph.timeline import lasting_ids
+from scenewright.stages.graph.tracks import CELL, cells_of
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
-from cli.timeline_command import timeline as timeline_command
-from schemas.contact_graph import ContactGraph, TimelineFile
-from schemas.errors import BadInput
-from schemas.panoptic_map import SNAPSHOTS, EntitiesFile, PanopticMap
-from stages.engine import reading
-from stages.graph import entities as entities_module
-from stages.graph.parameters import GraphParameters
-from stages.graph.stage import run
-from stages.graph.timeline import lasting_ids
-from stages.graph.tracks import CELL, cells_of
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from tests.panoptic_maps import box_mesh, floor_mesh, table_mesh, write_map
 
 TABLE = table_mesh((0.0, 0.0), (1.2, 0.7, 0.75))

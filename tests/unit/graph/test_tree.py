@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.contact_graph import SCENE_NODE
+from scenewright.stages.graph.ours import Ours
+from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.graph.support import Candidate
+from scenewright.stages.graph.tree import choose_parents
 
-from schemas.contact_graph import SCENE_NODE
-from stages.graph.ours import Ours
-from stages.graph.parameters import GraphParameters
-from stages.graph.support import Candidate
-from stages.graph.tree import choose_parents
 from tests.unit.graph.test_support import solid
 
 FLOOR = solid("floor_1", (-9, -9, -0.01), (9, 9, 0.0), class_name="floor", node_type="layout")

@@ -6,11 +6,11 @@ import os
 from pathlib import Path
 from typing import Any
 
-from schemas.evaluation import MetricsFile
-from schemas.kinds import KINDS
-from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest, Provenance
-from stages.engine.digests import content_digest, record_files
-from stages.kit.digests import external_digest
+from scenewright.schemas.evaluation import MetricsFile
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import MANIFEST_NAME, InputRecord, Manifest, Provenance
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.kit.digests import external_digest
 
 
 def make_artifact(

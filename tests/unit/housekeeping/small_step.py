@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 
 from pydantic import Field
-
-from schemas.trajectory import Trajectory
-from stages.kit.stage import Context, External, Optionally, Parameters, Stage
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.stage import Context, External, Optionally, Parameters, Stage
 
 
 class SmallParameters(Parameters):
@@ -40,4 +39,4 @@ class _SmallPackage:
     run = staticmethod(run)
 
 
-sys.modules.setdefault("stages.small.stage", _SmallPackage)  # type: ignore[arg-type]
+sys.modules.setdefault("scenewright.stages.small.stage", _SmallPackage)  # type: ignore[arg-type]

@@ -12,14 +12,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
+from scenewright.stages.engine import collection
+from scenewright.stages.engine.collection import collect, survey
+from scenewright.stages.engine.runner import run_stage
+from scenewright.stages.engine.verification import verify
 
-from cli.main import run
-from schemas.errors import BadInput
-from schemas.manifest import MANIFEST_NAME, Manifest
-from stages.engine import collection
-from stages.engine.collection import collect, survey
-from stages.engine.runner import run_stage
-from stages.engine.verification import verify
 from tests.unit.housekeeping.artifacts import snapshot
 from tests.unit.housekeeping.small_step import SMALL, SmallParameters
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenewright.cli.main import run
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.manifest import MANIFEST_NAME
+from scenewright.stages.engine.comparison import Change, Figure, compare
 
-from cli.main import run
-from schemas.errors import BadInput
-from schemas.manifest import MANIFEST_NAME
-from stages.engine.comparison import Change, Figure, compare
 from tests.unit.housekeeping.artifacts import make_artifact, make_evaluation, snapshot
 
 FINITE = st.floats(-1e6, 1e6, allow_nan=False)

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scenewright.cli.main import run
+from scenewright.schemas.errors import MachineFailure
+from scenewright.stages.engine import estimation
+from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.engine.estimation import estimate_pipeline, estimate_step, measured, warn_or_refuse
+from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
+from scenewright.stages.kit.estimates import Estimate
 
-from cli.main import run
-from schemas.errors import MachineFailure
-from stages.engine import estimation
-from stages.engine.discovery import all_stages
-from stages.engine.estimation import estimate_pipeline, estimate_step, measured, warn_or_refuse
-from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
-from stages.kit.estimates import Estimate
 from tests.unit.export.sequences import write_sequence
 from tests.unit.housekeeping.artifacts import make_artifact
 from tests.unit.housekeeping.small_step import SMALL, SmallParameters
@@ -152,7 +152,7 @@ def test_dry_runs_say_what_it_costs(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_steps_that_nobody_measured_just_run(tmp_path: Path) -> None:
-    from stages.engine.runner import run_stage
+    from scenewright.stages.engine.runner import run_stage
 
     result = run_stage(SMALL, {}, tmp_path / "a", SmallParameters(), dry_run=True)
     assert result.estimate is None

@@ -7,7 +7,7 @@ import sys
 
 PROGRAM = """
 import sys
-from stages.engine import forking
+from scenewright.stages.engine import forking
 forking.AT_WORK = 1.0
 child = [sys.executable, "-m", "tests.unit.housekeeping.forked_child"]
 with forking.begun(["json", "json", "no.such.module", "colorsys"]):

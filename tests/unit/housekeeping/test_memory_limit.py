@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from cli.main import run
-from schemas.errors import MachineFailure, UsageError
-from stages.engine import memory_limit
-from stages.engine.memory_limit import limited, parse_limit, resident_memory_bytes
+from scenewright.cli.main import run
+from scenewright.schemas.errors import MachineFailure, UsageError
+from scenewright.stages.engine import memory_limit
+from scenewright.stages.engine.memory_limit import limited, parse_limit, resident_memory_bytes
 
 OUT = Path("/somewhere/map")
 MEBIBYTE = 2**20
@@ -68,7 +67,8 @@ def test_other_exceptions_pass_through() -> None:
 
 def test_a_step_that_cannot_be_interrupted_is_ended() -> None:
     code = (
-        "import signal, time, numpy; from pathlib import Path; from stages.engine import memory_limit as m\n"
+        "import signal, time, numpy; from pathlib import Path;"
+        "from scenewright.stages.engine import memory_limit as m\n"
         "m.GRACE_SECONDS = 0.5\n"
         "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])\n"
         "with m.limited(m.resident_memory_bytes() + 2**20, Path('map')):\n"

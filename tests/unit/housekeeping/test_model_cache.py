@@ -7,12 +7,11 @@ import json
 from pathlib import Path
 
 import pytest
-
-from cli.main import run
-from schemas.errors import BadInput, MachineFailure, MissingDependency
-from stages.engine import model_cache
-from stages.engine.known_models import KnownModel
-from stages.engine.model_cache import add_model, cache_folder, cached_models, resolve_weights
+from scenewright.cli.main import run
+from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency
+from scenewright.stages.engine import model_cache
+from scenewright.stages.engine.known_models import KnownModel
+from scenewright.stages.engine.model_cache import add_model, cache_folder, cached_models, resolve_weights
 
 WEIGHTS = b"weights of a tiny network"
 KNOWN = KnownModel(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-
-from stages.kit.progress import BarProgress, LineProgress, SilentProgress, progress_for
+from scenewright.stages.kit.progress import BarProgress, LineProgress, SilentProgress, progress_for
 
 
 def test_a_terminal_has_bars_and_a_pipe_has_lines(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_library import CadLibrary
 
-from schemas.cad_library import CadLibrary
 from tests.unit.viewing import artifacts
 from tests.unit.viewing.suture_artifacts import make_suture
 from tests.unit.viewing.tableware_artifacts import make_tableware

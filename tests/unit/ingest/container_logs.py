@@ -12,9 +12,8 @@ from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Bag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2Writer
-
-from stages.ingest.messages.container import MessageLog
-from stages.ingest.messages.mcap_records import MAGIC
+from scenewright.stages.ingest.messages.container import MessageLog
+from scenewright.stages.ingest.messages.mcap_records import MAGIC
 
 Message = tuple[str, int, bytes]
 DEFINITION = "string data\n"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of
 
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import inverse, quaternion_of
 from tests.unit.ingest.tiny_room import CAMERA, jpeg, millimetres, png
 
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])

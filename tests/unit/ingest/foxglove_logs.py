@@ -14,8 +14,8 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import register_schema
+from scenewright.stages.kit.geometry.transforms import quaternion_of
 
-from stages.kit.geometry.transforms import quaternion_of
 from tests.unit.ingest.tiny_room import CAMERA, jpeg
 
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import LoadedFrame, LogSource
-from stages.kit.formats.foxglove import decode_color
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import LoadedFrame, LogSource
+from scenewright.stages.kit.formats.foxglove import decode_color
 
 
 def loaded_frames(log: Path, **options: Any) -> tuple[LogSource, list[LoadedFrame]]:

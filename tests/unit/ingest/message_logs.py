@@ -17,9 +17,9 @@ from rosbags.rosbag1 import Writer as Bag1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import quaternion_of
 
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import quaternion_of
 from tests.unit.ingest import foxglove_logs
 from tests.unit.ingest.tiny_room import CAMERA, jpeg, millimetres
 

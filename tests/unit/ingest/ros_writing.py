@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-from stages.ingest.messages.container import Channel
+from scenewright.stages.ingest.messages.container import Channel
 
 ROS1, ROS2 = Stores.ROS1_NOETIC, Stores.ROS2_HUMBLE
 

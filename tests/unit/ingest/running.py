@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from schemas.sequence import Sequence
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.stage import run
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.stage import run
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 
 
 def ingest(log: Path, output: Path, **options: Any) -> Sequence:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.color_registration import color_in_depth_camera, filled_depth
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.transforms import transform_from
 
-from schemas.scene_parts import Camera
-from stages.ingest.color_registration import color_in_depth_camera, filled_depth
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.transforms import transform_from
 from tests.real_data import real_data
 from tests.unit.ingest.running import ingest
 

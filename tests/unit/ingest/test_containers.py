@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 from rosbags.rosbag1 import Reader as Bag1Reader
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.messages.container import MessageLog
+from scenewright.stages.ingest.messages.mcap_log import McapLog
+from scenewright.stages.ingest.messages.opening import container_of, open_message_log
 
-from schemas.errors import BadInput
-from stages.ingest.messages.container import MessageLog
-from stages.ingest.messages.mcap_log import McapLog
-from stages.ingest.messages.opening import container_of, open_message_log
 from tests.real_data import real_data
 from tests.unit.ingest.container_logs import (
     DEFINITION,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-
-from stages.ingest.stage import brightness_of
+from scenewright.stages.ingest.stage import brightness_of
 
 
 @pytest.mark.parametrize("level", [0, 3, 120])

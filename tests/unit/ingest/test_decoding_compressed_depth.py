@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from scenewright.stages.ingest.messages.compressed_depth import decode_compressed_depth, decode_rvl
+from scenewright.stages.ingest.messages.pixels import depth_pixels, depth_unit
+from scenewright.stages.ingest.messages.records import ImageRecord
+from scenewright.stages.ingest.source import Unusable
 
-from stages.ingest.messages.compressed_depth import decode_compressed_depth, decode_rvl
-from stages.ingest.messages.pixels import depth_pixels, depth_unit
-from stages.ingest.messages.records import ImageRecord
-from stages.ingest.source import Unusable
 from tests.unit.ingest.rvl_writing import compressed_depth, encode_png, encode_rvl
 
 

@@ -16,8 +16,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.base import normalize_fieldname
-
-from stages.ingest.messages.ros_definitions import (
+from scenewright.stages.ingest.messages.ros_definitions import (
     SEQUENCE,
     UnreadableDefinition,
     bundled_definitions,
@@ -26,7 +25,8 @@ from stages.ingest.messages.ros_definitions import (
     parse_msg,
     short_name,
 )
-from stages.ingest.messages.ros_serialization import RosReader
+from scenewright.stages.ingest.messages.ros_serialization import RosReader
+
 from tests.real_data import real_data
 from tests.unit.ingest.ros_writing import ROS1, ROS2, definition, long_name, typestore
 

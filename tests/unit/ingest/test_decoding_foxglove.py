@@ -18,11 +18,10 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-from stages.ingest.messages.container import Channel
-from stages.ingest.messages.decoding import decoder_for, why_unreadable
-from stages.ingest.messages.json_messages import LARGEST_MESSAGE
-from stages.ingest.messages.records import (
+from scenewright.stages.ingest.messages.container import Channel
+from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
+from scenewright.stages.ingest.messages.json_messages import LARGEST_MESSAGE
+from scenewright.stages.ingest.messages.records import (
     CalibrationRecord,
     ImageRecord,
     PointsRecord,
@@ -31,6 +30,7 @@ from stages.ingest.messages.records import (
     TransformRecord,
     Undecodable,
 )
+
 from tests.real_data import real_data
 
 SECOND, NANOSECOND = 1_700_000_123, 456_789_012

@@ -10,10 +10,16 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-
-from stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels, role_of, why_other
-from stages.ingest.messages.records import ImageRecord
-from stages.ingest.source import Unusable
+from scenewright.stages.ingest.messages.pixels import (
+    color_pixels,
+    depth_pixels,
+    depth_unit,
+    label_pixels,
+    role_of,
+    why_other,
+)
+from scenewright.stages.ingest.messages.records import ImageRecord
+from scenewright.stages.ingest.source import Unusable
 
 COLOR = np.random.default_rng(3).integers(0, 256, (6, 8, 3)).astype(np.uint8)
 """RGB."""

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores
-from scipy.spatial.transform import Rotation
-
-from stages.ingest.messages.container import Channel
-from stages.ingest.messages.decoding import decoder_for, why_unreadable
-from stages.ingest.messages.pixels import depth_unit
-from stages.ingest.messages.records import (
+from scenewright.stages.ingest.messages.container import Channel
+from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
+from scenewright.stages.ingest.messages.pixels import depth_unit
+from scenewright.stages.ingest.messages.records import (
     CalibrationRecord,
     ImageRecord,
     ImuRecord,
@@ -25,6 +23,8 @@ from stages.ingest.messages.records import (
     TransformRecord,
     Undecodable,
 )
+from scipy.spatial.transform import Rotation
+
 from tests.real_data import real_data
 from tests.unit.ingest.ros_writing import ROS1, ROS2, channel, header, serialized, xyz
 

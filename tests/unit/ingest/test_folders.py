@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.files import natural_key
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.trajectories import read_tum
 
-from schemas.errors import BadInput
-from stages.ingest.folders.files import natural_key
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.trajectories import read_tum
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import (
     CAMERA,

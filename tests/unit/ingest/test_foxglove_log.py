@@ -7,12 +7,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import LabelEntry
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
 
-from schemas.errors import BadInput
-from schemas.sequence import LabelEntry
-from stages.kit.formats.frames import FrameReader, FrameWriter
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.transforms import inverse, transform_from_yaw
 from tests.real_data import real_data
 from tests.unit.ingest.foxglove_logs import (
     CompressionType,
@@ -279,7 +279,7 @@ def test_topics_can_be_chosen(tmp_path: Path) -> None:
 
 def test_memory_stays_flat(tmp_path: Path) -> None:
     """The chunks kept unpacked do not grow with the log."""
-    from stages.ingest.messages.mcap_log import McapLog
+    from scenewright.stages.ingest.messages.mcap_log import McapLog
 
     with McapLog(write_simple_log(tmp_path / "log.mcap", frames(12), chunk_size=1000)) as log:
         places = [message.location for message in log.messages()]
@@ -289,7 +289,7 @@ def test_memory_stays_flat(tmp_path: Path) -> None:
 
 
 def test_inverse_of_a_chain_is_looked_up(tmp_path: Path) -> None:
-    from stages.ingest.transform_tree import TransformTree
+    from scenewright.stages.ingest.transform_tree import TransformTree
 
     tree = TransformTree()
     first, second = transform_from_yaw(0.4, np.array([1.0, 2, 3])), transform_from_yaw(-1.0, np.array([0, 0, 1.0]))

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.gravity import find_floor, mean_camera_up, upright_from_direction, wall_yaw
+from scenewright.stages.kit.geometry.surface_samples import surface_samples
+from scenewright.stages.kit.geometry.transforms import apply, look_at, rotation_between, transform_from
+from scenewright.stages.kit.geometry.upright_world import make_upright
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import BadInput
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.gravity import find_floor, mean_camera_up, upright_from_direction, wall_yaw
-from stages.kit.geometry.surface_samples import surface_samples
-from stages.kit.geometry.transforms import apply, look_at, rotation_between, transform_from
-from stages.kit.geometry.upright_world import make_upright
 from tests.real_data import real_data
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import CAMERA, TABLE, camera_poses, frames, room_depth, write_seven_scenes

@@ -9,13 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.kit.geometry.transforms import transform_from, transform_from_yaw
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import BadInput, UsageError
-from schemas.scene_parts import Camera
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
-from stages.kit.geometry.transforms import transform_from, transform_from_yaw
 from tests.unit.ingest.depth_array_writing import write_colmap_array
 from tests.unit.ingest.folder_writers import (
     FIRST_STAMP,
@@ -456,8 +456,7 @@ def test_colmap_cameras_agree_with_the_library(tmp_path: Path, model: str, tail:
 
 def test_colmap_reader_agrees_with_the_library(tmp_path: Path) -> None:
     import pycolmap
-
-    from stages.ingest.layouts.colmap.model import read_model
+    from scenewright.stages.ingest.layouts.colmap.model import read_model
 
     for binary in (True, False):
         log = write_colmap(tmp_path / str(binary), frames(4), binary=binary)

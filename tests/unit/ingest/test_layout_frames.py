@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from scenewright.stages.ingest.detection import log_format, open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.registry import all_layouts
+from scenewright.stages.ingest.source import Unusable
 
-from stages.ingest.detection import log_format, open_log
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.registry import all_layouts
-from stages.ingest.source import Unusable
 from tests.unit.ingest.folder_writers import (
     FIRST_STAMP,
     write_colmap,

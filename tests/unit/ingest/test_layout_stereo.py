@@ -8,14 +8,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.layouts.images.reader import depth_of_disparity
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix, project
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
 
-from schemas.errors import BadInput, UsageError
-from schemas.scene_parts import Camera
-from stages.ingest.detection import open_log
-from stages.ingest.layouts.images.reader import depth_of_disparity
-from stages.ingest.parameters import IngestParameters
-from stages.kit.geometry.cameras import intrinsic_matrix, project
-from stages.kit.geometry.transforms import inverse, transform_from
 from tests.real_data import real_data
 from tests.unit.ingest.depth_array_writing import write_pfm
 from tests.unit.ingest.loading import loaded_frames
@@ -139,7 +139,7 @@ def test_unrectified_pair_is_rectified(tmp_path: Path) -> None:
     source, found = loaded_frames(log)
     camera, baseline = source.camera, source.cameras[0].baseline
     assert baseline == pytest.approx(BASELINE, rel=1e-6) and "rectified" in " ".join(source.notes)
-    from stages.ingest.stereo import rectifying_rotation
+    from scenewright.stages.ingest.stereo import rectifying_rotation
 
     points = POINTS @ rectifying_rotation(left_from_right).T
     for (x, y), z in zip(*project(points, camera), strict=True):

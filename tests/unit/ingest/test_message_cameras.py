@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.messages.topic_names import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.messages.topic_names import (
     calibration_names,
     camera_names,
     is_rectified,
@@ -18,8 +17,9 @@ from stages.ingest.messages.topic_names import (
     other_side,
     place,
 )
-from stages.kit.formats.frames import FrameReader, FrameWriter
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+
 from tests.unit.ingest.message_logs import FIRST, SECOND, record_room, recorder
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import CAMERA, color_image, frames, jpeg, millimetres

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
 
-from schemas.errors import BadInput
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.transforms import inverse, transform_from_yaw
 from tests.real_data import real_data
 from tests.unit.ingest.message_logs import FIRST, RECORDERS, SECOND, record_room, recorder
 from tests.unit.ingest.running import ingest

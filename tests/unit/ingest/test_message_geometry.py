@@ -8,18 +8,18 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.depth_registration import registered_depth
+from scenewright.stages.ingest.inertial import measured_up
+from scenewright.stages.ingest.lenses import lens_of, same_rays
+from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.ingest.stereo import rectifying_rotation, stereo_lenses
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.depth_registration import registered_depth
-from stages.ingest.inertial import measured_up
-from stages.ingest.lenses import lens_of, same_rays
-from stages.ingest.messages.records import CalibrationRecord
-from stages.ingest.stereo import rectifying_rotation, stereo_lenses
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.cameras import intrinsic_matrix
-from stages.kit.geometry.transforms import inverse, transform_from
 from tests.unit.ingest.message_logs import FIRST, SECOND, recorder
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import CAMERA, camera_poses, frames, jpeg, millimetres, room_depth

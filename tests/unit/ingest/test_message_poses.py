@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.transform_tree import SAME, Track, TransformTree, interpolated
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from, transform_from_yaw
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import BadInput
-from stages.ingest.transform_tree import SAME, Track, TransformTree, interpolated
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.transforms import inverse, transform_from, transform_from_yaw
 from tests.unit.ingest.message_logs import FIRST, SECOND, recorder
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import frames, jpeg

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.association import fresh, mutual_nearest, partners
+from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.trajectories import read_tum
 
-from schemas.errors import BadInput
-from stages.ingest.association import fresh, mutual_nearest, partners
-from stages.ingest.detection import open_log
-from stages.ingest.parameters import IngestParameters
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.trajectories import read_tum
 from tests.unit.ingest.message_logs import FIRST, SECOND, compressed_depth, recorder
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.rvl_writing import encode_rvl

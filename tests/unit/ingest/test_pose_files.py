@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.pose_files import read_pose_list
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.ingest.folders.pose_files import read_pose_list
-from stages.ingest.folders.stamped_poses import StampedPoses
 
 NAMES = {
     "padded": lambda number: f"{number:05d}",

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.transforms import inverse
 
-from schemas.sequence import Sequence
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.transforms import inverse
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import frames, write_seven_scenes
 

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.formats.trajectories import write_open3d_log
-from stages.kit.geometry.transforms import look_at, quaternion_of
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.trajectories import write_open3d_log
+from scenewright.stages.kit.geometry.transforms import look_at, quaternion_of
 
 CAMERA = Camera(width=96, height=72, fx=80.0, fy=80.0, cx=47.5, cy=35.5)
 ROOM = (np.array([-2.0, -1.5, 0.0]), np.array([2.0, 1.5, 2.5]))

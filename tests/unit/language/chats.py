@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from schemas.base import Model
-from stages.kit.language.chat import Chat
-from stages.kit.language.messages import say
-from stages.kit.language.opening import open_chat
-from stages.kit.language.options import LanguageParameters
-from stages.kit.language.reply_schema import schema_of
-from stages.kit.language.scripted import ScriptedBackend
+from scenewright.schemas.base import Model
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.messages import say
+from scenewright.stages.kit.language.opening import open_chat
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.language.reply_schema import schema_of
+from scenewright.stages.kit.language.scripted import ScriptedBackend
 
 KEY = "sk-stub-0123456789abcdef"
 VARIABLE = "STUB_KEY"

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-
-from stages.kit.language.actions import (
+from scenewright.stages.kit.language.actions import (
     LONGEST_NAME,
     MOST_CALLS,
     ActionCall,
@@ -20,9 +19,10 @@ from stages.kit.language.actions import (
     check_calls,
     quoted,
 )
-from stages.kit.language.chat import Chat
-from stages.kit.language.plan_schema import plan_schema
-from stages.kit.language.reply_schema import DoesNotFollow
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.plan_schema import plan_schema
+from scenewright.stages.kit.language.reply_schema import DoesNotFollow
+
 from tests.unit.language.chats import QUESTION, opened, scripted
 from tests.unit.language.stub_server import replies, serving
 

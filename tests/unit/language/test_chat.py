@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.language.backend import RawReply, Request, Usage
+from scenewright.stages.kit.language.chat import LONGEST_QUOTE, RE_PROMPTS, Chat, ChatSettings, read_reply
+from scenewright.stages.kit.language.failures import EXIT_CODES, LanguageFailed
+from scenewright.stages.kit.language.messages import Image, say
+from scenewright.stages.kit.language.reply_schema import DoesNotFollow, schema_from, schema_of
+from scenewright.stages.kit.language.reply_text import LONGEST_REPLY, MOST_OBJECTS, Unreadable, objects_in
+from scenewright.stages.kit.language.scripted import ScriptedBackend
 
-from schemas.base import Model
-from schemas.errors import BadInput
-from stages.kit.language.backend import RawReply, Request, Usage
-from stages.kit.language.chat import LONGEST_QUOTE, RE_PROMPTS, Chat, ChatSettings, read_reply
-from stages.kit.language.failures import EXIT_CODES, LanguageFailed
-from stages.kit.language.messages import Image, say
-from stages.kit.language.reply_schema import DoesNotFollow, schema_from, schema_of
-from stages.kit.language.reply_text import LONGEST_REPLY, MOST_OBJECTS, Unreadable, objects_in
-from stages.kit.language.scripted import ScriptedBackend
 from tests.unit.language.chats import QUESTION, SCHEMA, opened, scripted
 from tests.unit.language.stub_server import replies, serving
 

@@ -13,17 +13,17 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.stages.kit.configuration import parameters_for
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import Image, say
+from scenewright.stages.kit.language.openai_compatible import LARGEST_BODY
+from scenewright.stages.kit.language.opening import open_chat
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.services.connection import HIDDEN, Connection
+from scenewright.stages.kit.stage import Stage
+from scenewright.stages.plan.parameters import STAGE as PLAN
 
-from schemas.errors import BadInput, MissingDependency, UsageError
-from stages.kit.configuration import parameters_for
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import Image, say
-from stages.kit.language.openai_compatible import LARGEST_BODY
-from stages.kit.language.opening import open_chat
-from stages.kit.language.options import LanguageParameters
-from stages.kit.services.connection import HIDDEN, Connection
-from stages.kit.stage import Stage
-from stages.plan.parameters import STAGE as PLAN
 from tests.unit.language.chats import GOOD, KEY, QUESTION, SCHEMA, VARIABLE, opened, scripted
 from tests.unit.language.stub_server import (
     Behaviour,

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import say
+from scenewright.stages.kit.language.opening import open_chat
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.language.transcripts import TranscriptFile, read_transcript
 
-from schemas.errors import BadInput, UsageError
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import say
-from stages.kit.language.opening import open_chat
-from stages.kit.language.options import LanguageParameters
-from stages.kit.language.transcripts import TranscriptFile, read_transcript
 from tests.unit.language.chats import GOOD, QUESTION, SCHEMA, opened, scripted
 from tests.unit.language.stub_server import replies, serving, status
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-
-from schemas.cad_library import CadModel
-from stages.kit.formats.cad_models import part_transforms
+from scenewright.schemas.cad_library import CadModel
+from scenewright.stages.kit.formats.cad_models import part_transforms
 
 
 def depths_of_links(

@@ -12,27 +12,33 @@ import pytest
 import trimesh
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scenewright.cli.main import run as command_line
+from scenewright.schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.stages.kit.formats.cad_models import (
+    load_collision_parts,
+    model_folder,
+    part_transforms,
+    posed_mesh,
+    read_model,
+)
+from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.library.addition import run
+from scenewright.stages.library.importing.classes import class_of
+from scenewright.stages.library.importing.collada_file import parse_collada
+from scenewright.stages.library.importing.discovery import find_models
+from scenewright.stages.library.importing.frames import AXES, model_rotation
+from scenewright.stages.library.importing.grouping import grouped, source_points
+from scenewright.stages.library.importing.pieces import convex_pieces
+from scenewright.stages.library.importing.placing import normal_limits
+from scenewright.stages.library.importing.source_folder import SourceFolder
+from scenewright.stages.library.importing.source_model import SourceModel, Surface, painted_faces
+from scenewright.stages.library.importing.versions import coacd_version, uses_coacd
+from scenewright.stages.library.parameters import AdditionParameters
 
-from cli.main import run as command_line
-from schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile
-from schemas.errors import BadInput, MissingDependency
-from stages.kit.formats.cad_models import load_collision_parts, model_folder, part_transforms, posed_mesh, read_model
-from stages.kit.formats.urdf_check import check_urdf
-from stages.kit.geometry.transforms import apply
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.library.addition import run
-from stages.library.importing.classes import class_of
-from stages.library.importing.collada_file import parse_collada
-from stages.library.importing.discovery import find_models
-from stages.library.importing.frames import AXES, model_rotation
-from stages.library.importing.grouping import grouped, source_points
-from stages.library.importing.pieces import convex_pieces
-from stages.library.importing.placing import normal_limits
-from stages.library.importing.source_folder import SourceFolder
-from stages.library.importing.source_model import SourceModel, Surface, painted_faces
-from stages.library.importing.versions import coacd_version, uses_coacd
-from stages.library.parameters import AdditionParameters
 from tests.real_data import real_data
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import box
-from stages.library.joint_kinds import joint_kind
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.solids import box
+from scenewright.stages.library.joint_kinds import joint_kind
 
 CABINET = box((-0.5, 0.5), (0.0, 0.5), (0.0, 1.0)).vertices
 

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 import yourdfpy
-
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.errors import BadInput, UsageError
-from schemas.scene_parts import Joint
-from stages.kit.formats.cad_models import (
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.formats.cad_models import (
     load_collision_parts,
     load_visual_parts,
     model_folder,
@@ -22,12 +21,13 @@ from stages.kit.formats.cad_models import (
     posed_mesh,
     read_model,
 )
-from stages.kit.formats.urdf_check import check_urdf
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.library.families import GENERATORS
-from stages.library.parameters import LibraryParameters
-from stages.library.stage import run
+from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.library.families import GENERATORS
+from scenewright.stages.library.parameters import LibraryParameters
+from scenewright.stages.library.stage import run
+
 from tests.unit.library.clearance import depths_of_links
 
 GRIPPER_OPENING = 0.08

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, model_folder, posed_collision
+from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.library.design import Design, centered
+from scenewright.stages.library.families import GENERATORS
 
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.cad_models import load_collision_parts, model_folder, posed_collision
-from stages.kit.formats.urdf_check import check_urdf
-from stages.library.design import Design, centered
-from stages.library.families import GENERATORS
 from tests.unit.library.clearance import depths_of_links
 from tests.unit.library.test_library import FIRST, build
 

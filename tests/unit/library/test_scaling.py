@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import yourdfpy
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.stages.kit.formats.cad_models import load_visual_parts, model_folder, part_transforms
+from scenewright.stages.kit.formats.scene_links import model_links
+from scenewright.stages.kit.formats.urdf_file import Urdf, write_urdf
 
-from schemas.cad_library import CadLibrary
-from stages.kit.formats.cad_models import load_visual_parts, model_folder, part_transforms
-from stages.kit.formats.scene_links import model_links
-from stages.kit.formats.urdf_file import Urdf, write_urdf
 from tests.unit.library.test_library import build
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.geometry.solids import (
+from scenewright.stages.kit.geometry.solids import (
     Solid,
     bar,
     box,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.geometry.solids import box, cylinder
-from stages.library.surfaces import surface_planes
+from scenewright.stages.kit.geometry.solids import box, cylinder
+from scenewright.stages.library.surfaces import surface_planes
 
 
 def horizontals(solids):

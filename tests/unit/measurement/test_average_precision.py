@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.kit.measurement.average_precision import (
+from scenewright.stages.kit.measurement.average_precision import (
     Candidates,
     PrecisionRecall,
     average_precision,

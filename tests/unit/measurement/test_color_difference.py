@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.evaluate.color_difference import color_difference, lab_from_linear, linear_from_srgb, mean_lab
+from scenewright.stages.evaluate.color_difference import color_difference, lab_from_linear, linear_from_srgb, mean_lab
 
 
 @pytest.mark.parametrize(

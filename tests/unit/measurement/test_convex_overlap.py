@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.measurement.convex_overlap import (
+    convex_piece,
+    penetration_depth,
+    piece_depth,
+    shared_volume,
+)
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.measurement.convex_overlap import convex_piece, penetration_depth, piece_depth, shared_volume
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
 

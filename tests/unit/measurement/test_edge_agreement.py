@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.scene_parts import Relation
-from stages.kit.drawing.tree_layout import tree_layout
-from stages.kit.measurement.edge_agreement import edge_agreement, edge_errors
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.kit.drawing.tree_layout import tree_layout
+from scenewright.stages.kit.measurement.edge_agreement import edge_agreement, edge_errors
 
 CLASSES = {"floor": "layout", "wall": "layout", "desk": "rigid", "shelf": "rigid", "cup": "rigid", "board": "rigid"}
 

@@ -12,15 +12,18 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
-
-from stages.evaluate.mesh_distance import distances_to_mesh, surface_agreement
-from stages.evaluate.point_labels import nearest_labels
-from stages.kit.drawing.palette import hex_color, instance_color
-from stages.kit.drawing.plots import plot_bars, plot_graphs
-from stages.kit.drawing.tree_layout import tree_layout
-from stages.kit.measurement.bootstrap import bootstrap_interval, figure_interval, paired_interval, pooled_interval
-from stages.kit.measurement.pose_error import (
+from scenewright.stages.evaluate.mesh_distance import distances_to_mesh, surface_agreement
+from scenewright.stages.evaluate.point_labels import nearest_labels
+from scenewright.stages.kit.drawing.palette import hex_color, instance_color
+from scenewright.stages.kit.drawing.plots import plot_bars, plot_graphs
+from scenewright.stages.kit.drawing.tree_layout import tree_layout
+from scenewright.stages.kit.measurement.bootstrap import (
+    bootstrap_interval,
+    figure_interval,
+    paired_interval,
+    pooled_interval,
+)
+from scenewright.stages.kit.measurement.pose_error import (
     align_rigidly,
     associate,
     position_error,
@@ -29,7 +32,8 @@ from stages.kit.measurement.pose_error import (
     yaw_error,
     yaw_of,
 )
-from stages.kit.measurement.tables import Table, as_csv, as_markdown
+from scenewright.stages.kit.measurement.tables import Table, as_csv, as_markdown
+from scipy.spatial.transform import Rotation
 
 
 def test_yaw_error():
@@ -220,7 +224,7 @@ def test_plots_are_the_same_bytes_every_time(tmp_path):
 
 
 def test_plot_of_graphs_without_nodes(tmp_path):
-    from schemas.contact_graph import ContactGraphFile
+    from scenewright.schemas.contact_graph import ContactGraphFile
 
     plot_graphs(tmp_path / "g.png", {"empty": ContactGraphFile(nodes=(), links=())}, marked={}, title="nothing")
     assert (tmp_path / "g.png").stat().st_size > 500

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.errors import BadInput
-from schemas.scene_parts import Relation
-from stages.evaluate.graph_edit_distance import SupportTree, graph_edit_distance, support_tree
-from stages.kit.measurement.edge_agreement import edge_agreement
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.evaluate.graph_edit_distance import SupportTree, graph_edit_distance, support_tree
+from scenewright.stages.kit.measurement.edge_agreement import edge_agreement
 
 
 def tree(*nodes: tuple[str, str, str]) -> SupportTree:

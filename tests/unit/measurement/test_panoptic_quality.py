@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.kit.measurement.panoptic_quality import (
+from scenewright.stages.kit.measurement.panoptic_quality import (
     ClassQuality,
     average_quality,
     average_quality_thesis_code,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.kit.drawing.plan_tree import MOST_BRANCHES, Branch, plan_tree
+from scenewright.stages.kit.drawing.plan_tree import MOST_BRANCHES, Branch, plan_tree
 
 
 def texts(figure) -> list[str]:

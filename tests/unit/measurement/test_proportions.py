@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.measurement.proportions import wilson_interval
+from scenewright.stages.kit.measurement.proportions import wilson_interval
 
 Z = 1.959963984540054
 """The normal distribution's 97.5 % quantile."""

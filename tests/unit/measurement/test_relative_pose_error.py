@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.measurement.relative_pose_error import relative_error, trajectory_drift
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.measurement.relative_pose_error import relative_error, trajectory_drift
 
 TIMES = 0.1 * np.arange(101)
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
-
-from stages.kit.measurement.shape_symmetry import (
+from scenewright.stages.kit.measurement.shape_symmetry import (
     NO_SYMMETRY,
     Symmetry,
     cube_rotations,
@@ -15,6 +13,7 @@ from stages.kit.measurement.shape_symmetry import (
     shape_symmetry,
     symmetric_rotation_error,
 )
+from scipy.spatial.transform import Rotation
 
 
 def samples(mesh: trimesh.Trimesh) -> np.ndarray:

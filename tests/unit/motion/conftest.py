@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.simulation.robot import Robot
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.world import load_scene
 
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.simulation.robot import Robot
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.world import load_scene
 from tests.unit.simulation.handmade_scene import kitchen, write_scene
 
 

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.compiled_check import FREE, HIT, find_collision
+from scenewright.stages.kit.motion.convex_distance import Hull, convex_distance
+from scenewright.stages.kit.motion.convex_pieces import link_pieces
+from scenewright.stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
+from scenewright.stages.kit.simulation.robot import Configuration, Robot
+from scenewright.stages.kit.simulation.robot_description import load_robot, mobile_robot_urdf
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 from scipy.optimize import minimize
-
-from schemas.base import as_transform
-from schemas.interactive_scene import SceneBody
-from schemas.scene_parts import Box
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.compiled_check import FREE, HIT, find_collision
-from stages.kit.motion.convex_distance import Hull, convex_distance
-from stages.kit.motion.convex_pieces import link_pieces
-from stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
-from stages.kit.simulation.robot import Configuration, Robot
-from stages.kit.simulation.robot_description import load_robot, mobile_robot_urdf
-from stages.kit.simulation.world import PhysicsWorld
 
 PANDA = load_robot("panda")
 UNIT = np.eye(4)[:3]

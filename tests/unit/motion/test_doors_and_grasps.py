@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.scene_parts import Joint
-from stages.kit.motion.doors import ContactPoint, body_from_moved, closing_direction, push_points, tool_poses
-from stages.kit.motion.grasps import _square, narrowest_width, sample_grasps
-from stages.kit.simulation.shapes import surface_points
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.motion.doors import (
+    ContactPoint,
+    body_from_moved,
+    closing_direction,
+    push_points,
+    tool_poses,
+)
+from scenewright.stages.kit.motion.grasps import _square, narrowest_width, sample_grasps
+from scenewright.stages.kit.simulation.shapes import surface_points
 
 HINGE = Joint(
     name="f__hinge",

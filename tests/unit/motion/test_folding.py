@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics, random_starts
-from stages.kit.simulation.robot import Configuration, Robot
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics, random_starts
+from scenewright.stages.kit.simulation.robot import Configuration, Robot
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 
 class Alone:

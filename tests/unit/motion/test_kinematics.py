@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.motion.cartesian import follow, straight_poses
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics, random_starts, reach
-from stages.kit.simulation.robot import Configuration, base_pose
-from stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.motion.cartesian import follow, straight_poses
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics, random_starts, reach
+from scenewright.stages.kit.simulation.robot import Configuration, base_pose
+from scenewright.stages.kit.simulation.robot_description import load_robot
 
 PANDA = load_robot("panda")
 CHAIN = arm_chain(PANDA)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.motion.base_placement import base_query, plan_drive, sample_bases
-from stages.kit.motion.collision import Collision, CollisionChecker
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import arm_chain
-from stages.kit.motion.path_query import Effort, Query
-from stages.kit.motion.path_search import find_path
-from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
-from stages.kit.motion.timing import sample_times, time_path
-from stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.motion.base_placement import base_query, plan_drive, sample_bases
+from scenewright.stages.kit.motion.collision import Collision, CollisionChecker
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import arm_chain
+from scenewright.stages.kit.motion.path_query import Effort, Query
+from scenewright.stages.kit.motion.path_search import find_path
+from scenewright.stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
+from scenewright.stages.kit.motion.timing import sample_times, time_path
+from scenewright.stages.kit.simulation.robot_description import load_robot
 
 PANDA = load_robot("panda")
 CHAIN = arm_chain(PANDA)

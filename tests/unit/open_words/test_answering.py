@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.open_words.answering import RegionIndex, explained
+from scenewright.stages.kit.open_words.answering import RegionIndex, explained
 
 NOTHING = np.zeros(0, int)
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.kit.open_words.calibration import UNFITTED, Calibration, calibration_of, log_odds, recognised
+from scenewright.stages.kit.open_words.embedded import BUNDLED, EmbeddedEncoder
+from scenewright.stages.kit.open_words.encoder import check_width, checked_text, unit
+from scenewright.stages.kit.open_words.relevancy import CANONICAL, margins, query_rows, relevancy
+from scenewright.stages.kit.open_words.two_towers import parts_of, tokens, words_of
 
-from schemas.errors import BadInput, UsageError
-from stages.kit.open_words.calibration import UNFITTED, Calibration, calibration_of, log_odds, recognised
-from stages.kit.open_words.embedded import BUNDLED, EmbeddedEncoder
-from stages.kit.open_words.encoder import check_width, checked_text, unit
-from stages.kit.open_words.relevancy import CANONICAL, margins, query_rows, relevancy
-from stages.kit.open_words.two_towers import parts_of, tokens, words_of
 from tests.unit.open_words.stand_ins import ColorEncoder
 
 

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.options import EncoderParameters
+from scenewright.stages.kit.open_words.service_encoder import ServiceEncoder
+from scenewright.stages.kit.open_words.transformers_encoder import TransformersEncoder
 
-from schemas.errors import BadInput, MissingDependency
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.open_words.options import EncoderParameters
-from stages.kit.open_words.service_encoder import ServiceEncoder
-from stages.kit.open_words.transformers_encoder import TransformersEncoder
 from tests.unit.open_words.stand_ins import ColorEncoder
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
-
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import Relation
-from stages.kit.open_words.relations import related, split_relation
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.kit.open_words.relations import related, split_relation
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from schemas.plan import Failure
-from stages.pack.records import Action, Attempt, BoxState, Observation, Proposer, Rectangle, StepFeedback
+from scenewright.schemas.plan import Failure
+from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation, Proposer, Rectangle, StepFeedback
 
 BASKET = Rectangle("basket", (0.54, -0.105), (0.76, 0.105))
 SIZES = {"red_box": (0.07, 0.07), "blue_box": (0.07, 0.07), "green_box": (0.105, 0.035), "tan_box": (0.035, 0.035)}

@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_starts
+from scenewright.stages.kit.motion.rrt_connect import densify, first_collision
+from scenewright.stages.pack.arm import FixedArm, ToolPose
+from scenewright.stages.pack.arm_scene import ArmScene
+from scenewright.stages.pack.environment import PackingWorld, State
+from scenewright.stages.pack.hand import Named, held_block, tool_over_centre
+from scenewright.stages.pack.instances import BASKETS, Instance, Obstacle, Rectangle, published_instance
+from scenewright.stages.pack.motion import HOME_STANCE, MotionPlanner
+from scenewright.stages.pack.records import Action, BoxState
+from scenewright.stages.pack.settling import rest_of
+from scenewright.stages.pack.solids import Block, flat_depth, overlap
 from shapely import affinity
 from shapely.geometry import Polygon, box
-
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import inverse_kinematics, random_starts
-from stages.kit.motion.rrt_connect import densify, first_collision
-from stages.pack.arm import FixedArm, ToolPose
-from stages.pack.arm_scene import ArmScene
-from stages.pack.environment import PackingWorld, State
-from stages.pack.hand import Named, held_block, tool_over_centre
-from stages.pack.instances import BASKETS, Instance, Obstacle, Rectangle, published_instance
-from stages.pack.motion import HOME_STANCE, MotionPlanner
-from stages.pack.records import Action, BoxState
-from stages.pack.settling import rest_of
-from stages.pack.solids import Block, flat_depth, overlap
 
 BOX = BoxState("red_box", 0.07, 0.05, 0.07, 0.45, 0.1, 0.0, False)
 

@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenewright.schemas.plan import Failure
+from scenewright.stages.kit.language.chat import Chat, ChatSettings
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.language.messages import say
+from scenewright.stages.kit.language.opening import open_chat
+from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.language.plan_schema import plan_schema
+from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.pack.language_prompt import packing_language, prompt, trace_text
+from scenewright.stages.pack.language_proposer import LanguageProposer, SymbolicProposer
+from scenewright.stages.pack.language_reading import read_prompt
+from scenewright.stages.pack.language_scripted import scripted_backend, scripted_chat
+from scenewright.stages.pack.records import Action, Attempt, Observation, Rectangle, StepFeedback
 
-from schemas.plan import Failure
-from stages.kit.language.chat import Chat, ChatSettings
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.language.messages import say
-from stages.kit.language.opening import open_chat
-from stages.kit.language.options import LanguageParameters
-from stages.kit.language.plan_schema import plan_schema
-from stages.kit.language.scripted import ScriptedBackend
-from stages.pack.language_prompt import packing_language, prompt, trace_text
-from stages.pack.language_proposer import LanguageProposer, SymbolicProposer
-from stages.pack.language_reading import read_prompt
-from stages.pack.language_scripted import scripted_backend, scripted_chat
-from stages.pack.records import Action, Attempt, Observation, Rectangle, StepFeedback
 from tests.unit.pack.flat_world import SIZES, observation, packed, solved, tried
 
 PICK, PLACE = Action("pick", "red_box"), Action("place", "red_box", 0.6, -0.02, 1.57)

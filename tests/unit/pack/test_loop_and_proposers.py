@@ -6,21 +6,20 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-
-from schemas.errors import UsageError
-from schemas.plan import Failure
-from stages.pack import hard_suites
-from stages.pack.backtracking import Backtracking
-from stages.pack.environment import PackingWorld
-from stages.pack.hard_suites import HARD_CELLS, hard_instance
-from stages.pack.instances import Instance, Obstacle, Rectangle, published_instance
-from stages.pack.layout_search import LayoutProblem, find_layout
-from stages.pack.learned_limits import learn
-from stages.pack.loop import Budget, GaveUp, run_loop
-from stages.pack.motion import MotionPlanner
-from stages.pack.own_proposer import OwnProposer, placement_solver
-from stages.pack.records import Action, Attempt, BoxState, StepFeedback
-from stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler, pick_and_place
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.plan import Failure
+from scenewright.stages.pack import hard_suites
+from scenewright.stages.pack.backtracking import Backtracking
+from scenewright.stages.pack.environment import PackingWorld
+from scenewright.stages.pack.hard_suites import HARD_CELLS, hard_instance
+from scenewright.stages.pack.instances import Instance, Obstacle, Rectangle, published_instance
+from scenewright.stages.pack.layout_search import LayoutProblem, find_layout
+from scenewright.stages.pack.learned_limits import learn
+from scenewright.stages.pack.loop import Budget, GaveUp, run_loop
+from scenewright.stages.pack.motion import MotionPlanner
+from scenewright.stages.pack.own_proposer import OwnProposer, placement_solver
+from scenewright.stages.pack.records import Action, Attempt, BoxState, StepFeedback
+from scenewright.stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler, pick_and_place
 
 EASY = ("red_box", "blue_box", "green_box", "tan_box")
 

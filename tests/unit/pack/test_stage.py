@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.packing import Packing
+from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.pack.parameters import STAGE, PackParameters, Suite
+from scenewright.stages.pack.problem_file import from_file, read_problem, to_file
+from scenewright.stages.pack.stage import run
 
 from benchmarks.experiments.llm3.arms import HARD, PUBLISHED
-from schemas.errors import BadInput, UsageError
-from schemas.packing import Packing
-from stages.kit.language.failures import LanguageFailed
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.pack.parameters import STAGE, PackParameters, Suite
-from stages.pack.problem_file import from_file, read_problem, to_file
-from stages.pack.stage import run
 from tests.unit.language.stub_server import replies, serving, status
 
 PROBLEM: dict[str, Any] = {

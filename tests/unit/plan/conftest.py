@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.plan.world_model import WorldModel
 
-from schemas.contact_graph import ContactGraphFile
-from stages.kit.simulation.robot_description import load_robot
-from stages.plan.world_model import WorldModel
 from tests.unit.simulation.handmade_scene import kitchen, write_scene
 
 

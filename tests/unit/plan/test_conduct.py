@@ -9,20 +9,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-from schemas.plan import BodyMatch
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.segments import Manipulation, Segment
-from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
-from stages.plan import conduct as conduct_module
-from stages.plan.action import MotionRequest
-from stages.plan.actions.place import MOST_TILT, Place
-from stages.plan.conduct import Conduct
-from stages.plan.eyes import Room, TrueEyes
-from stages.plan.pick_place import Budgets
-from stages.plan.refinement import Step
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.schemas.plan import BodyMatch
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.segments import Manipulation, Segment
+from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
+from scenewright.stages.plan import conduct as conduct_module
+from scenewright.stages.plan.action import MotionRequest
+from scenewright.stages.plan.actions.place import MOST_TILT, Place
+from scenewright.stages.plan.conduct import Conduct
+from scenewright.stages.plan.eyes import Room, TrueEyes
+from scenewright.stages.plan.pick_place import Budgets
+from scenewright.stages.plan.refinement import Step
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 BUDGETS = Budgets(bases=1, pairs=1, path_samples=1, paths=1)
 START = RobotState(np.zeros(3), np.zeros(7))

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.plan import refinement
+from scenewright.stages.plan.action import MotionRequest
+from scenewright.stages.plan.driving import ROOM, drive_way
+from scenewright.stages.plan.pick_place import Budgets
+from scenewright.stages.plan.refinement import refine_action
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
-from schemas.contact_graph import ContactGraphFile
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.simulation.robot_description import load_robot
-from stages.plan import refinement
-from stages.plan.action import MotionRequest
-from stages.plan.driving import ROOM, drive_way
-from stages.plan.pick_place import Budgets
-from stages.plan.refinement import refine_action
-from stages.plan.world_model import RobotState, WorldModel
 from tests.unit.simulation.handmade_scene import HandmadeBody, floor, kitchen, write_scene
 
 PANDA = load_robot("panda")

@@ -8,19 +8,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.motion.segments import Segment
-from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
-from stages.kit.simulation.robot import Configuration
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.world import load_scene, read_scene_bodies
-from stages.plan.camera_eyes import CameraEyes
-from stages.plan.erring_robot import ErringRobot
-from stages.plan.eyes import NoisyEyes, Room, TrueEyes
-from stages.plan.pictures import RoomPictures
-from stages.plan.pose_fit import fit_upright
-from stages.plan.world_model import WorldModel
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.motion.segments import Segment
+from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
+from scenewright.stages.kit.simulation.robot import Configuration
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.world import load_scene, read_scene_bodies
+from scenewright.stages.plan.camera_eyes import CameraEyes
+from scenewright.stages.plan.erring_robot import ErringRobot
+from scenewright.stages.plan.eyes import NoisyEyes, Room, TrueEyes
+from scenewright.stages.plan.pictures import RoomPictures
+from scenewright.stages.plan.pose_fit import fit_upright
+from scenewright.stages.plan.world_model import WorldModel
 
 NEVER = SegmenterErrors(SegmenterRates(confusable=0.0, hidden=0.0, missed=0.0), Luck(0), ())
 ALWAYS = SegmenterErrors(SegmenterRates(missed=1.0), Luck(0), ())

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply, inverse, look_at, transform_from_yaw
-from stages.kit.rendering.object_views import Picture, View
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.kit.rendering.surfaces import build_soup
-from stages.kit.simulation.shapes import surface_points
-from stages.plan.furniture_fit import Range, Surface, fit_furniture
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at, transform_from_yaw
+from scenewright.stages.kit.rendering.object_views import Picture, View
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.rendering.surfaces import build_soup
+from scenewright.stages.kit.simulation.shapes import surface_points
+from scenewright.stages.plan.furniture_fit import Range, Surface, fit_furniture
 
 CAMERA = Camera(width=160, height=120, fx=170.0, fy=170.0, cx=79.5, cy=59.5)
 HINGE = np.array([0.2, -0.25, 0.0])

@@ -5,16 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput, ScenewrightError, UsageError
-from stages.kit.tasks.strips import Atom, validate
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan.formulas import Names, alternatives
-from stages.plan.given_domain import read_given_domain
-from stages.plan.reading import Reading
-from stages.plan.symbols import symbolic_state
-from stages.plan.world_model import WorldModel
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput, ScenewrightError, UsageError
+from scenewright.stages.kit.tasks.strips import Atom, validate
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan.formulas import Names, alternatives
+from scenewright.stages.plan.given_domain import read_given_domain
+from scenewright.stages.plan.reading import Reading
+from scenewright.stages.plan.symbols import symbolic_state
+from scenewright.stages.plan.world_model import WorldModel
 
 TIDY = """(define (domain tidy)
   (:requirements :strips :typing :negative-preconditions)

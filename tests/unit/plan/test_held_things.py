@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.motion.grasps import sample_grasps
-from stages.kit.simulation.shapes import surface_points
-from stages.plan.pick_place import HAND_END, PALM_BEHIND, _palm_free
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.motion.grasps import sample_grasps
+from scenewright.stages.kit.simulation.shapes import surface_points
+from scenewright.stages.plan.pick_place import HAND_END, PALM_BEHIND, _palm_free
 
 PALM = (0.21, 0.066)
 

@@ -6,24 +6,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.plan import BodyMatch, Failure
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
+from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.tasks.strips import GroundAction, ground
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan.assumptions import believe, match_beliefs, parse_priors
+from scenewright.stages.plan.carriers import HAND
+from scenewright.stages.plan.domain import DOMAIN
+from scenewright.stages.plan.joined_bodies import _roll_pitch_yaw
+from scenewright.stages.plan.learning import Lessons
+from scenewright.stages.plan.refinement import Step
+from scenewright.stages.plan.symbols import parse_goal, symbolic_state, task_problem
+from scenewright.stages.plan.tree_state import after_step, start_state
+from scenewright.stages.plan.world_model import WorldModel
 from scipy.spatial.transform import Rotation
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import UsageError
-from schemas.plan import BodyMatch, Failure
-from stages.kit.geometry.transforms import inverse, transform_from_yaw
-from stages.kit.motion.segments import Manipulation
-from stages.kit.tasks.strips import GroundAction, ground
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan.assumptions import believe, match_beliefs, parse_priors
-from stages.plan.carriers import HAND
-from stages.plan.domain import DOMAIN
-from stages.plan.joined_bodies import _roll_pitch_yaw
-from stages.plan.learning import Lessons
-from stages.plan.refinement import Step
-from stages.plan.symbols import parse_goal, symbolic_state, task_problem
-from stages.plan.tree_state import after_step, start_state
-from stages.plan.world_model import WorldModel
 
 
 def action(name: str, *arguments: str, pre: tuple = (), add: tuple = ()) -> GroundAction:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.open_words.vectors import of_regions, write_vectors
+from scenewright.stages.plan import open_goals
+from scenewright.stages.plan.open_goals import has_words, named_goal
 
-from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.errors import BadInput, UsageError
-from schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
-from schemas.scene_parts import Box
-from stages.kit.open_words.vectors import of_regions, write_vectors
-from stages.plan import open_goals
-from stages.plan.open_goals import has_words, named_goal
 from tests.unit.open_words.stand_ins import ColorEncoder
 
 OBJECTS = {"cup_1": "item", "cup_2": "item", "table_3": "surface"}

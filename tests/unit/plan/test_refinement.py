@@ -8,21 +8,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.rrt_connect import densify
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.tasks.strips import positive_task
+from scenewright.stages.plan.action import MotionRequest
+from scenewright.stages.plan.door_motion import plan_close
+from scenewright.stages.plan.goals import default_goals
+from scenewright.stages.plan.pick_place import Budgets, plan_pick
+from scenewright.stages.plan.refinement import SearchSettings, plan_and_refine, refine_action
+from scenewright.stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
+from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import UsageError
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.rrt_connect import densify
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.tasks.strips import positive_task
-from stages.plan.action import MotionRequest
-from stages.plan.door_motion import plan_close
-from stages.plan.goals import default_goals
-from stages.plan.pick_place import Budgets, plan_pick
-from stages.plan.refinement import SearchSettings, plan_and_refine, refine_action
-from stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
-from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 from tests.unit.simulation.handmade_scene import HandmadeBody, kitchen, write_scene
 
 PANDA = load_robot("panda")

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.scene_parts import Joint
-from stages.plan.regions import OPEN_AIR, Region, find_regions
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.plan.regions import OPEN_AIR, Region, find_regions
 
 SLIDE = Joint(
     name="chest__slide", type="prismatic", part="chest__drawer", origin=(0, 0, 0), axis=(0, -1, 0), lower=0, upper=0.3

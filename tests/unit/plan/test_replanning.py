@@ -7,19 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from schemas.contact_graph import ContactGraphFile
-from schemas.plan import Failure, TriedPlan
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.tasks.strips import GroundAction, Problem
-from stages.plan.believed_tree import TreeState
-from stages.plan.carriers import HAND, NOTHING
-from stages.plan.reading import Reading
-from stages.plan.refinement import Attempt, Step
-from stages.plan.replanning import Replanning, in_the_middle
-from stages.plan.tree_state import start_state
-from stages.plan.world_model import RobotState, WorldModel
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.plan import Failure, TriedPlan
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.tasks.strips import GroundAction, Problem
+from scenewright.stages.plan.believed_tree import TreeState
+from scenewright.stages.plan.carriers import HAND, NOTHING
+from scenewright.stages.plan.reading import Reading
+from scenewright.stages.plan.refinement import Attempt, Step
+from scenewright.stages.plan.replanning import Replanning, in_the_middle
+from scenewright.stages.plan.tree_state import start_state
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 FIRST = frozenset(
     {

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.simulation.shapes import link_shapes, surface_points
-from stages.plan.rim_grasps import rim_grasps
-from stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
+from scenewright.stages.plan.rim_grasps import rim_grasps
+from scenewright.stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
 
 LONG, WIDE, RIM, GRIP = 0.24, 0.16, 0.015, 0.047
 TRUE = transform_from_yaw(0.3, np.array([1.0, -2.0, 0.75]))

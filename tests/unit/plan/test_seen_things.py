@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-
-from stages.kit.geometry.transforms import apply, transform_from_yaw
-from stages.kit.simulation.shapes import link_shapes, surface_points
-from stages.plan.seen_things import SeenThings
-from stages.plan.sticking_out import sticking_out
-from stages.plan.thing_fit import in_sight
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
+from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
+from scenewright.stages.plan.seen_things import SeenThings
+from scenewright.stages.plan.sticking_out import sticking_out
+from scenewright.stages.plan.thing_fit import in_sight
 
 EYES = np.array([[0.0, -0.7, 0.8], [0.0, -0.15, 0.5]])
 BEAKER = (

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.plan import Plan
+from scenewright.stages.ingest.messages.mcap_log import McapLog
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.plan.parameters import PlanParameters
+from scenewright.stages.plan.stage import run
 
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import UsageError
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.plan import Plan
-from stages.ingest.messages.mcap_log import McapLog
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.plan.parameters import PlanParameters
-from stages.plan.stage import run
 from tests.unit.simulation.handmade_scene import HandmadeBody, kitchen, write_scene
 
 

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.base import as_transform
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.plan import pick_place
+from scenewright.stages.plan.pick_place import HAND_END, PALM_BEHIND, Budgets, palm_bottom, plan_pick
+from scenewright.stages.plan.placements import PUT_DOWN_HEIGHT, sample_placements
+from scenewright.stages.plan.regions import CELL
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 from scipy.spatial.transform import Rotation
 
-from schemas.base import as_transform
-from stages.kit.geometry.transforms import apply, transform_from_yaw
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.simulation.robot_description import load_robot
-from stages.plan import pick_place
-from stages.plan.pick_place import HAND_END, PALM_BEHIND, Budgets, palm_bottom, plan_pick
-from stages.plan.placements import PUT_DOWN_HEIGHT, sample_placements
-from stages.plan.regions import CELL
-from stages.plan.world_model import RobotState, WorldModel
 from tests.unit.simulation.handmade_scene import kitchen, write_scene
 
 PANDA = load_robot("panda")

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.motion.failures import MotionFailed
-from stages.plan.start_pose import SHELL, start_base
-from stages.plan.world_model import WorldModel
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.plan.start_pose import SHELL, start_base
+from scenewright.stages.plan.world_model import WorldModel
 
 
 def start(model: WorldModel, cameras: np.ndarray | None = None) -> np.ndarray:

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene
+from scenewright.stages.plan.checks import CONTACT_HEIGHT, check_on
+from scenewright.stages.plan.tasks import MOST_GOALS, SceneFacts, task_goals, tidy_the_desk
 
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.simulation.world import PhysicsWorld, load_scene
-from stages.plan.checks import CONTACT_HEIGHT, check_on
-from stages.plan.tasks import MOST_GOALS, SceneFacts, task_goals, tidy_the_desk
 from tests.unit.simulation.handmade_scene import HandmadeBody, floor, table, write_scene
 
 # --- tidying a desk -------------------------------------------------------------------------------------------

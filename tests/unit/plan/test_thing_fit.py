@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
+from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
+from scenewright.stages.plan.scaled_body import scaled_text
+from scenewright.stages.plan.thing_fit import FittedThing, fit_thing, in_sight
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import apply, transform_from_yaw
-from stages.kit.simulation.shapes import link_shapes, surface_points
-from stages.plan.scaled_body import scaled_text
-from stages.plan.thing_fit import FittedThing, fit_thing, in_sight
 
 EYES = np.array([[0.0, -0.7, 0.8], [0.0, -0.15, 0.5]])
 

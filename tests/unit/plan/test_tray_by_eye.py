@@ -9,19 +9,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
+from scenewright.stages.kit.simulation.robot import Configuration
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.world import load_scene, read_scene_bodies
+from scenewright.stages.plan.camera_eyes import CameraEyes, Look
+from scenewright.stages.plan.erring_robot import ErringRobot
+from scenewright.stages.plan.eyes import Room
+from scenewright.stages.plan.pictures import RoomPictures
+from scenewright.stages.plan.rim_grasps import has_rim
+from scenewright.stages.plan.world_model import WorldModel
 
-from schemas.contact_graph import ContactGraphFile
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
-from stages.kit.simulation.robot import Configuration
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.world import load_scene, read_scene_bodies
-from stages.plan.camera_eyes import CameraEyes, Look
-from stages.plan.erring_robot import ErringRobot
-from stages.plan.eyes import Room
-from stages.plan.pictures import RoomPictures
-from stages.plan.rim_grasps import has_rim
-from stages.plan.world_model import WorldModel
 from tests.unit.plan.test_tray_loading import tray
 from tests.unit.simulation.handmade_scene import floor, table, write_scene
 

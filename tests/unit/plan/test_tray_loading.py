@@ -9,13 +9,12 @@ import pytest
 import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-
-from schemas.contact_graph import ContactGraphFile
-from stages.kit.geometry.transforms import apply, transform_from_yaw
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.shapes import surface_points
-from stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, has_rim, rim_grasps
-from stages.plan.tray_loading import (
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.shapes import surface_points
+from scenewright.stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, has_rim, rim_grasps
+from scenewright.stages.plan.tray_loading import (
     GRAVITY,
     PALM_ROOM,
     free_lanes,
@@ -25,7 +24,8 @@ from stages.plan.tray_loading import (
     load_moments,
     twisting_moments,
 )
-from stages.plan.world_model import WorldModel
+from scenewright.stages.plan.world_model import WorldModel
+
 from tests.unit.simulation.handmade_scene import HandmadeBody, floor, table, write_scene
 
 PALM = (0.2, 0.06)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.alignment import align, judge
+from scenewright.stages.kit.registration.pyramid import Pyramid, build_pyramid
+from scenewright.stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
 
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.alignment import align, judge
-from stages.kit.registration.pyramid import Pyramid, build_pyramid
-from stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 
 TARGET = round_walk(49)[6]  # a corner with a block before it: depth fixes every direction

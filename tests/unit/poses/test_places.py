@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import apply, transform_from
+from scenewright.stages.kit.registration.rigid_motion import between, distance_of
+from scenewright.stages.poses.features import Features, find_features, ransac_motion, rigid_motions
+from scenewright.stages.poses.places import Ferns, PlaceIndex, fern_likeness
 from scipy.spatial.transform import Rotation
 
-from stages.kit.geometry.transforms import apply, transform_from
-from stages.kit.registration.rigid_motion import between, distance_of
-from stages.poses.features import Features, find_features, ransac_motion, rigid_motions
-from stages.poses.places import Ferns, PlaceIndex, fern_likeness
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 
 WALK = round_walk(13)

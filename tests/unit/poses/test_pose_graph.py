@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.pose_graph import Edge, laid_out, optimize, parts_of
-from stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.pose_graph import Edge, laid_out, optimize, parts_of
+from scenewright.stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
 
 SURE = np.eye(6) * 1e4
 

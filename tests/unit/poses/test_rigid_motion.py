@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.kit.geometry.transforms import inverse
-from stages.kit.registration.rigid_motion import (
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.registration.rigid_motion import (
     adjoint,
     angle_of,
     between,

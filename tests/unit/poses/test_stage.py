@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.measurement.pose_error import trajectory_error
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.poses.parameters import PosesParameters, check
+from scenewright.stages.poses.stage import outcome_of, ranges, run
 
-from schemas.errors import BadInput, UsageError
-from schemas.sequence import Sequence
-from schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.transforms import inverse
-from stages.kit.measurement.pose_error import trajectory_error
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.poses.parameters import PosesParameters, check
-from stages.poses.stage import outcome_of, ranges, run
 from tests.unit.poses.textured_room import round_walk, write_sequence
 
 FRAMES = 49

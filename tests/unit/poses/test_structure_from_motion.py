@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.registration.rigid_motion import between, exponential, fraction
-from stages.poses.structure_from_motion import interpolated
+from scenewright.stages.kit.registration.rigid_motion import between, exponential, fraction
+from scenewright.stages.poses.structure_from_motion import interpolated
 
 POSES = {
     0: exponential(np.array([0.1, 0.2, 0.3, 1.0, 2.0, 3.0])),

@@ -6,13 +6,12 @@ from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.scene_parts import Camera
-from schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.transforms import look_at
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.transforms import look_at
 
 CAMERA = Camera(width=160, height=120, fx=120.0, fy=120.0, cx=79.5, cy=59.5)
 LOW, HIGH = np.array([-2.0, -1.6, 0.0]), np.array([2.0, 1.6, 2.4])

@@ -7,10 +7,9 @@ import json
 from pathlib import Path
 
 import pytest
-
-from cli.main import run as run_command
-from stages.kit.tasks import fast_downward
-from stages.predicates.learning.records import document_of, memory_of
+from scenewright.cli.main import run as run_command
+from scenewright.stages.kit.tasks import fast_downward
+from scenewright.stages.predicates.learning.records import document_of, memory_of
 
 
 def run(*words: str) -> int:
@@ -42,7 +41,7 @@ def test_what_was_learned_is_counted(learned: Path, tmp_path: Path) -> None:
 
 
 def test_a_memory_comes_back_from_its_document(learned: Path) -> None:
-    from schemas.learned_domain import LearnedDomain
+    from scenewright.schemas.learned_domain import LearnedDomain
 
     document = LearnedDomain(root=learned).info
     memory = memory_of(document, "here")
@@ -64,8 +63,8 @@ def test_a_memory_comes_back_from_its_document(learned: Path) -> None:
     ],
 )
 def test_a_damaged_document_is_refused_in_one_line(learned: Path, change, message: str) -> None:  # type: ignore[no-untyped-def]
-    from schemas.errors import BadInput
-    from schemas.learned_domain import LearnedDomainFile
+    from scenewright.schemas.errors import BadInput
+    from scenewright.schemas.learned_domain import LearnedDomainFile
 
     document = json.loads((learned / "domain.json").read_text())
     change(document)

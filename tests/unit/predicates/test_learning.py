@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import pytest
-
-from stages.kit.predicates.expressions import read, text_of
-from stages.kit.predicates.goal_words import goal_phrases
-from stages.kit.tasks.pddl import domain_text, parse_domain
-from stages.predicates.execution import attempt
-from stages.predicates.learning.operators import Transition, learn_operators, lift
-from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.phrases import Phrase, phrase_of
-from stages.predicates.learning.synthesis import Label, Synthesiser
-from stages.predicates.state import Seen, State
-from stages.predicates.tasks import tasks_of
-from stages.predicates.teacher.simulated import SimulatedTeacher
-from stages.predicates.training import train
-from stages.predicates.truth import truth_of
-from stages.predicates.world.catalogue import kitchen_file
+from scenewright.stages.kit.predicates.expressions import read, text_of
+from scenewright.stages.kit.predicates.goal_words import goal_phrases
+from scenewright.stages.kit.tasks.pddl import domain_text, parse_domain
+from scenewright.stages.predicates.execution import attempt
+from scenewright.stages.predicates.learning.operators import Transition, learn_operators, lift
+from scenewright.stages.predicates.learning.ours import OursLearner
+from scenewright.stages.predicates.learning.phrases import Phrase, phrase_of
+from scenewright.stages.predicates.learning.synthesis import Label, Synthesiser
+from scenewright.stages.predicates.state import Seen, State
+from scenewright.stages.predicates.tasks import tasks_of
+from scenewright.stages.predicates.teacher.simulated import SimulatedTeacher
+from scenewright.stages.predicates.training import train
+from scenewright.stages.predicates.truth import truth_of
+from scenewright.stages.predicates.world.catalogue import kitchen_file
 
 
 def taught(domain: str, wrong: float = 0.0, wording: str = "plain", tasks: int = 10) -> OursLearner:

@@ -8,11 +8,11 @@ import pddl
 import pytest
 from pddl.logic.predicates import Predicate
 from pddl.logic.terms import Constant
+from scenewright.stages.kit.tasks.pddl import domain_text, parse_domain, problem_text
+from scenewright.stages.kit.tasks.strips import Domain, Problem, Schema
+from scenewright.stages.predicates.tasks import open_kitchen, tasks_of
+from scenewright.stages.predicates.truth import truth_of
 
-from stages.kit.tasks.pddl import domain_text, parse_domain, problem_text
-from stages.kit.tasks.strips import Domain, Problem, Schema
-from stages.predicates.tasks import open_kitchen, tasks_of
-from stages.predicates.truth import truth_of
 from tests.unit.predicates.test_learning import taught
 
 

@@ -6,18 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Predicate, check, read
-from stages.kit.tasks.pddl import parse_domain
-from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.ours import OursLearner
-from stages.predicates.state import KITCHEN_WORDS, Seen, State
-from stages.predicates.tasks import layout
-from stages.predicates.teach_stage import write_predicates
-from stages.predicates.teacher.simulated import SimulatedTeacher
-from stages.predicates.truth import true_predicates
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Predicate, check, read
+from scenewright.stages.kit.tasks.pddl import parse_domain
+from scenewright.stages.predicates.learning.memory import Memory
+from scenewright.stages.predicates.learning.ours import OursLearner
+from scenewright.stages.predicates.state import KITCHEN_WORDS, Seen, State
+from scenewright.stages.predicates.tasks import layout
+from scenewright.stages.predicates.teach_stage import write_predicates
+from scenewright.stages.predicates.teacher.simulated import SimulatedTeacher
+from scenewright.stages.predicates.truth import true_predicates
 
 TABLE = State({"can": Seen(0.0, 0.0, 3.0, 3.0, "can"), "cup": Seen(9.0, 0.0, 4.0, 4.0, "cup")})
 

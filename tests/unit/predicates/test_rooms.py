@@ -6,20 +6,20 @@ import json
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run as run_command
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput, ScenewrightError
+from scenewright.stages.kit.predicates.room import Body, RoomState
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan.given_domain import read_given_domain
+from scenewright.stages.plan.reading import Reading
+from scenewright.stages.plan.symbols import symbolic_state
+from scenewright.stages.plan.world_model import WorldModel
+from scenewright.stages.predicates.room.tasks import read_rooms, room_tasks
+from scenewright.stages.predicates.room.world import RoomWorld
+from scenewright.stages.predicates.teacher.terminal import Asked, TerminalTeacher, read_dialogue
+from scenewright.stages.predicates.truth import truth_of
 
-from cli.main import run as run_command
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput, ScenewrightError
-from stages.kit.predicates.room import Body, RoomState
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan.given_domain import read_given_domain
-from stages.plan.reading import Reading
-from stages.plan.symbols import symbolic_state
-from stages.plan.world_model import WorldModel
-from stages.predicates.room.tasks import read_rooms, room_tasks
-from stages.predicates.room.world import RoomWorld
-from stages.predicates.teacher.terminal import Asked, TerminalTeacher, read_dialogue
-from stages.predicates.truth import truth_of
 from tests.unit.plan.conftest import kitchen_model, model, scene  # noqa: F401
 
 
@@ -146,13 +146,13 @@ def test_without_a_terminal_nobody_is_asked(tmp_path: Path) -> None:
 
 def test_a_whole_lesson_replays(tmp_path: Path) -> None:
     """What a simulated person would answer, as a dialogue: the artifact is the same when it is replayed."""
-    from stages.predicates.learning.memory import Memory
-    from stages.predicates.learning.ours import OursLearner
-    from stages.predicates.learning.records import document_of
-    from stages.predicates.learning.setting import ROOM as SETTING
-    from stages.predicates.room.tasks import open_room
-    from stages.predicates.teacher.simulated import SimulatedTeacher
-    from stages.predicates.training import train
+    from scenewright.stages.predicates.learning.memory import Memory
+    from scenewright.stages.predicates.learning.ours import OursLearner
+    from scenewright.stages.predicates.learning.records import document_of
+    from scenewright.stages.predicates.learning.setting import ROOM as SETTING
+    from scenewright.stages.predicates.room.tasks import open_room
+    from scenewright.stages.predicates.teacher.simulated import SimulatedTeacher
+    from scenewright.stages.predicates.training import train
 
     tasks = room_tasks([ROOM], 3, 1)
     truth = SimulatedTeacher("room", 1)

@@ -6,25 +6,25 @@ import json
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run as run_command
+from scenewright.stages.kit.language.backend import Request
+from scenewright.stages.kit.language.chat import Chat
+from scenewright.stages.kit.language.recorded import RecordedBackend, RecordingBackend
+from scenewright.stages.kit.language.reply_text import objects_in
+from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.kit.language.transcripts import TranscriptFile, read_transcript
+from scenewright.stages.kit.predicates.expressions import text_of
+from scenewright.stages.predicates.execution import Live
+from scenewright.stages.predicates.language_arms import code_as_policies, inner_monologue
+from scenewright.stages.predicates.learning.operators import Transition
+from scenewright.stages.predicates.learning.phrases import Phrase
+from scenewright.stages.predicates.learning.synthesis import Label
+from scenewright.stages.predicates.learning.thesis import NEVER, ROUNDS, ThesisLearner, stand_in
+from scenewright.stages.predicates.learning.thesis_memory import ThesisMemory
+from scenewright.stages.predicates.learning.thesis_operators import likelihood, search_operators
+from scenewright.stages.predicates.tasks import Task, open_kitchen
+from scenewright.stages.predicates.teacher.simulated import SimulatedTeacher
 
-from cli.main import run as run_command
-from stages.kit.language.backend import Request
-from stages.kit.language.chat import Chat
-from stages.kit.language.recorded import RecordedBackend, RecordingBackend
-from stages.kit.language.reply_text import objects_in
-from stages.kit.language.scripted import ScriptedBackend
-from stages.kit.language.transcripts import TranscriptFile, read_transcript
-from stages.kit.predicates.expressions import text_of
-from stages.predicates.execution import Live
-from stages.predicates.language_arms import code_as_policies, inner_monologue
-from stages.predicates.learning.operators import Transition
-from stages.predicates.learning.phrases import Phrase
-from stages.predicates.learning.synthesis import Label
-from stages.predicates.learning.thesis import NEVER, ROUNDS, ThesisLearner, stand_in
-from stages.predicates.learning.thesis_memory import ThesisMemory
-from stages.predicates.learning.thesis_operators import likelihood, search_operators
-from stages.predicates.tasks import Task, open_kitchen
-from stages.predicates.teacher.simulated import SimulatedTeacher
 from tests.unit.predicates.test_learning import TABLE
 
 ACTIONS = {"pick_up": 1, "place_on_table": 1, "place_first_on_second": 2}

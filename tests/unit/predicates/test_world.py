@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import pytest
-
-from schemas.errors import BadInput
-from stages.kit.predicates.evaluating import Evaluator
-from stages.kit.predicates.expressions import Predicate, check, read, text_of
-from stages.predicates.execution import oracle
-from stages.predicates.language.saying import say
-from stages.predicates.state import KITCHEN_WORDS, Seen, State
-from stages.predicates.tasks import SETS, open_kitchen, tasks_of, true_atoms
-from stages.predicates.truth import true_domain, true_predicates
-from stages.predicates.world.actions import act
-from stages.predicates.world.catalogue import DOMAINS, kitchen_file
-from stages.predicates.world.kitchen import Kitchen
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.predicates.evaluating import Evaluator
+from scenewright.stages.kit.predicates.expressions import Predicate, check, read, text_of
+from scenewright.stages.predicates.execution import oracle
+from scenewright.stages.predicates.language.saying import say
+from scenewright.stages.predicates.state import KITCHEN_WORDS, Seen, State
+from scenewright.stages.predicates.tasks import SETS, open_kitchen, tasks_of, true_atoms
+from scenewright.stages.predicates.truth import true_domain, true_predicates
+from scenewright.stages.predicates.world.actions import act
+from scenewright.stages.predicates.world.catalogue import DOMAINS, kitchen_file
+from scenewright.stages.predicates.world.kitchen import Kitchen
 
 
 def kitchen(*things: tuple[str, float, float], seed: int = 0) -> Kitchen:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from schemas.scene_parts import Camera
-from stages.kit.rendering.depth_noise import (
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.rendering.depth_noise import (
     DepthCamera,
     axial_sigma,
     disturb_depth,

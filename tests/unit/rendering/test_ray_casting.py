@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply, look_at
-from stages.kit.rendering.light_map import AreaLight, SoftLight
-from stages.kit.rendering.patterns import PATTERNS, Material, is_wood, pattern_factor
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.kit.rendering.surfaces import corner_normals, linear_to_srgb, srgb_to_linear
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply, look_at
+from scenewright.stages.kit.rendering.light_map import AreaLight, SoftLight
+from scenewright.stages.kit.rendering.patterns import PATTERNS, Material, is_wood, pattern_factor
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.rendering.surfaces import corner_normals, linear_to_srgb, srgb_to_linear
 
 CAMERA = Camera(width=80, height=60, fx=70.0, fy=70.0, cx=39.5, cy=29.5)
 

@@ -8,16 +8,15 @@ import numba
 import numpy as np
 import pytest
 import torch
+from scenewright.schemas.errors import MissingDependency
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
+from scenewright.stages.kit.rendering.splatting.gpu import GpuRasterizer
+from scenewright.stages.kit.rendering.splatting.harmonics import basis
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, View
+from scenewright.stages.kit.rendering.splatting.reference import ReferenceRasterizer, moved
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import MissingDependency
-from schemas.scene_parts import Camera
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
-from stages.kit.rendering.splatting.gpu import GpuRasterizer
-from stages.kit.rendering.splatting.harmonics import basis
-from stages.kit.rendering.splatting.rasterizer import Picture, View
-from stages.kit.rendering.splatting.reference import ReferenceRasterizer, moved
 
 SMALL = Camera(width=18, height=13, fx=14.0, fy=15.0, cx=8.3, cy=6.1)
 ODD = Camera(width=50, height=37, fx=40.0, fy=41.0, cx=24.0, cy=19.0)

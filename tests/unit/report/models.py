@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import trimesh
-
-from schemas.cad_library import CadModel, ModelState
+from scenewright.schemas.cad_library import CadModel, ModelState
 
 
 def write_box_model(root: Path, model_id: str, class_name: str, size, color=(180, 90, 40)) -> Path:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.agent_episode import AgentEpisode
-from stages.agent.parameters import RunParameters
-from stages.agent.run_stage import run
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
+from scenewright.schemas.agent_episode import AgentEpisode
+from scenewright.stages.agent.parameters import RunParameters
+from scenewright.stages.agent.run_stage import run
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+
 from tests.unit.report.test_report import parse, report
 
 

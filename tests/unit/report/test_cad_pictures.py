@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_scene import CadCandidate, CadScene
+from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.kit.measurement.cad_candidates import candidates_of
+from scenewright.stages.report.candidates import object_views
+from scenewright.stages.report.global_check import CONFLICT, checked_scenes
+from scenewright.stages.report.kinematic_tree import corresponding_trees, read_joints
+from scenewright.stages.report.placed_models import ModelShelf
+from scenewright.stages.report.surfaces import cad_model
 
-from schemas.base import as_transform
-from schemas.cad_scene import CadCandidate, CadScene
-from schemas.scene_parts import Relation
-from stages.kit.measurement.cad_candidates import candidates_of
-from stages.report.candidates import object_views
-from stages.report.global_check import CONFLICT, checked_scenes
-from stages.report.kinematic_tree import corresponding_trees, read_joints
-from stages.report.placed_models import ModelShelf
-from stages.report.surfaces import cad_model
 from tests.unit.evaluate.handmade import ROOM, graph_of, make_cad_scene, make_map, model_pose
 from tests.unit.report.models import write_box_model
 from tests.unit.report.test_report import SMALL, parse, report

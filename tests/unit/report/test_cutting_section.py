@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.cutting_plan import CuttingPlan, CuttingPlanFile, WantedFragment
+from scenewright.schemas.cutting_plan import CuttingPlan, CuttingPlanFile, WantedFragment
+
 from tests.unit.report.test_report import parse, report
 
 

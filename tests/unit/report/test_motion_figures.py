@@ -7,11 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from pydantic import ValidationError
-
-from schemas.base import as_transform
-from schemas.errors import BadInput
-from schemas.plan import Failure, PlanFile, PlannedAction, TriedPlan
-from stages.report.motion_figures import motion_figure, tried_tree
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.plan import Failure, PlanFile, PlannedAction, TriedPlan
+from scenewright.stages.report.motion_figures import motion_figure, tried_tree
 
 ACTIONS = ("drive(start, fridge_7)", "open(fridge_7__door_hinge)", "pick(bottle_9, fridge_7)")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.report.outlook import Facts, Outlook, outlook
+from scenewright.stages.report.outlook import Facts, Outlook, outlook
 
 GOOD = {
     "sequence": Facts("ok", {"frames": 30, "dropped": 0, "gravity": "given"}),

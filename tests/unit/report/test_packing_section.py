@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.packing import Packing, PackingAttempt, PackingStep
+from scenewright.schemas.plan import Failure
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.pack.parameters import PackParameters
+from scenewright.stages.pack.stage import run as pack
+from scenewright.stages.report.sections.packing.view import MOST_ROWS, attempt_row, packing_view
 
-from schemas.errors import BadInput
-from schemas.packing import Packing, PackingAttempt, PackingStep
-from schemas.plan import Failure
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.pack.parameters import PackParameters
-from stages.pack.stage import run as pack
-from stages.report.sections.packing.view import MOST_ROWS, attempt_row, packing_view
 from tests.unit.report.test_report import parse, report
 
 

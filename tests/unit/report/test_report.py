@@ -13,20 +13,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.evaluation import Evaluation, MetricsFile, Report
+from scenewright.schemas.manifest import InputRecord, Manifest, Provenance
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.report.figures import metric_groups
+from scenewright.stages.report.graph_drawing import draw_graph
+from scenewright.stages.report.images import from_file
+from scenewright.stages.report.parameters import ReportParameters, check_inputs
+from scenewright.stages.report.provenance import made_of
+from scenewright.stages.report.stage import run
+from scenewright.stages.report.surfaces import map_model
+from scenewright.stages.report.views import bounds_of, cut_away, oblique_view, place_labels, render, top_view
 
-from schemas.errors import BadInput, UsageError
-from schemas.evaluation import Evaluation, MetricsFile, Report
-from schemas.manifest import InputRecord, Manifest, Provenance
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.report.figures import metric_groups
-from stages.report.graph_drawing import draw_graph
-from stages.report.images import from_file
-from stages.report.parameters import ReportParameters, check_inputs
-from stages.report.provenance import made_of
-from stages.report.stage import run
-from stages.report.surfaces import map_model
-from stages.report.views import bounds_of, cut_away, oblique_view, place_labels, render, top_view
 from tests.browser import ELEMENT, WEBGL, browser, needs_browser
 from tests.unit.evaluate.handmade import (
     LABEL,

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.kitchen_plan import EvaluatedSet, KitchenEvaluation, KitchenEvaluationFile, KitchenPlan, KitchenPlanFile
-from schemas.learned_domain import (
+from scenewright.schemas.kitchen_plan import (
+    EvaluatedSet,
+    KitchenEvaluation,
+    KitchenEvaluationFile,
+    KitchenPlan,
+    KitchenPlanFile,
+)
+from scenewright.schemas.learned_domain import (
     DialogueTurn,
     HeardPhrase,
     LabelledExample,
@@ -15,6 +21,7 @@ from schemas.learned_domain import (
     SeenObject,
     SeenState,
 )
+
 from tests.unit.report.test_report import HOSTILE, parse, report
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 CAMERA = Camera(width=160, height=120, fx=140.0, fy=140.0, cx=79.5, cy=59.5)
 

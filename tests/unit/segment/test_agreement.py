@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.engine.model_cache import with_usual_models
+from scenewright.stages.segment import registry
+from scenewright.stages.segment.backends.detector.agreement import SURE, Thing, witnessed
+from scenewright.stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
+from scenewright.stages.segment.parameters import STAGE, SegmentParameters
 
-from schemas.errors import BadInput, MissingDependency
-from schemas.vocabulary import load_vocabulary
-from stages.engine.model_cache import with_usual_models
-from stages.segment import registry
-from stages.segment.backends.detector.agreement import SURE, Thing, witnessed
-from stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
-from stages.segment.parameters import STAGE, SegmentParameters
 from tests import real_data
 
 VOCABULARY = load_vocabulary()

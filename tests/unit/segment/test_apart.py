@@ -10,15 +10,15 @@ import time
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.errors import BadInput, MachineFailure
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.segment import apart
+from scenewright.stages.segment.apart import LEAST_FRAMES_EACH, MOST_WORKERS, worker_count
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.stage import run
 
-from schemas.errors import BadInput, MachineFailure
-from stages.engine.digests import content_digest, record_files
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.segment import apart
-from stages.segment.apart import LEAST_FRAMES_EACH, MOST_WORKERS, worker_count
-from stages.segment.parameters import SegmentParameters
-from stages.segment.stage import run
 from tests.unit.export.sequences import write_sequence
 
 
@@ -57,7 +57,7 @@ def test_same_bytes(options: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     used = []
     original = apart.segmented_apart
     monkeypatch.setattr(
-        "stages.segment.stage.segmented_apart", lambda *given: used.append(given[2]) or original(*given)
+        "scenewright.stages.segment.stage.segmented_apart", lambda *given: used.append(given[2]) or original(*given)
     )
     assert segmented(sequence, tmp_path / "apart", **options) == here and used == [2]
     assert multiprocessing.active_children() == []

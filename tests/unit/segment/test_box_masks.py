@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.class_extents import extent_of, is_plausible
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.segment.backends.detector.agreement import Thing
+from scenewright.stages.segment.backends.detector.backend import merge_duplicates, paint
+from scenewright.stages.segment.backends.detector.box_masks import FrameGeometry, box_mask, frame_geometry
+from scenewright.stages.segment.backends.detector.room import (
+    find_floor,
+    find_room,
+    find_walls,
+    room_masks,
+    sample_surface,
+)
+from scenewright.stages.segment.geometric import segment_depth
 
-from schemas.scene_parts import Camera
-from schemas.vocabulary import load_vocabulary
-from stages.kit.class_extents import extent_of, is_plausible
-from stages.kit.geometry.transforms import look_at
-from stages.segment.backends.detector.agreement import Thing
-from stages.segment.backends.detector.backend import merge_duplicates, paint
-from stages.segment.backends.detector.box_masks import FrameGeometry, box_mask, frame_geometry
-from stages.segment.backends.detector.room import find_floor, find_room, find_walls, room_masks, sample_surface
-from stages.segment.geometric import segment_depth
 from tests.unit.segment.scenes import combine
 
 VOCABULARY = load_vocabulary()

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.segment.backends.ground_truth.corruption import (
+from scenewright.stages.segment.backends.ground_truth.corruption import (
     CorruptionRates,
     corrupt,
     displace_boundaries,
     rates_of_level,
 )
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 CLASSES = {True: (4, 5, 17), False: (1, 2)}
 ROWS, COLUMNS, SIZE = 6, 8, 20

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-
-from stages.segment import fusion_ours, fusion_thesis
-from stages.segment.claims import claim_unlabelled
-from stages.segment.clustering import clouds_touch, largest_cluster
-from stages.segment.fusion import (
+from scenewright.stages.segment import fusion_ours, fusion_thesis
+from scenewright.stages.segment.claims import claim_unlabelled
+from scenewright.stages.segment.clustering import clouds_touch, largest_cluster
+from scenewright.stages.segment.fusion import (
     FusionRule,
     FusionSettings,
     far_from_instance,
@@ -21,9 +20,9 @@ from stages.segment.fusion import (
     overlap_table,
     split_contained,
 )
-from stages.segment.fusion_ours import has_core, reach_of
-from stages.segment.overlaps import pixels_of_labels
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.fusion_ours import has_core, reach_of
+from scenewright.stages.segment.overlaps import pixels_of_labels
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 HEIGHT, WIDTH = 480, 640
 SETTINGS = FusionSettings()

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.segment.geometric import (
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.segment.geometric import (
     GeometricSettings,
     depth_discontinuity,
     label_regions,
@@ -15,7 +14,8 @@ from stages.segment.geometric import (
     relabel,
     segment_depth,
 )
-from stages.segment.normals import surface_normals
+from scenewright.stages.segment.normals import surface_normals
+
 from tests.unit.segment.scenes import CAMERA, best_overlap, box_depth, combine, plane_depth, rays, sphere_depth
 
 SMALL = GeometricSettings(normal_window=7, normal_step=1, minimum_pixels=600)

@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.engine.hub_cache import is_hub_id
+from scenewright.stages.engine.model_cache import resolve_weights
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.formats.transformers_folder import short_name
+from scenewright.stages.kit.labels import LabelSet, parse_words
+from scenewright.stages.segment.backends.huggingface import panoptic
+from scenewright.stages.segment.backends.huggingface.backend import HuggingFaceSettings, make_backend
+from scenewright.stages.segment.backends.huggingface.open_vocabulary import make_prompts, word_scores
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.parameters import SegmentParameters
 
-from schemas.errors import BadInput, MissingDependency, UsageError
-from schemas.vocabulary import load_vocabulary
-from stages.engine.hub_cache import is_hub_id
-from stages.engine.model_cache import resolve_weights
-from stages.kit.formats.frames import Frame
-from stages.kit.formats.transformers_folder import short_name
-from stages.kit.labels import LabelSet, parse_words
-from stages.segment.backends.huggingface import panoptic
-from stages.segment.backends.huggingface.backend import HuggingFaceSettings, make_backend
-from stages.segment.backends.huggingface.open_vocabulary import make_prompts, word_scores
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.parameters import SegmentParameters
 from tests.unit.segment import tiny_models
 
 pytest.importorskip("transformers")

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput
-from schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
-from stages.kit.labels import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
+from scenewright.stages.kit.labels import (
     LABEL_FILES,
     LABELS_FOLDER,
     Label,
@@ -20,8 +19,8 @@ from stages.kit.labels import (
     parse_words,
     read_label_file,
 )
-from stages.segment.coco import COCO_NAMES
-from stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
+from scenewright.stages.segment.coco import COCO_NAMES
+from scenewright.stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
 
 VOCABULARY = load_vocabulary()
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from stages.kit.rendering.segmenter_errors import Luck, view_region
-from stages.segment.backends.ground_truth.lasting import Alike, LastingErrors, LastingRates, View
-from stages.segment.backends.ground_truth.lasting_rates import RATES
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.kit.rendering.segmenter_errors import Luck, view_region
+from scenewright.stages.segment.backends.ground_truth.lasting import Alike, LastingErrors, LastingRates, View
+from scenewright.stages.segment.backends.ground_truth.lasting_rates import RATES
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 CLASSES = {"cup": 1, "chair": 2, "book": 3}
 WALL = 9

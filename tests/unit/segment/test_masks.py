@@ -17,27 +17,27 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.engine.runner import run_stage
+from scenewright.stages.ingest.parameters import STAGE as INGEST
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.masks import encode_panoptic_png
+from scenewright.stages.kit.formats.run_lengths import decode_rle, encode_rle
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.services.segmentation_protocol import PROTOCOL
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.segment.backends.masks.formats import npz_stacks
+from scenewright.stages.segment.backends.masks.given import GivenFrame, GivenMask, Picture, ReadSettings
+from scenewright.stages.segment.backends.masks.matching import match_pictures
+from scenewright.stages.segment.backends.masks.overlapping import flatten
+from scenewright.stages.segment.backends.service import reply_cache
+from scenewright.stages.segment.geometric import pixels_at
+from scenewright.stages.segment.parameters import SegmentParameters, check
+from scenewright.stages.segment.stage import run
 
-from schemas.errors import BadInput, UsageError
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.vocabulary import load_vocabulary
-from stages.engine.runner import run_stage
-from stages.ingest.parameters import STAGE as INGEST
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.masks import encode_panoptic_png
-from stages.kit.formats.run_lengths import decode_rle, encode_rle
-from stages.kit.progress import SilentProgress
-from stages.kit.services.segmentation_protocol import PROTOCOL
-from stages.kit.stage import Context
-from stages.segment.backends.masks.formats import npz_stacks
-from stages.segment.backends.masks.given import GivenFrame, GivenMask, Picture, ReadSettings
-from stages.segment.backends.masks.matching import match_pictures
-from stages.segment.backends.masks.overlapping import flatten
-from stages.segment.backends.service import reply_cache
-from stages.segment.geometric import pixels_at
-from stages.segment.parameters import SegmentParameters, check
-from stages.segment.stage import run
 from tests.unit.segment.test_service import FAST, FakeServer, serving
 from tests.unit.segment.test_stage import NAMES, Written, payload, write_sequence
 

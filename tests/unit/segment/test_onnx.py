@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput, MissingDependency
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.segment.backends.onnx.decoding import _pasted
-from stages.segment.backends.onnx.network import fit
-from stages.segment.backends.onnx.sidecar import Sidecar, find_layout, read_sidecar
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.parameters import SegmentParameters
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.segment.backends.onnx.decoding import _pasted
+from scenewright.stages.segment.backends.onnx.network import fit
+from scenewright.stages.segment.backends.onnx.sidecar import Sidecar, find_layout, read_sidecar
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.parameters import SegmentParameters
 
 onnx = pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")

@@ -13,16 +13,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenewright.schemas.base import LARGEST_INT32
+from scenewright.schemas.errors import BadInput, MachineFailure, UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.services import receiving
+from scenewright.stages.kit.services.connection import Connection, GivenUp
+from scenewright.stages.kit.services.receiving import BoundedServer
+from scenewright.stages.kit.services.segmentation_protocol import (
+    LARGEST_PART,
+    SegmentRequest,
+    encode_request,
+    split_multipart,
+)
+from scenewright.stages.segment.backends.service import server
 
-from schemas.base import LARGEST_INT32
-from schemas.errors import BadInput, MachineFailure, UsageError
-from schemas.scene_parts import Camera
-from stages.kit.formats.frames import Frame
-from stages.kit.services import receiving
-from stages.kit.services.connection import Connection, GivenUp
-from stages.kit.services.receiving import BoundedServer
-from stages.kit.services.segmentation_protocol import LARGEST_PART, SegmentRequest, encode_request, split_multipart
-from stages.segment.backends.service import server
 from tests.unit.segment.test_service import reference_server, serving
 
 OK = b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n"
@@ -232,7 +237,7 @@ def test_names_that_are_no_hosts(host: str) -> None:
 def test_who_listens_to_the_network_says_so(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from cli import segmentation_server, serve_command
+    from scenewright.cli import segmentation_server, serve_command
 
     monkeypatch.setattr(BoundedServer, "serve_forever", lambda self, poll_interval: None)
     for host, open_to_all in (("127.0.0.1", False), ("localhost", False), ("0.0.0.0", True), ("", True)):

@@ -18,18 +18,17 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from cli.segmentation_server import open_server
-from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
-from schemas.scene_parts import Camera
-from schemas.segments import Segments
-from schemas.vocabulary import load_vocabulary
-from stages.engine.keys import library_versions
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.formats.masks import encode_panoptic_png
-from stages.kit.progress import SilentProgress
-from stages.kit.services.connection import Connection
-from stages.kit.services.segmentation_protocol import (
+from scenewright.cli.segmentation_server import open_server
+from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.engine.keys import library_versions
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.masks import encode_panoptic_png
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.services.connection import Connection
+from scenewright.stages.kit.services.segmentation_protocol import (
     PROTOCOL,
     Category,
     SegmentRequest,
@@ -39,14 +38,15 @@ from stages.kit.services.segmentation_protocol import (
     parse_request,
     split_multipart,
 )
-from stages.kit.stage import Context
-from stages.segment.backends.service import reply_cache
-from stages.segment.backends.service.server import SegmentationServer
-from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.registry import all_backends, check_backend
-from stages.segment.settings import geometric_settings
-from stages.segment.stage import run
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.segment.backends.service import reply_cache
+from scenewright.stages.segment.backends.service.server import SegmentationServer
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.parameters import STAGE, SegmentParameters
+from scenewright.stages.segment.registry import all_backends, check_backend
+from scenewright.stages.segment.settings import geometric_settings
+from scenewright.stages.segment.stage import run
+
 from tests.unit.segment.test_stage import Written, payload, write_sequence
 
 CATEGORIES = {3: Category(id=3, name="chair"), 7: Category(id=7, name="wall-brick", isthing=0)}

@@ -7,22 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.segments import FrameSegment, FrameSegments, Segments
+from scenewright.schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
+from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.stages.ingest.color_registration import color_in_depth_camera
+from scenewright.stages.ingest.layouts.seven_scenes.reader import COLOR_CAMERA, COLOR_FROM_DEPTH
+from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
+from scenewright.stages.kit.formats.masks import PanopticReader
+from scenewright.stages.kit.geometry.transforms import look_at, transform_from_quaternion
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.segment.parameters import STAGE, SegmentParameters
+from scenewright.stages.segment.stage import recognised_share, run
 
-from schemas.base import as_transform
-from schemas.errors import BadInput, MissingDependency, UsageError
-from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment, FrameSegments, Segments
-from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
-from schemas.vocabulary import UNNAMED, load_vocabulary
-from stages.ingest.color_registration import color_in_depth_camera
-from stages.ingest.layouts.seven_scenes.reader import COLOR_CAMERA, COLOR_FROM_DEPTH
-from stages.kit.formats.frames import FrameReader, FrameWriter
-from stages.kit.formats.masks import PanopticReader
-from stages.kit.geometry.transforms import look_at, transform_from_quaternion
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.stage import recognised_share, run
 from tests.real_data import real_data
 from tests.unit.segment.test_box_masks import SCENE, WIDE, world_depth
 

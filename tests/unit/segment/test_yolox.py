@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.stages.segment.backends.detector.yolox import Detector, decode, letterbox, tile_windows
+from scenewright.stages.segment.coco import COCO_NAMES
+from scenewright.stages.segment.suppression import overlap_of_boxes, suppress
 
-from schemas.errors import BadInput, MissingDependency
-from stages.segment.backends.detector.yolox import Detector, decode, letterbox, tile_windows
-from stages.segment.coco import COCO_NAMES
-from stages.segment.suppression import overlap_of_boxes, suppress
 from tests.real_data import real_data
 
 

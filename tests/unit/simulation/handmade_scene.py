@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-
-from schemas.base import as_transform, as_vector
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.interactive_scene import InteractiveSceneFile, SceneBody
-from schemas.scene_parts import Box, Joint, Relation, SurfacePlane
-from stages.kit.geometry.transforms import quaternion_of, transform_from_yaw
+from scenewright.schemas.base import as_transform, as_vector
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from scenewright.schemas.scene_parts import Box, Joint, Relation, SurfacePlane
+from scenewright.stages.kit.geometry.transforms import quaternion_of, transform_from_yaw
 
 Boxes = list[tuple[tuple[float, float, float], tuple[float, float, float]]]
 """(centre, size) of boxes in a link frame."""

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.simulation.robot import Configuration, Robot
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.world import load_scene
 
-from schemas.errors import UsageError
-from stages.kit.simulation.robot import Configuration, Robot
-from stages.kit.simulation.robot_description import load_robot
-from stages.kit.simulation.world import load_scene
 from tests.unit.simulation.handmade_scene import bottle, floor, write_scene
 
 PANDA = load_robot("panda")

@@ -6,13 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.kinematics import (
+    arm_chain,
+    forward,
+    inverse_kinematics,
+    random_starts,
+    reach,
+    shoulder_height,
+)
+from scenewright.stages.kit.simulation.robot import Configuration, Robot, base_pose
+from scenewright.stages.kit.simulation.robot_description import FOLDER, RobotDescription, description_files, load_robot
+from scenewright.stages.kit.simulation.world import load_scene
 
-from schemas.errors import BadInput
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics, random_starts, reach, shoulder_height
-from stages.kit.simulation.robot import Configuration, Robot, base_pose
-from stages.kit.simulation.robot_description import FOLDER, RobotDescription, description_files, load_robot
-from stages.kit.simulation.world import load_scene
 from tests.unit.simulation.handmade_scene import floor, write_scene
 
 NAMES = ("panda", "ur5", "ur5_bench", "kinova_gen3")

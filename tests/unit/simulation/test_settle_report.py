@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.cli.main import run
+from scenewright.schemas.contact_graph import SCENE_NODE
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.urdf.settle_report import SettleReport, settle_report
 
-from cli.main import run
-from schemas.contact_graph import SCENE_NODE
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.urdf.settle_report import SettleReport, settle_report
 from tests.unit.simulation.handmade_scene import HandmadeBody, bottle, floor, fridge, kitchen, table, write_scene
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 
-from schemas.errors import BadInput
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from tests.unit.simulation.handmade_scene import bottle, floor, fridge, kitchen, write_scene
 
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.splat.adjustment import Adjustment
+from scenewright.stages.splat.building import arrivals, placed_poses, train
+from scenewright.stages.splat.methods import ours, thesis
+from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.views import PosedView
 
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.splat.adjustment import Adjustment
-from stages.splat.building import arrivals, placed_poses, train
-from stages.splat.methods import ours, thesis
-from stages.splat.training import Trainer
-from stages.splat.views import PosedView
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 
 TRUE = round_walk(25)

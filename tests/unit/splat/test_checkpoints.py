@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.engine.runner import run_stage
+from scenewright.stages.splat import build_stage
+from scenewright.stages.splat.checkpoints import FILE, write_checkpoint
+from scenewright.stages.splat.parameters import BUILD, BuildParameters
+from scenewright.stages.splat.training import Trainer
 
-from schemas.sequence import Sequence
-from stages.engine.runner import run_stage
-from stages.splat import build_stage
-from stages.splat.checkpoints import FILE, write_checkpoint
-from stages.splat.parameters import BUILD, BuildParameters
-from stages.splat.training import Trainer
 from tests.unit.poses.textured_room import round_walk, write_sequence
 from tests.unit.viewing.artifacts import seal
 

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.trajectories import read_tum, write_tum
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.splat import build_stage, render_stage
+from scenewright.stages.splat.parameters import BuildParameters, RenderParameters
+from scenewright.stages.splat.ply import COLUMNS, read_gaussians, write_gaussians
+from scenewright.stages.splat.triangulation import with_points
+from scenewright.stages.splat.turntable import opened, turn
+from scenewright.stages.splat.views import posed_frames, read_view
 
-from schemas.errors import BadInput
-from schemas.sequence import Sequence
-from schemas.splat import Splat
-from schemas.trajectory import Trajectory
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.trajectories import read_tum, write_tum
-from stages.kit.progress import SilentProgress
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.stage import Context
-from stages.splat import build_stage, render_stage
-from stages.splat.parameters import BuildParameters, RenderParameters
-from stages.splat.ply import COLUMNS, read_gaussians, write_gaussians
-from stages.splat.triangulation import with_points
-from stages.splat.turntable import opened, turn
-from stages.splat.views import posed_frames, read_view
 from tests.unit.poses.textured_room import round_walk, write_sequence
 from tests.unit.report.test_report import parse, report
 

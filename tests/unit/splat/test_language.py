@@ -8,36 +8,36 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.schemas.language_map import LanguageMap
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat
+from scenewright.schemas.vocabulary import UNNAMED
+from scenewright.stages.kit.geometry.boxes import points_in_box
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.open_words.calibration import NAMED_SPLAT, UNFITTED, Calibration
+from scenewright.stages.kit.open_words.finding import Finder, class_vectors, source_of
+from scenewright.stages.kit.open_words.relevancy import margins, query_rows
+from scenewright.stages.kit.open_words.vectors import read_vectors
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
+from scenewright.stages.kit.rendering.splatting.rasterizer import View
+from scenewright.stages.splat import evaluate_stage, language_stage, query_stage
+from scenewright.stages.splat.asked_figures import calibration_error, recall_at_rejection
+from scenewright.stages.splat.language.entities import NONE, entity_of, nearest_entities
+from scenewright.stages.splat.language.field import LanguageField
+from scenewright.stages.splat.language.learning import learn, lesson_of
+from scenewright.stages.splat.language.looks import Sight, looks
+from scenewright.stages.splat.language.pieces import pieces
+from scenewright.stages.splat.language.pyramid import LEVELS, pyramid
+from scenewright.stages.splat.parameters import EvaluateParameters, LanguageParameters, QueryParameters
+from scenewright.stages.splat.ply import write_gaussians
 
 from benchmarks.perfect_maps import write_map
-from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
-from schemas.errors import BadInput, UsageError
-from schemas.evaluation import Evaluation
-from schemas.language_map import LanguageMap
-from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence
-from schemas.splat import Splat
-from schemas.vocabulary import UNNAMED
-from stages.kit.geometry.boxes import points_in_box
-from stages.kit.geometry.transforms import transform_from
-from stages.kit.open_words.calibration import NAMED_SPLAT, UNFITTED, Calibration
-from stages.kit.open_words.finding import Finder, class_vectors, source_of
-from stages.kit.open_words.relevancy import margins, query_rows
-from stages.kit.open_words.vectors import read_vectors
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.gaussians import Gaussians
-from stages.kit.rendering.splatting.rasterizer import View
-from stages.splat import evaluate_stage, language_stage, query_stage
-from stages.splat.asked_figures import calibration_error, recall_at_rejection
-from stages.splat.language.entities import NONE, entity_of, nearest_entities
-from stages.splat.language.field import LanguageField
-from stages.splat.language.learning import learn, lesson_of
-from stages.splat.language.looks import Sight, looks
-from stages.splat.language.pieces import pieces
-from stages.splat.language.pyramid import LEVELS, pyramid
-from stages.splat.parameters import EvaluateParameters, LanguageParameters, QueryParameters
-from stages.splat.ply import write_gaussians
 from tests.unit.open_words.stand_ins import COLORS, ColorEncoder
 from tests.unit.poses.textured_room import round_walk, write_sequence
 from tests.unit.splat.test_commands import build, context

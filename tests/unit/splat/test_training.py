@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture
+from scenewright.stages.splat.building import arrivals, carried_poses, train
+from scenewright.stages.splat.density import Density, grown, useless
+from scenewright.stages.splat.losses import LossWeights, loss_of, signal_to_noise, structural_similarity
+from scenewright.stages.splat.methods import ours, thesis
+from scenewright.stages.splat.seeding import filled, seen_through
+from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.views import PosedView
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import BadInput
-from stages.kit.geometry.cameras import scaled
-from stages.kit.geometry.transforms import inverse
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.rasterizer import Picture
-from stages.splat.building import arrivals, carried_poses, train
-from stages.splat.density import Density, grown, useless
-from stages.splat.losses import LossWeights, loss_of, signal_to_noise, structural_similarity
-from stages.splat.methods import ours, thesis
-from stages.splat.seeding import filled, seen_through
-from stages.splat.training import Trainer
-from stages.splat.views import PosedView
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 
 WALK = round_walk(25)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.needle.observation import NeedleObservation
+from scenewright.stages.suture.rig import TWO_CAMERAS, NeedlePose, StereoRig
+from scenewright.stages.suture.world.tubes import needle_radii
 from scipy.spatial.transform import Rotation
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.needle.observation import NeedleObservation
-from stages.suture.rig import TWO_CAMERAS, NeedlePose, StereoRig
-from stages.suture.world.tubes import needle_radii
 
 
 def pose_at(tilt_degrees: float = 50.0, roll_degrees: float = 70.0, depth: float = 0.35) -> NeedlePose:

@@ -8,20 +8,20 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenewright.cli.main import run
+from scenewright.schemas.evaluation import MetricsFile
+from scenewright.schemas.sequence import SequenceFile
+from scenewright.schemas.suture_needle import SutureNeedleFile
+from scenewright.schemas.suture_scene import SutureScene, SutureSceneFile
+from scenewright.schemas.suture_trial import SutureTrialFile
+from scenewright.stages.engine.loading import load, payload
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.report.sections.suture.view import tables_of
+from scenewright.stages.suture.evaluation.thread_figures import thread_error
+from scenewright.stages.suture.motion_reports import motions_to_last
+from scenewright.stages.suture.pairs import StereoPairs
+from scenewright.stages.suture.trials.recording import KEPT_OF_A_MOTION
 
-from cli.main import run
-from schemas.evaluation import MetricsFile
-from schemas.sequence import SequenceFile
-from schemas.suture_needle import SutureNeedleFile
-from schemas.suture_scene import SutureScene, SutureSceneFile
-from schemas.suture_trial import SutureTrialFile
-from stages.engine.loading import load, payload
-from stages.kit.formats.frames import FrameWriter
-from stages.report.sections.suture.view import tables_of
-from stages.suture.evaluation.thread_figures import thread_error
-from stages.suture.motion_reports import motions_to_last
-from stages.suture.pairs import StereoPairs
-from stages.suture.trials.recording import KEPT_OF_A_MOTION
 from tests.unit.viewing.artifacts import seal
 from tests.unit.viewing.suture_artifacts import CAMERA, make_scene
 

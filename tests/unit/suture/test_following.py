@@ -14,17 +14,17 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.suture import following
+from scenewright.stages.suture.following import Follower, growing_pairs, name_of, named_pairs, read_rig
+from scenewright.stages.suture.masks import EyeMasks, masks_in
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.estimators import ESTIMATORS
+from scenewright.stages.suture.needle.observation import NeedleEstimate
+from scenewright.stages.suture.needle.radius import as_if_usual, in_metres
+from scenewright.stages.suture.pairs import Pair
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose
 
-from schemas.errors import BadInput
-from stages.suture import following
-from stages.suture.following import Follower, growing_pairs, name_of, named_pairs, read_rig
-from stages.suture.masks import EyeMasks, masks_in
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.estimators import ESTIMATORS
-from stages.suture.needle.observation import NeedleEstimate
-from stages.suture.needle.radius import as_if_usual, in_metres
-from stages.suture.pairs import Pair
-from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose
 from tests.unit.suture.needle_cases import drawn_mask, observed, pose_at
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -211,7 +211,16 @@ def test_a_rig_may_name_the_needle(tmp_path: Path) -> None:
 def test_the_command_writes_lines(masks: Path, tmp_path: Path) -> None:
     arrive(tmp_path, "000000")
     (tmp_path / "rig.json").write_text(json.dumps(RIG))
-    command = [sys.executable, "-m", "cli", "suture", "follow", str(tmp_path), "--rig", str(tmp_path / "rig.json")]
+    command = [
+        sys.executable,
+        "-m",
+        "scenewright",
+        "suture",
+        "follow",
+        str(tmp_path),
+        "--rig",
+        str(tmp_path / "rig.json"),
+    ]
     done = subprocess.run(
         [*command, "--masks", str(masks), "--idle", "0"], cwd=REPOSITORY, capture_output=True, text=True, check=False
     )

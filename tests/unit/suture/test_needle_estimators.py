@@ -7,18 +7,18 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.evidence import _crossings
+from scenewright.stages.suture.needle.filter import difference, fuse
+from scenewright.stages.suture.needle.filter import moved as moved_pose
+from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation, violet
+from scenewright.stages.suture.needle.starts import _runs
+from scenewright.stages.suture.needle.thesis import farthest_pair, ransac_circle, ransac_plane, thesis_estimate
+from scenewright.stages.suture.rig import TWO_CAMERAS, NeedlePose
 from scipy.spatial.transform import Rotation
 
-from schemas.errors import BadInput
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.evidence import _crossings
-from stages.suture.needle.filter import difference, fuse
-from stages.suture.needle.filter import moved as moved_pose
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation, violet
-from stages.suture.needle.starts import _runs
-from stages.suture.needle.thesis import farthest_pair, ransac_circle, ransac_plane, thesis_estimate
-from stages.suture.rig import TWO_CAMERAS, NeedlePose
 from tests.unit.suture.needle_cases import drawn_mask, observed, pose_at
 
 

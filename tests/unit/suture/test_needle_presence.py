@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.stages.suture.masks import spoiled_masks
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.observation import NeedleObservation
+from scenewright.stages.suture.needle.presence import FEATURES, presence_probability
+from scenewright.stages.suture.rig import TWO_CAMERAS, NeedlePose
+from scenewright.stages.suture.world.clutter import cluttered, false_masks
+from scenewright.stages.suture.world.render import render
+from scenewright.stages.suture.world.sampling import seen_scene
+from scenewright.stages.suture.world.tubes import NEEDLE
 
-from stages.suture.masks import spoiled_masks
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.observation import NeedleObservation
-from stages.suture.needle.presence import FEATURES, presence_probability
-from stages.suture.rig import TWO_CAMERAS, NeedlePose
-from stages.suture.world.clutter import cluttered, false_masks
-from stages.suture.world.render import render
-from stages.suture.world.sampling import seen_scene
-from stages.suture.world.tubes import NEEDLE
 from tests.unit.suture.needle_cases import observed, pose_at
 
 

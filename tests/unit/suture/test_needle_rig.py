@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, NeedlePose
 
-from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, NeedlePose
 from tests.unit.suture.needle_cases import pose_at
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.suture.rig import TWO_CAMERAS
-from stages.suture.world.corruption import noisy_disparity, spoiled_mask
-from stages.suture.world.render import ARC_ANGLES, render
-from stages.suture.world.scene import make_scene, moved_scene, random_motions
-from stages.suture.world.thread import THREAD_RADIUS, loose_thread
-from stages.suture.world.tubes import NEEDLE, WIRE_RADIUS, needle_radii
+from scenewright.stages.suture.rig import TWO_CAMERAS
+from scenewright.stages.suture.world.corruption import noisy_disparity, spoiled_mask
+from scenewright.stages.suture.world.render import ARC_ANGLES, render
+from scenewright.stages.suture.world.scene import make_scene, moved_scene, random_motions
+from scenewright.stages.suture.world.thread import THREAD_RADIUS, loose_thread
+from scenewright.stages.suture.world.tubes import NEEDLE, WIRE_RADIUS, needle_radii
 
 
 @pytest.fixture(scope="module")

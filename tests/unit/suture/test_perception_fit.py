@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.stages.suture.evaluation.judgement import Estimate
+from scenewright.stages.suture.trials.perception import FOLDER, perception_model
+from scenewright.stages.suture.trials.sight import Looked
 
 from benchmarks.stitch.perception import as_toml, by_place, by_place_looked, fitted, persistence
-from stages.suture.evaluation.judgement import Estimate
-from stages.suture.trials.perception import FOLDER, perception_model
-from stages.suture.trials.sight import Looked
 
 
 def estimate(case: str, seed: int, holder: str = "air", answered: bool = True, wrong: str = "") -> Estimate:

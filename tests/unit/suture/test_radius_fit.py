@@ -7,13 +7,13 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scenewright.stages.suture.masks import spoiled_masks
+from scenewright.stages.suture.needle.estimate import estimate
+from scenewright.stages.suture.needle.radius import as_if_usual, in_metres
+from scenewright.stages.suture.needle.radius_fit import Radius, estimate_without_radius, fitted_radius, together
+from scenewright.stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from scenewright.stages.suture.world.sampling import seen_scene
 
-from stages.suture.masks import spoiled_masks
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.radius import as_if_usual, in_metres
-from stages.suture.needle.radius_fit import Radius, estimate_without_radius, fitted_radius, together
-from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
-from stages.suture.world.sampling import seen_scene
 from tests.unit.suture.needle_cases import observed, pose_at
 
 

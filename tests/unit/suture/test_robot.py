@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.suture.robot import psm
+from scenewright.stages.suture.robot.inverse import branches, follow, reachable, solutions
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-
-from stages.suture.robot import psm
-from stages.suture.robot.inverse import branches, follow, reachable, solutions
 
 RANDOM = np.random.default_rng(3)
 

@@ -10,18 +10,18 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.stages.suture.segmentation.checkpoint import BUNDLED, load_network, save_network
+from scenewright.stages.suture.segmentation.infer import Segmenter, without_specks
+from scenewright.stages.suture.segmentation.model import SutureNetwork
+from scenewright.stages.suture.world.render import render
+from scenewright.stages.suture.world.sampling import seen_scene
+from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
 from benchmarks.stitch import segmentation_samples
 from benchmarks.stitch.segmentation_samples import CROP, Views, _cluttered, masks_of, sample
 from benchmarks.stitch.segmentation_train import Plan, Run, loss_of
-from schemas.errors import BadInput
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
-from stages.suture.segmentation.checkpoint import BUNDLED, load_network, save_network
-from stages.suture.segmentation.infer import Segmenter, without_specks
-from stages.suture.segmentation.model import SutureNetwork
-from stages.suture.world.render import render
-from stages.suture.world.sampling import seen_scene
-from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
 SMALL = (4, 4, 8, 8, 8)
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.suture.thread.curve import fitted
+from scenewright.stages.suture.thread.reconstruct import reconstruct_thread
 
-from schemas.errors import BadInput
-from stages.suture.thread.curve import fitted
-from stages.suture.thread.reconstruct import reconstruct_thread
 from tests.unit.suture.thread_cases import RIG, distances, helix, length_of, line, masks_of
 
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.suture.thread.path import followed
-from stages.suture.thread.skeleton import stretches, thinned
-from stages.suture.thread.strands import strands
+from scenewright.stages.suture.thread.path import followed
+from scenewright.stages.suture.thread.skeleton import stretches, thinned
+from scenewright.stages.suture.thread.strands import strands
 
 
 def drawn(*lines: list[tuple[int, int]], size: tuple[int, int] = (120, 160), thickness: int = 3) -> np.ndarray:

@@ -7,24 +7,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput
-from schemas.suture_trial import SutureRun
-from stages.suture.evaluation.trial_figures import metrics, table
-from stages.suture.motion import primitives
-from stages.suture.motion.constants import OpenConstants, cinch_length
-from stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned, upright
-from stages.suture.rig import NEEDLE_RADIUS
-from stages.suture.robot.arms import ARMS
-from stages.suture.trials.belief import START_ANGLE, as_planned, believed
-from stages.suture.trials.bench import CORNER, HOME, Bench, loaded
-from stages.suture.trials.drawing import draw_strip, whole_suture
-from stages.suture.trials.gripping import close
-from stages.suture.trials.machine import Outcome, run_trial
-from stages.suture.trials.ours.extraction import grasp_point, left_to_turn
-from stages.suture.trials.ours.handover import middle, turned_about
-from stages.suture.trials.ours.pose_correction import fused, in_driver
-from stages.suture.trials.perception import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.suture_trial import SutureRun
+from scenewright.stages.suture.evaluation.trial_figures import metrics, table
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.constants import OpenConstants, cinch_length
+from scenewright.stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned, upright
+from scenewright.stages.suture.rig import NEEDLE_RADIUS
+from scenewright.stages.suture.robot.arms import ARMS
+from scenewright.stages.suture.trials.belief import START_ANGLE, as_planned, believed
+from scenewright.stages.suture.trials.bench import CORNER, HOME, Bench, loaded
+from scenewright.stages.suture.trials.drawing import draw_strip, whole_suture
+from scenewright.stages.suture.trials.gripping import close
+from scenewright.stages.suture.trials.machine import Outcome, run_trial
+from scenewright.stages.suture.trials.ours.extraction import grasp_point, left_to_turn
+from scenewright.stages.suture.trials.ours.handover import middle, turned_about
+from scenewright.stages.suture.trials.ours.pose_correction import fused, in_driver
+from scenewright.stages.suture.trials.perception import (
     FOLDER,
     Errors,
     Eyes,
@@ -35,14 +34,14 @@ from stages.suture.trials.perception import (
     nearer_end,
     perception_model,
 )
-from stages.suture.trials.places import GRASPING
-from stages.suture.trials.policies import POLICIES, THESIS
-from stages.suture.trials.recording import Recorder
-from stages.suture.trials.rope import PARTICLES, drape, line, winding
-from stages.suture.trials.settings import World
-from stages.suture.trials.thesis.handover import NormalUnchanged
-from stages.suture.trials.thread import Thread, draw, pull_on, pull_through
-from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, entry, exit_, passage
+from scenewright.stages.suture.trials.places import GRASPING
+from scenewright.stages.suture.trials.policies import POLICIES, THESIS
+from scenewright.stages.suture.trials.recording import Recorder
+from scenewright.stages.suture.trials.rope import PARTICLES, drape, line, winding
+from scenewright.stages.suture.trials.settings import World
+from scenewright.stages.suture.trials.thesis.handover import NormalUnchanged
+from scenewright.stages.suture.trials.thread import Thread, draw, pull_on, pull_through
+from scenewright.stages.suture.trials.wound import CHORD, HOLE_HEIGHT, entry, exit_, passage
 
 STILL_WORLD = World(
     thread_shortest=0.30,

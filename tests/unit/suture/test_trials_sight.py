@@ -5,20 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scenewright.cli.main import run
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.suture.motion.needle import point_at
+from scenewright.stages.suture.robot.arms import REMOTE_CENTRES
+from scenewright.stages.suture.trials.bench import CORNER, Bench, loaded
+from scenewright.stages.suture.trials.machine import run_trial
+from scenewright.stages.suture.trials.perception import FOLDER, perception_model
+from scenewright.stages.suture.trials.policies import POLICIES
+from scenewright.stages.suture.trials.settings import World
+from scenewright.stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes, driver, pictured
+from scenewright.stages.suture.trials.thread import Thread
+from scenewright.stages.suture.world.scene import make_scene
 
 from benchmarks.stitch.trial_views import PLACES, Keeping, trial_scenes
-from cli.main import run
-from stages.kit.geometry.transforms import apply, inverse
-from stages.suture.motion.needle import point_at
-from stages.suture.robot.arms import REMOTE_CENTRES
-from stages.suture.trials.bench import CORNER, Bench, loaded
-from stages.suture.trials.machine import run_trial
-from stages.suture.trials.perception import FOLDER, perception_model
-from stages.suture.trials.policies import POLICIES
-from stages.suture.trials.settings import World
-from stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes, driver, pictured
-from stages.suture.trials.thread import Thread
-from stages.suture.world.scene import make_scene
 
 MODEL = perception_model(FOLDER / "perception_ours.toml")
 

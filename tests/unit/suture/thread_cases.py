@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from stages.suture.rig import StereoRig
+from scenewright.stages.suture.rig import StereoRig
 
 RIG = StereoRig(640, 480, 800.0, (319.5, 239.5), 0.060)
 

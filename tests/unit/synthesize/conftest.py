@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from schemas.cad_library import CadLibrary
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.library.parameters import LibraryParameters
-from stages.library.stage import run
-from stages.synthesize.furniture import Catalogue
-from stages.synthesize.recipes import load_recipe, recipe_names
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.library.parameters import LibraryParameters
+from scenewright.stages.library.stage import run
+from scenewright.stages.synthesize.furniture import Catalogue
+from scenewright.stages.synthesize.recipes import load_recipe, recipe_names
 
 
 @pytest.fixture(scope="session")

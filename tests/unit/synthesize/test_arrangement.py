@@ -8,16 +8,15 @@ import fcl
 import numpy as np
 import open3d as o3d
 import pytest
-
-from schemas.cad_library import CadLibrary, LibraryFile
-from schemas.errors import BadInput, UsageError
-from stages.kit.formats.cad_models import load_collision_parts, part_transforms
-from stages.kit.geometry.transforms import apply
-from stages.synthesize.arrangement import Arrangement, arrange
-from stages.synthesize.collision import CollisionWorld, box_shape, convex_shape
-from stages.synthesize.furniture import Catalogue, main_joint
-from stages.synthesize.placement import PlacedObject
-from stages.synthesize.recipes import Recipe, load_recipe, recipe_names, rescaled
+from scenewright.schemas.cad_library import CadLibrary, LibraryFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.kit.formats.cad_models import load_collision_parts, part_transforms
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.synthesize.arrangement import Arrangement, arrange
+from scenewright.stages.synthesize.collision import CollisionWorld, box_shape, convex_shape
+from scenewright.stages.synthesize.furniture import Catalogue, main_joint
+from scenewright.stages.synthesize.placement import PlacedObject
+from scenewright.stages.synthesize.recipes import Recipe, load_recipe, recipe_names, rescaled
 
 SEEDS = (0, 1, 2, 3)
 

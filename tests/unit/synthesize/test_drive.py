@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from schemas.errors import UsageError
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.arrangement import arrange, world_meshes
-from stages.synthesize.drive import HEIGHTS, Shape, plan_drive
-from stages.synthesize.free_space import FreeSpace, find_free_space
-from stages.synthesize.furniture import Catalogue
-from stages.synthesize.parameters import SynthesizeParameters, check
-from stages.synthesize.recipes import load_recipe
-from stages.synthesize.viewpoints import blocked_floor
-from stages.synthesize.walk import CLEARANCE, RATE, Walk
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.synthesize.arrangement import arrange, world_meshes
+from scenewright.stages.synthesize.drive import HEIGHTS, Shape, plan_drive
+from scenewright.stages.synthesize.free_space import FreeSpace, find_free_space
+from scenewright.stages.synthesize.furniture import Catalogue
+from scenewright.stages.synthesize.parameters import SynthesizeParameters, check
+from scenewright.stages.synthesize.recipes import load_recipe
+from scenewright.stages.synthesize.viewpoints import blocked_floor
+from scenewright.stages.synthesize.walk import CLEARANCE, RATE, Walk
 
 Place = tuple[FreeSpace, SceneRenderer]
 SPEED = 0.5

@@ -10,23 +10,22 @@ import numpy as np
 import open3d as o3d
 import pytest
 import trimesh
-
-from schemas.cad_library import CadLibrary
-from schemas.contact_graph import SCENE_NODE
-from schemas.errors import UsageError
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveSceneFile
-from stages.kit.formats.frames import FrameReader
-from stages.kit.formats.trajectories import read_tum
-from stages.kit.geometry.boxes import boxes_overlap_volume, points_in_box
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
-from stages.kit.progress import SilentProgress
-from stages.kit.rendering.depth_noise import DepthCamera
-from stages.kit.simulation.world import load_scene
-from stages.kit.stage import Context
-from stages.synthesize.parameters import SynthesizeParameters, check
-from stages.synthesize.stage import run
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.contact_graph import SCENE_NODE
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.geometry.boxes import boxes_overlap_volume, points_in_box
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.rendering.depth_noise import DepthCamera
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.synthesize.parameters import SynthesizeParameters, check
+from scenewright.stages.synthesize.stage import run
 
 
 def make(library: CadLibrary, output: Path, **options: object) -> GroundTruth:

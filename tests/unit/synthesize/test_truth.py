@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from stages.kit.geometry.boxes import box_yaw
-from stages.kit.geometry.transforms import apply, transform_from_yaw
-from stages.synthesize.truth import object_box
+from scenewright.stages.kit.geometry.boxes import box_yaw
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
+from scenewright.stages.synthesize.truth import object_box
 
 
 def screen_on_a_round_foot() -> np.ndarray:

@@ -6,18 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import project
-from stages.kit.geometry.transforms import apply, inverse, is_rigid
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
-from stages.synthesize.free_space import find_free_space
-from stages.synthesize.furniture import Catalogue
-from stages.synthesize.recipes import load_recipe
-from stages.synthesize.viewpoints import blocked_floor, choose_views
-from stages.synthesize.walk import CLEARANCE, Walk, frame_times, plan_walk
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import project
+from scenewright.stages.kit.geometry.transforms import apply, inverse, is_rigid
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.synthesize.arrangement import Arrangement, arrange, world_meshes
+from scenewright.stages.synthesize.free_space import find_free_space
+from scenewright.stages.synthesize.furniture import Catalogue
+from scenewright.stages.synthesize.recipes import load_recipe
+from scenewright.stages.synthesize.viewpoints import blocked_floor, choose_views
+from scenewright.stages.synthesize.walk import CLEARANCE, Walk, frame_times, plan_walk
 
 CAMERA = Camera(width=160, height=120, fx=131.0, fy=131.0, cx=79.5, cy=59.5)
 Place = tuple[Arrangement, SceneRenderer, Walk]

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 import trimesh
-
-from stages.tableware.world.items import Table, make_item, stand_height
-from stages.tableware.world.overhead import overhead_camera, render_overhead
+from scenewright.stages.tableware.world.items import Table, make_item, stand_height
+from scenewright.stages.tableware.world.overhead import overhead_camera, render_overhead
 
 
 @pytest.fixture(scope="package")

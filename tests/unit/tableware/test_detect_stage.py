@@ -13,22 +13,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.tableware_detections import TablewareDetection, TablewareDetections, TablewareDetectionsFile
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.tableware.detect_parameters import DETECT, DetectParameters, check_inputs
+from scenewright.stages.tableware.detect_stage import run
+from scenewright.stages.tableware.vision.detections import Detection, as_table
+from scenewright.stages.tableware.vision.detections_file import from_file
+from scenewright.stages.tableware.vision.error_model import ErrorModel, KindErrors, error_model, sampled_detections
+from scenewright.stages.tableware.vision.image_files import read_camera, read_image
+from scenewright.stages.tableware.vision.photographs import find_outlines
+from scenewright.stages.tableware.world.items import STANDARD, Table, make_item
+from scenewright.stages.tableware.world.overhead import overhead_camera
 
 from benchmarks.experiments.tidy_detect.score import Match, compare, measures, reliability
 from benchmarks.experiments.tidy_detect_real import grouped, matched, overlap, ratio
-from schemas.errors import BadInput, UsageError
-from schemas.tableware_detections import TablewareDetection, TablewareDetections, TablewareDetectionsFile
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.tableware.detect_parameters import DETECT, DetectParameters, check_inputs
-from stages.tableware.detect_stage import run
-from stages.tableware.vision.detections import Detection, as_table
-from stages.tableware.vision.detections_file import from_file
-from stages.tableware.vision.error_model import ErrorModel, KindErrors, error_model, sampled_detections
-from stages.tableware.vision.image_files import read_camera, read_image
-from stages.tableware.vision.photographs import find_outlines
-from stages.tableware.world.items import STANDARD, Table, make_item
-from stages.tableware.world.overhead import overhead_camera
 
 VIEW = overhead_camera()
 

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-
-from stages.tableware.vision.detection import detect
-from stages.tableware.vision.detections import as_table, statement
-from stages.tableware.vision.rim_finding import Rim
-from stages.tableware.vision.stack_reading import read_stacks
-from stages.tableware.world.items import STANDARD, rise
-from stages.tableware.world.overhead import overhead_camera
+from scenewright.stages.tableware.vision.detection import detect
+from scenewright.stages.tableware.vision.detections import as_table, statement
+from scenewright.stages.tableware.vision.rim_finding import Rim
+from scenewright.stages.tableware.vision.stack_reading import read_stacks
+from scenewright.stages.tableware.world.items import STANDARD, rise
+from scenewright.stages.tableware.world.overhead import overhead_camera
 
 VIEW = overhead_camera()
 

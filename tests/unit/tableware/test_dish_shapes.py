@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from scenewright.stages.tableware.world.dish_shapes import item_mesh, shell_mesh, utensil_mesh
+from scenewright.stages.tableware.world.items import DISHES, STANDARD, UTENSILS, Measures, make_item, rise
 
-from stages.tableware.world.dish_shapes import item_mesh, shell_mesh, utensil_mesh
-from stages.tableware.world.items import DISHES, STANDARD, UTENSILS, Measures, make_item, rise
 from tests.unit.tableware.volumes import shell_volume, utensil_volume
 
 

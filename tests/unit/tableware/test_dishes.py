@@ -11,25 +11,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
-
-from schemas.errors import BadInput, UsageError
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_dishes import TablewareDishes
-from schemas.tableware_scene import TablewareScene
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.tableware import detect_stage, plan_stage, scene_stage
-from stages.tableware.detect_parameters import DetectParameters
-from stages.tableware.dishes_file import file_of, read_dishes, setting_of
-from stages.tableware.parameters import DETECT, PLAN, PlanParameters, SceneParameters
-from stages.tableware.planning.policy import THESIS
-from stages.tableware.planning.rules import Rules, can_hold, can_hold_two, can_stack, lips
-from stages.tableware.vision.detection import detect
-from stages.tableware.vision.possible_stacks import lip_range
-from stages.tableware.world.items import STANDARD, Table, make_item, rise
-from stages.tableware.world.overhead import overhead_camera, render_overhead
-from stages.tableware.world.scenes import make_table
-from stages.tableware.world.setting import Gripper, Setting
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.tableware_detections import TablewareDetections
+from scenewright.schemas.tableware_dishes import TablewareDishes
+from scenewright.schemas.tableware_scene import TablewareScene
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.tableware import detect_stage, plan_stage, scene_stage
+from scenewright.stages.tableware.detect_parameters import DetectParameters
+from scenewright.stages.tableware.dishes_file import file_of, read_dishes, setting_of
+from scenewright.stages.tableware.parameters import DETECT, PLAN, PlanParameters, SceneParameters
+from scenewright.stages.tableware.planning.policy import THESIS
+from scenewright.stages.tableware.planning.rules import Rules, can_hold, can_hold_two, can_stack, lips
+from scenewright.stages.tableware.vision.detection import detect
+from scenewright.stages.tableware.vision.possible_stacks import lip_range
+from scenewright.stages.tableware.world.items import STANDARD, Table, make_item, rise
+from scenewright.stages.tableware.world.overhead import overhead_camera, render_overhead
+from scenewright.stages.tableware.world.scenes import make_table
+from scenewright.stages.tableware.world.setting import Gripper, Setting
 
 MINE = """
 [cup]

@@ -12,19 +12,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from benchmarks.tidy.thesis_fit import TABLE_7_2, expected_trips, fit, fitted_hold, trips_of
-from schemas.errors import UsageError
-from stages.tableware.actions.grasp import grasp_two, taken
-from stages.tableware.actions.pull import after_pull, pull
-from stages.tableware.actions.pull_grasp import pull_grasp
-from stages.tableware.actions.stack import after_stack, stack
-from stages.tableware.actions.stack_grasp import stack_grasp
-from stages.tableware.planning.joint import JointPolicy
-from stages.tableware.planning.optimum import Optimum, clear, seconds
-from stages.tableware.planning.policy import STANDARD_SETTING, THESIS
-from stages.tableware.planning.pulled_load import centre_height
-from stages.tableware.planning.rules import (
+from scenewright.schemas.errors import UsageError
+from scenewright.stages.tableware.actions.grasp import grasp_two, taken
+from scenewright.stages.tableware.actions.pull import after_pull, pull
+from scenewright.stages.tableware.actions.pull_grasp import pull_grasp
+from scenewright.stages.tableware.actions.stack import after_stack, stack
+from scenewright.stages.tableware.actions.stack_grasp import stack_grasp
+from scenewright.stages.tableware.planning.joint import JointPolicy
+from scenewright.stages.tableware.planning.optimum import Optimum, clear, seconds
+from scenewright.stages.tableware.planning.policy import STANDARD_SETTING, THESIS
+from scenewright.stages.tableware.planning.pulled_load import centre_height
+from scenewright.stages.tableware.planning.rules import (
     Rules,
     can_grasp_two,
     can_hold,
@@ -34,7 +32,7 @@ from stages.tableware.planning.rules import (
     letters,
     why_not_pulled,
 )
-from stages.tableware.planning.time_model import (
+from scenewright.stages.tableware.planning.time_model import (
     EXACT,
     Chances,
     TimeModel,
@@ -43,17 +41,19 @@ from stages.tableware.planning.time_model import (
     placement_error,
     thesis_fit,
 )
-from stages.tableware.planning.trip_options import slip_cost
-from stages.tableware.policies.pull import PullPolicy
-from stages.tableware.policies.random import RandomOne
-from stages.tableware.policies.random_piles import RandomPile
-from stages.tableware.policies.stack import StackPolicy
-from stages.tableware.simulation.fast import FastWorld, run_trial
-from stages.tableware.simulation.pieces import solid
-from stages.tableware.world.footprints import Footprint, footprint, gap
-from stages.tableware.world.items import STANDARD, Item, Table, make_item, rise
-from stages.tableware.world.scenes import TIERS, make_table
-from stages.tableware.world.setting import Gripper, Setting
+from scenewright.stages.tableware.planning.trip_options import slip_cost
+from scenewright.stages.tableware.policies.pull import PullPolicy
+from scenewright.stages.tableware.policies.random import RandomOne
+from scenewright.stages.tableware.policies.random_piles import RandomPile
+from scenewright.stages.tableware.policies.stack import StackPolicy
+from scenewright.stages.tableware.simulation.fast import FastWorld, run_trial
+from scenewright.stages.tableware.simulation.pieces import solid
+from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap
+from scenewright.stages.tableware.world.items import STANDARD, Item, Table, make_item, rise
+from scenewright.stages.tableware.world.scenes import TIERS, make_table
+from scenewright.stages.tableware.world.setting import Gripper, Setting
+
+from benchmarks.tidy.thesis_fit import TABLE_7_2, expected_trips, fit, fitted_hold, trips_of
 
 MODEL = TimeModel(trip=10.1, stack=8.45, pull=5.7)
 DISHES = st.sampled_from(["cup", "bowl", "plate"])

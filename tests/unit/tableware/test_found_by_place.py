@@ -7,20 +7,19 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from schemas.errors import UsageError
-from schemas.tableware_plan import FIELD_OF
-from stages.tableware import actions, policies
-from stages.tableware.found_by_place import module_named, names_in
-from stages.tableware.options import PolicyName
-from stages.tableware.planning.choice import declared_policy
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.tableware_plan import FIELD_OF
+from scenewright.stages.tableware import actions, policies
+from scenewright.stages.tableware.found_by_place import module_named, names_in
+from scenewright.stages.tableware.options import PolicyName
+from scenewright.stages.tableware.planning.choice import declared_policy
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 NEWEST_FIRST = '''
 """Takes what was seen last."""
 
-from stages.tableware.actions.grasp import grasp
-from stages.tableware.planning.policy import DeclaredPolicy
+from scenewright.stages.tableware.actions.grasp import grasp
+from scenewright.stages.tableware.planning.policy import DeclaredPolicy
 
 
 class NewestFirst:
@@ -36,9 +35,9 @@ def with_a_policy_more(folder: Path, arguments: list[str]) -> subprocess.Complet
     """Run the command line with a folder of policies more, which holds `newest_first.py`."""
     folder.joinpath("newest_first.py").write_text(NEWEST_FIRST)
     code = (
-        "import sys, stages.tableware.policies as policies;"
+        "import sys, scenewright.stages.tableware.policies as policies;"
         f"policies.__path__.append({str(folder)!r});"
-        f"from cli.main import run; sys.exit(run({arguments!r}))"
+        f"from scenewright.cli.main import run; sys.exit(run({arguments!r}))"
     )
     return subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, text=True, check=False)
 

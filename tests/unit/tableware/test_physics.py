@@ -8,30 +8,30 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.motion.kinematics import arm_chain, forward
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.tableware.actions.grasp import Grasp, grasp, grasp_two
+from scenewright.stages.tableware.actions.stack import stack
+from scenewright.stages.tableware.parameters import SimulateParameters
+from scenewright.stages.tableware.planning.action import Action
+from scenewright.stages.tableware.planning.rules import Rules, why_not_pulled
+from scenewright.stages.tableware.planning.time_model import TimeModel
+from scenewright.stages.tableware.simulation.arm_times import FILE, ArmTimes, arm_times
+from scenewright.stages.tableware.simulation.holds import Hold, pair_hold, rim_hold, unevenness
+from scenewright.stages.tableware.simulation.physics import PhysicsTable, Speeds, finger_force
+from scenewright.stages.tableware.simulation.physics_pictures import key_frames
+from scenewright.stages.tableware.simulation.physics_trial import alone
+from scenewright.stages.tableware.simulation.pieces import DISH_DENSITY, MARGIN, shell_pieces, solid
+from scenewright.stages.tableware.simulation.recording import Recording
+from scenewright.stages.tableware.simulation.tabletop import where_it_passed
+from scenewright.stages.tableware.simulation.trial import Done, Trial, most_actions, run_in
+from scenewright.stages.tableware.simulators import SIMULATORS
+from scenewright.stages.tableware.world.items import STANDARD, Item, Kind, Table, make_item, stand_height
 
 from benchmarks.experiments.tidy_holds import held
 from benchmarks.experiments.tidy_physics import Run
 from benchmarks.experiments.tidy_pulls import divergence, pair
 from benchmarks.tidy.physics_times import fit
-from stages.kit.motion.kinematics import arm_chain, forward
-from stages.kit.simulation.robot_description import load_robot
-from stages.tableware.actions.grasp import Grasp, grasp, grasp_two
-from stages.tableware.actions.stack import stack
-from stages.tableware.parameters import SimulateParameters
-from stages.tableware.planning.action import Action
-from stages.tableware.planning.rules import Rules, why_not_pulled
-from stages.tableware.planning.time_model import TimeModel
-from stages.tableware.simulation.arm_times import FILE, ArmTimes, arm_times
-from stages.tableware.simulation.holds import Hold, pair_hold, rim_hold, unevenness
-from stages.tableware.simulation.physics import PhysicsTable, Speeds, finger_force
-from stages.tableware.simulation.physics_pictures import key_frames
-from stages.tableware.simulation.physics_trial import alone
-from stages.tableware.simulation.pieces import DISH_DENSITY, MARGIN, shell_pieces, solid
-from stages.tableware.simulation.recording import Recording
-from stages.tableware.simulation.tabletop import where_it_passed
-from stages.tableware.simulation.trial import Done, Trial, most_actions, run_in
-from stages.tableware.simulators import SIMULATORS
-from stages.tableware.world.items import STANDARD, Item, Kind, Table, make_item, stand_height
 from tests.unit.tableware.volumes import shell_volume
 
 DENAVIT_HARTENBERG = (

@@ -8,25 +8,30 @@ from math import pi
 
 import numpy as np
 import pytest
-
-from benchmarks.tidy.thesis_fit import FAILED_TRIALS, TABLE_7_2, trips_of
-from schemas.errors import BadInput, MissingDependency
-from schemas.tableware_plan import TablewareAction
-from stages.tableware import simulators
-from stages.tableware.actions.grasp import Grasp, grasp, grasp_two
-from stages.tableware.actions.pull import pull
-from stages.tableware.actions.pull_grasp import pull_grasp
-from stages.tableware.actions.stack import stack
-from stages.tableware.actions.stack_grasp import stack_grasp
-from stages.tableware.parameters import SimulateParameters
-from stages.tableware.planning.choice import make_policy
-from stages.tableware.planning.joint import JointPolicy, plan, rules_in
-from stages.tableware.planning.optimum import Optimum, Solution
-from stages.tableware.planning.reasons import impossible_pairs
-from stages.tableware.planning.records import as_action, as_record
-from stages.tableware.planning.refusals import Doubt, Unknown, accept, statement
-from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold_two, can_pull, can_put, split_over_two
-from stages.tableware.planning.time_model import (
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.tableware_plan import TablewareAction
+from scenewright.stages.tableware import simulators
+from scenewright.stages.tableware.actions.grasp import Grasp, grasp, grasp_two
+from scenewright.stages.tableware.actions.pull import pull
+from scenewright.stages.tableware.actions.pull_grasp import pull_grasp
+from scenewright.stages.tableware.actions.stack import stack
+from scenewright.stages.tableware.actions.stack_grasp import stack_grasp
+from scenewright.stages.tableware.parameters import SimulateParameters
+from scenewright.stages.tableware.planning.choice import make_policy
+from scenewright.stages.tableware.planning.joint import JointPolicy, plan, rules_in
+from scenewright.stages.tableware.planning.optimum import Optimum, Solution
+from scenewright.stages.tableware.planning.reasons import impossible_pairs
+from scenewright.stages.tableware.planning.records import as_action, as_record
+from scenewright.stages.tableware.planning.refusals import Doubt, Unknown, accept, statement
+from scenewright.stages.tableware.planning.rules import (
+    Rules,
+    can_grasp_two,
+    can_hold_two,
+    can_pull,
+    can_put,
+    split_over_two,
+)
+from scenewright.stages.tableware.planning.time_model import (
     EXACT,
     Chances,
     TimeModel,
@@ -35,16 +40,18 @@ from stages.tableware.planning.time_model import (
     with_spills,
     with_thesis_failures,
 )
-from stages.tableware.policies import ours_bold
-from stages.tableware.sight import named_as, understood, without_places
-from stages.tableware.simulation.fast import FastWorld, run_trial
-from stages.tableware.simulation.trial import run_in
-from stages.tableware.table_pictures import draw_strip, draw_table
-from stages.tableware.vision.detections import Detection
-from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped
-from stages.tableware.world.items import Table, make_item
-from stages.tableware.world.scenes import make_table
-from stages.tableware.world.setting import Setting
+from scenewright.stages.tableware.policies import ours_bold
+from scenewright.stages.tableware.sight import named_as, understood, without_places
+from scenewright.stages.tableware.simulation.fast import FastWorld, run_trial
+from scenewright.stages.tableware.simulation.trial import run_in
+from scenewright.stages.tableware.table_pictures import draw_strip, draw_table
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap, overlapped
+from scenewright.stages.tableware.world.items import Table, make_item
+from scenewright.stages.tableware.world.scenes import make_table
+from scenewright.stages.tableware.world.setting import Setting
+
+from benchmarks.tidy.thesis_fit import FAILED_TRIALS, TABLE_7_2, trips_of
 
 MODEL = TimeModel(trip=10.0, stack=8.0, pull=5.0)
 RULES, BOLD = Rules(), ours_bold.RULES
@@ -287,7 +294,7 @@ def test_a_pile_that_is_more_than_seen_is_dropped() -> None:
 
 
 def test_physics_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulators, "SIMULATION", "stages.tableware.no_such_package")
+    monkeypatch.setattr(simulators, "SIMULATION", "scenewright.stages.tableware.no_such_package")
     with pytest.raises(MissingDependency, match="no physics"):
         simulators.SIMULATORS["physics"](SimulateParameters(simulator="physics"))
 

@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from scenewright.schemas.tableware_plan import TablewarePlanFile
+from scenewright.stages.tableware.ros2_plan import hand_poses, write_plan_bag
 from scipy.spatial.transform import Rotation
-
-from schemas.tableware_plan import TablewarePlanFile
-from stages.tableware.ros2_plan import hand_poses, write_plan_bag
 
 PLAN = TablewarePlanFile.read(Path(__file__).parents[2] / "golden" / "v1" / "tableware_plan" / "plan.json")
 

@@ -5,16 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.tableware.planning.rules import Rules, can_stack
-from stages.tableware.sight import setting_seen
-from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.seeing import see, see_image, seen_from_the_side
-from stages.tableware.world.items import STANDARD, Table, make_item
-from stages.tableware.world.overhead import OverheadCamera, overhead_camera, render_overhead
-from stages.tableware.world.setting import Setting
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.tableware.planning.rules import Rules, can_stack
+from scenewright.stages.tableware.sight import setting_seen
+from scenewright.stages.tableware.vision.detections import Detection
+from scenewright.stages.tableware.vision.seeing import see, see_image, seen_from_the_side
+from scenewright.stages.tableware.world.items import STANDARD, Table, make_item
+from scenewright.stages.tableware.world.overhead import OverheadCamera, overhead_camera, render_overhead
+from scenewright.stages.tableware.world.setting import Setting
 
 VIEW = overhead_camera()
 

@@ -4,18 +4,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-from stages.tableware.vision.bar_search import bar_candidates
-from stages.tableware.vision.dish_reading import dishes_of
-from stages.tableware.vision.rim_finding import Rim, overlapping
-from stages.tableware.vision.rim_fitting import RAYS, SoughtLip, _circle_shift, fit_circle
-from stages.tableware.vision.stack_reading import read_stacks
-from stages.tableware.vision.tines import tine_difference
-from stages.tableware.vision.utensil_finding import search_bars
-from stages.tableware.vision.utensil_kind import fork_chance
-from stages.tableware.vision.utensil_reading import SeenUtensil, as_detection
-from stages.tableware.world.dish_shapes import utensil_parts
-from stages.tableware.world.items import STANDARD
+from scenewright.stages.tableware.vision.bar_search import bar_candidates
+from scenewright.stages.tableware.vision.dish_reading import dishes_of
+from scenewright.stages.tableware.vision.rim_finding import Rim, overlapping
+from scenewright.stages.tableware.vision.rim_fitting import RAYS, SoughtLip, _circle_shift, fit_circle
+from scenewright.stages.tableware.vision.stack_reading import read_stacks
+from scenewright.stages.tableware.vision.tines import tine_difference
+from scenewright.stages.tableware.vision.utensil_finding import search_bars
+from scenewright.stages.tableware.vision.utensil_kind import fork_chance
+from scenewright.stages.tableware.vision.utensil_reading import SeenUtensil, as_detection
+from scenewright.stages.tableware.world.dish_shapes import utensil_parts
+from scenewright.stages.tableware.world.items import STANDARD
 
 SCALE = 771.0
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.tableware.world.dish_shapes import utensil_parts
-from stages.tableware.world.items import Measures
+from scenewright.stages.tableware.world.dish_shapes import utensil_parts
+from scenewright.stages.tableware.world.items import Measures
 
 
 def shell_volume(shell: Measures, sides: int | None = None) -> float:

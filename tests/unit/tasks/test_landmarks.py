@@ -6,13 +6,13 @@ import importlib.util
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.stages.kit.tasks import fast_downward
+from scenewright.stages.kit.tasks.landmarks import find_landmarks
+from scenewright.stages.kit.tasks.relaxed import relax
+from scenewright.stages.kit.tasks.strips import Problem, ground, validate
+from scenewright.stages.kit.tasks.task_planner import plan_task
 
-from schemas.errors import BadInput, MissingDependency
-from stages.kit.tasks import fast_downward
-from stages.kit.tasks.landmarks import find_landmarks
-from stages.kit.tasks.relaxed import relax
-from stages.kit.tasks.strips import Problem, ground, validate
-from stages.kit.tasks.task_planner import plan_task
 from tests.unit.tasks.test_task_planner import BLOCKS, simulate, tower_problem
 
 

@@ -7,12 +7,11 @@ import itertools
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from schemas.errors import BadInput
-from stages.kit.tasks.pddl import domain_text, parse_domain, parse_problem, problem_text
-from stages.kit.tasks.strips import Atom, Domain, Problem, Schema, ground, positive_task
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan.domain import DOMAIN
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.tasks.pddl import domain_text, parse_domain, parse_problem, problem_text
+from scenewright.stages.kit.tasks.strips import Atom, Domain, Problem, Schema, ground, positive_task
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan.domain import DOMAIN
 
 LIGHTS = """; lamps in a row: only a lamp that is off can be switched on, and only when its neighbour is on
 (define (domain lights) (:requirements :strips :typing :negative-preconditions)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
-
-from schemas.errors import BadInput
-from stages.kit.tasks.pddl import domain_text, parse_domain, parse_problem, problem_text
-from stages.kit.tasks.strips import Domain, GroundAction, Problem, Schema, ground, validate
-from stages.kit.tasks.task_planner import plan_task
-from stages.plan.symbols import DOMAIN
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.tasks.pddl import domain_text, parse_domain, parse_problem, problem_text
+from scenewright.stages.kit.tasks.strips import Domain, GroundAction, Problem, Schema, ground, validate
+from scenewright.stages.kit.tasks.task_planner import plan_task
+from scenewright.stages.plan.symbols import DOMAIN
 
 BLOCKS = Domain(
     "blocks",

@@ -12,6 +12,11 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.segment.backends.network.features import CHANNELS, Mount, features
+from scenewright.stages.segment.backends.network.model import Widths
 
 from benchmarks.training.data import DEPTH_UNIT, HEIGHT, WIDTH, Sample, papered, write_shard
 from benchmarks.training.drawing import drawn
@@ -24,11 +29,6 @@ from benchmarks.training.sensors import coarse_depth, lose_things
 from benchmarks.training.shapes import MAKERS, SMALL_MAKERS, Maker
 from benchmarks.training.targets import IGNORED, make_targets
 from benchmarks.training.train import PEAK_RATE, WARM_UP, Clock, Feed, Plan, Run, class_weights
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.vocabulary import load_vocabulary
-from stages.segment.backends.network.features import CHANNELS, Mount, features
-from stages.segment.backends.network.model import Widths
 
 TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
 CAMERA = Camera(width=WIDTH, height=HEIGHT, fx=260.0, fy=260.0, cx=159.5, cy=119.5)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 import trimesh
+from scenewright.stages.kit.geometry.transforms import look_at
 
-from stages.kit.geometry.transforms import look_at
 from tests.unit.evaluate.handmade import Thing
 from tests.unit.ingest.folder_writers import write_scenenn
 from tests.unit.ingest.tiny_room import CAMERA, color_image

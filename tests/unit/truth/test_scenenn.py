@@ -9,34 +9,34 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import EntitiesFile, Entity
-from schemas.sequence import Sequence
-from stages.evaluate.graph_measures import measure_boxes
-from stages.evaluate.map_measures import PredictedMap, label_true_points, measure_instances, measure_quality
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.results import Part
-from stages.evaluate.stage import run as evaluate
-from stages.evaluate.surfaces import Surface
-from stages.evaluate.truth import load_truth
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.stage import run as ingest
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.formats.scenenn_annotation import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import EntitiesFile, Entity
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.evaluate.graph_measures import measure_boxes
+from scenewright.stages.evaluate.map_measures import PredictedMap, label_true_points, measure_instances, measure_quality
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.results import Part
+from scenewright.stages.evaluate.stage import run as evaluate
+from scenewright.stages.evaluate.surfaces import Surface
+from scenewright.stages.evaluate.truth import load_truth
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.stage import run as ingest
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.formats.scenenn_annotation import (
     AnnotatedLabel,
     class_by_last_word,
     class_by_substring,
     read_annotation,
 )
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.truth.labelled_mesh import read_labelled_mesh
-from stages.truth.parameters import SceneNNParameters
-from stages.truth.stage import read_words, run
-from stages.truth.surface import surface_points
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.truth.labelled_mesh import read_labelled_mesh
+from scenewright.stages.truth.parameters import SceneNNParameters
+from scenewright.stages.truth.stage import read_words, run
+from scenewright.stages.truth.surface import surface_points
+
 from tests.unit.truth.scenenn_folder import ROOM, SCENE, VOID, annotation, labelled_mesh, ply_bytes, write_folder
 
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.measurement.average_precision import Candidates
+from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality
 
 from benchmarks.command import main
 from benchmarks.experiments.mapping.measuring import Outcome, ranked
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
 from benchmarks.experiments.scenenn.tables import all_figures, of_ten, printed, read_published
-from schemas.vocabulary import load_vocabulary
-from stages.kit.measurement.average_precision import Candidates
-from stages.kit.measurement.panoptic_quality import ClassQuality
 from tests.unit.truth.scenenn_folder import SCENE, write_folder
 
 

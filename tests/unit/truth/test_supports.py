@@ -10,26 +10,26 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.scene_parts import Relation
+from scenewright.schemas.sequence import LabelEntry, Sequence
+from scenewright.stages.evaluate.parameters import EvaluateParameters
+from scenewright.stages.evaluate.stage import run as evaluate
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.stage import run as ingest
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.truth.annotated_points import most_common_labels
+from scenewright.stages.truth.parameters import SupportsParameters
+from scenewright.stages.truth.support_annotation import SupportAnnotation, contradictions, read_support_annotation
+from scenewright.stages.truth.supports import run
 
-from schemas.contact_graph import ContactGraph, ContactGraphFile
-from schemas.errors import BadInput
-from schemas.ground_truth import GroundTruth
-from schemas.scene_parts import Relation
-from schemas.sequence import LabelEntry, Sequence
-from stages.evaluate.parameters import EvaluateParameters
-from stages.evaluate.stage import run as evaluate
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.stage import run as ingest
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.truth.annotated_points import most_common_labels
-from stages.truth.parameters import SupportsParameters
-from stages.truth.support_annotation import SupportAnnotation, contradictions, read_support_annotation
-from stages.truth.supports import run
 from tests.panoptic_maps import box_mesh, write_map
 from tests.unit.ingest.tiny_room import CAMERA, TABLE, camera_poses, room_depth
 

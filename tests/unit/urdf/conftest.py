@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from scenewright.schemas.cad_library import CadLibrary
 
-from schemas.cad_library import CadLibrary
 from tests.unit.urdf.small_room import small_library
 
 

@@ -6,18 +6,17 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-
-from schemas.cad_library import CadLibrary, CadModel
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.scene_parts import Box, Relation
-from stages.kit.formats.cad_models import model_folder, posed_mesh
-from stages.kit.formats.scene_bundle import BundleBody
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.library.parameters import LibraryParameters
-from stages.library.stage import run as build_library
+from scenewright.schemas.cad_library import CadLibrary, CadModel
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh
+from scenewright.stages.kit.formats.scene_bundle import BundleBody
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
+from scenewright.stages.library.parameters import LibraryParameters
+from scenewright.stages.library.stage import run as build_library
 
 
 def context(output: Path, seed: int = 0) -> Context:

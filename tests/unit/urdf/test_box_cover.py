@@ -7,8 +7,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from stages.kit.geometry.box_cover import cover_with_boxes, merge_cells
+from scenewright.stages.kit.geometry.box_cover import cover_with_boxes, merge_cells
 
 
 @settings(max_examples=50, deadline=None)

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenewright.stages.urdf.convex_cutting import THINNEST, half, outside_box
 from scipy.spatial import ConvexHull
-
-from stages.urdf.convex_cutting import THINNEST, half, outside_box
 
 UNIT = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
 

@@ -9,23 +9,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene, CadSceneFile
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.schemas.scene_parts import Box, Relation, SurfacePlane
+from scenewright.stages.kit.formats.cad_models import model_folder
+from scenewright.stages.kit.formats.mobility import Mobility, mobility
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.geometry.convex_pieces import convex_pieces
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.urdf.bodies import held_under_fixed, scene_bodies
+from scenewright.stages.urdf.giving_way import DEPTH, given_way, written_pieces
+from scenewright.stages.urdf.parameters import UrdfParameters
+from scenewright.stages.urdf.stage import run
 
-from schemas.base import as_transform
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene, CadSceneFile
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.interactive_scene import InteractiveSceneFile
-from schemas.scene_parts import Box, Relation, SurfacePlane
-from stages.kit.formats.cad_models import model_folder
-from stages.kit.formats.mobility import Mobility, mobility
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.geometry.convex_pieces import convex_pieces
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.urdf.bodies import held_under_fixed, scene_bodies
-from stages.urdf.giving_way import DEPTH, given_way, written_pieces
-from stages.urdf.parameters import UrdfParameters
-from stages.urdf.stage import run
 from tests.unit.urdf.small_room import context
 
 FLOOR = SurfacePlane(normal=(0, 0, 1), offset=0.0, area=36.0, center=(0, 0, 0), horizontal=True)

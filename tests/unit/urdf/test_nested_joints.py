@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Box, Joint
+from scenewright.stages.kit.formats.cad_models import part_transforms, read_model
+from scenewright.stages.kit.formats.model_writer import PartGeometry, write_model_folder
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.geometry.solids import box, mass_properties
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.joint_sweep import sweep_joints
 
-from schemas.cad_library import CadModel
-from schemas.errors import BadInput
-from schemas.scene_parts import Box, Joint
-from stages.kit.formats.cad_models import part_transforms, read_model
-from stages.kit.formats.model_writer import PartGeometry, write_model_folder
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.geometry.solids import box, mass_properties
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.simulation.world import load_scene
-from stages.urdf.joint_sweep import sweep_joints
 from tests.unit.urdf.small_room import graph_of
 
 VALUES = {"hinge": 0.7, "slide": 0.2}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run
+from scenewright.stages.kit.formats.urdf_check import advice, check_urdf
 
-from cli.main import run
-from stages.kit.formats.urdf_check import advice, check_urdf
 from tests.unit.urdf.test_urdf_file import BROKEN, INERTIA, link, robot
 
 pytest.importorskip("urdf_validator_main", reason="needs urdf-validator")

@@ -9,11 +9,10 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.model_writer import write_obj
-from stages.kit.formats.part_colors import recolored, recolored_shapes
-from stages.kit.formats.urdf_file import Shape
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.model_writer import write_obj
+from scenewright.stages.kit.formats.part_colors import recolored, recolored_shapes
+from scenewright.stages.kit.formats.urdf_file import Shape
 
 colors = st.lists(st.tuples(*[st.floats(0, 1)] * 3), min_size=1, max_size=6)
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.urdf.resting import rested_bodies
+from scenewright.stages.urdf.settle_report import settle_report
 
-from schemas.scene_parts import Box
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.geometry.transforms import transform_from_yaw
-from stages.urdf.resting import rested_bodies
-from stages.urdf.settle_report import settle_report
 from tests.unit.urdf.small_room import graph_of, layout
 
 

@@ -13,15 +13,15 @@ import pybullet
 import pytest
 import trimesh
 import yourdfpy
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.schemas.scene_parts import SurfacePlane
+from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.geometry.transforms import apply, quaternion_of
 
-from schemas.errors import BadInput
-from schemas.interactive_scene import InteractiveSceneFile
-from schemas.scene_parts import SurfacePlane
-from stages.kit.formats.cad_models import model_folder, posed_mesh
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.formats.urdf_check import check_urdf
-from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.geometry.transforms import apply, quaternion_of
 from tests.unit.urdf.small_room import find, graph_of, layout, placed, room
 
 

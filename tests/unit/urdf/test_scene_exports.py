@@ -14,19 +14,19 @@ import trimesh
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.reader import make_reader
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.stages.kit.formats.foxglove import transform_matrix
+from scenewright.stages.kit.formats.link_poses import link_poses
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.exporters.glb import linear
+from scenewright.stages.urdf.exports import write_exports
+from scenewright.stages.urdf.mujoco_settle import mujoco_motions
+from scenewright.stages.urdf.settle_report import settle_report
 
-from schemas.cad_library import CadLibrary
-from schemas.errors import BadInput
-from schemas.interactive_scene import InteractiveSceneFile
-from stages.kit.formats.foxglove import transform_matrix
-from stages.kit.formats.link_poses import link_poses
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.simulation.world import load_scene
-from stages.urdf.exporters.glb import linear
-from stages.urdf.exports import write_exports
-from stages.urdf.mujoco_settle import mujoco_motions
-from stages.urdf.settle_report import settle_report
 from tests.unit.urdf.small_room import graph_of, room
 
 

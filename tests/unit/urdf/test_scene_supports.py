@@ -7,19 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.scene_parts import Box, Relation, SurfacePlane
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
-from stages.kit.formats.scene_supports import Carried, cut_below, levelled, standing_points
-from stages.kit.formats.urdf_check import check_urdf
-from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.geometry.solids import hull
-from stages.kit.geometry.substances import FRICTION_OF_LIKE, SUBSTANCES, substance_of
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.world import load_scene
-from stages.urdf.settle_report import settle_report
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Box, Relation, SurfacePlane
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.formats.scene_supports import Carried, cut_below, levelled, standing_points
+from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.geometry.solids import hull
+from scenewright.stages.kit.geometry.substances import FRICTION_OF_LIKE, SUBSTANCES, substance_of
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.urdf.settle_report import settle_report
 
 CUP = Carried(Box(center=(0.3, 0.0, 0.8), size=(0.1, 0.1, 0.1)), height=0.75)
 

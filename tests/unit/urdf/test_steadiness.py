@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-
-from stages.urdf.steadiness import LEAST_TILT, stands_steadily
+from scenewright.stages.urdf.steadiness import LEAST_TILT, stands_steadily
 
 
 def solid(width: float, depth: float, height: float, lean: float = 0.0) -> trimesh.Trimesh:

@@ -6,9 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-
-from cli.main import run
-from stages.urdf.rest_penetration import resting_penetrations
+from scenewright.cli.main import run
+from scenewright.stages.urdf.rest_penetration import resting_penetrations
 
 BOX = (
     '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'

@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yourdfpy
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.urdf_check import check_urdf, require_sound
+from scenewright.stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, number, parse_urdf, write_urdf
+from scenewright.stages.kit.geometry.solids import MassProperties
+from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
-
-from schemas.errors import BadInput
-from stages.kit.formats.urdf_check import check_urdf, require_sound
-from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, number, parse_urdf, write_urdf
-from stages.kit.geometry.solids import MassProperties
-from stages.kit.geometry.transforms import transform_from
 
 SOUND_INERTIA = MassProperties(2.0, np.array([0.1, -0.2, 0.3]), np.diag([0.02, 0.03, 0.04]))
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.cad_scene import CadScene, CadSceneFile
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.stages.kit.formats.cad_models import model_folder
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
+from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas
+from scenewright.stages.kit.viewing.scenes import draw_settling
+from scenewright.stages.urdf.parameters import UrdfParameters
+from scenewright.stages.urdf.stage import run
 
-from schemas.cad_scene import CadScene, CadSceneFile
-from schemas.errors import BadInput, UsageError
-from stages.kit.formats.cad_models import model_folder
-from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.viewing.page.page_canvas import PageCanvas
-from stages.kit.viewing.scenes import draw_settling
-from stages.urdf.parameters import UrdfParameters
-from stages.urdf.stage import run
 from tests.unit.urdf.small_room import context, graph_of, placed, room
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-
-from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.scene_parts import Box, Relation
-from stages.kit.geometry.layout_slabs import box_under
-from stages.urdf.scene_penetration import Overlap
-from stages.urdf.wedged import held
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Box, Relation
+from scenewright.stages.kit.geometry.layout_slabs import box_under
+from scenewright.stages.urdf.scene_penetration import Overlap
+from scenewright.stages.urdf.wedged import held
 
 
 def overlap(first: str, second: str) -> Overlap:

@@ -8,15 +8,14 @@ import cv2
 import numpy as np
 import trimesh
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-
-from schemas.base import as_transform
-from schemas.cad_scene import CadCandidate, CadSceneFile, Replacement
-from schemas.contact_graph import ContactGraphFile
-from schemas.evaluation import MetricsFile, ReportFile
-from schemas.ground_truth import GroundTruthFile, TrueObject
-from schemas.kinds import KINDS
-from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
-from schemas.packing import (
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.cad_scene import CadCandidate, CadSceneFile, Replacement
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.evaluation import MetricsFile, ReportFile
+from scenewright.schemas.ground_truth import GroundTruthFile, TrueObject
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
+from scenewright.schemas.packing import (
     PackingArea,
     PackingAttempt,
     PackingBox,
@@ -25,15 +24,16 @@ from schemas.packing import (
     PackingObstacle,
     PackingStep,
 )
-from schemas.panoptic_map import EntitiesFile, Entity
-from schemas.plan import Failure, PlanFile, PlannedAction
-from schemas.segments import FrameSegment, FrameSegments, SegmentsFile
-from schemas.sequence import Sequence
-from stages.engine.digests import content_digest, record_files
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.masks import write_panoptic_zip
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.formats.trajectories import write_tum
+from scenewright.schemas.panoptic_map import EntitiesFile, Entity
+from scenewright.schemas.plan import Failure, PlanFile, PlannedAction
+from scenewright.schemas.segments import FrameSegment, FrameSegments, SegmentsFile
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.kit.formats.trajectories import write_tum
+
 from tests.unit.disparity.pairs import pair, write_folder
 from tests.unit.disparity.running import matched
 from tests.unit.export.sequences import export

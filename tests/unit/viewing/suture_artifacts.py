@@ -6,16 +6,22 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.evaluation import MetricsFile
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Gravity, SequenceCamera, SequenceFile
+from scenewright.schemas.suture_needle import (
+    NeedleEstimateRecord,
+    NeedleFrame,
+    SutureNeedleFile,
+    SutureThreadFile,
+    ThreadFrame,
+)
+from scenewright.schemas.suture_scene import StereoRigRecord, SutureSceneFile, SutureView
+from scenewright.schemas.suture_trial import SutureEvent, SuturePerception, SutureRun, SutureTrialFile
+from scenewright.stages.kit.formats.frames import FrameWriter
+from scenewright.stages.kit.formats.trajectories import write_tum
 
-from schemas.base import as_transform
-from schemas.evaluation import MetricsFile
-from schemas.scene_parts import Camera
-from schemas.sequence import Gravity, SequenceCamera, SequenceFile
-from schemas.suture_needle import NeedleEstimateRecord, NeedleFrame, SutureNeedleFile, SutureThreadFile, ThreadFrame
-from schemas.suture_scene import StereoRigRecord, SutureSceneFile, SutureView
-from schemas.suture_trial import SutureEvent, SuturePerception, SutureRun, SutureTrialFile
-from stages.kit.formats.frames import FrameWriter
-from stages.kit.formats.trajectories import write_tum
 from tests.unit.viewing.artifacts import seal
 
 CAMERA = Camera(width=32, height=24, fx=60.0, fy=60.0, cx=15.5, cy=11.5)

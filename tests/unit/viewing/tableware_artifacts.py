@@ -6,11 +6,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.base import as_transform
-from schemas.scene_parts import Camera
-from schemas.tableware_detections import TablewareDetection, TablewareDetectionsFile
-from schemas.tableware_plan import (
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.tableware_detections import TablewareDetection, TablewareDetectionsFile
+from scenewright.schemas.tableware_plan import (
     GraspFields,
     StackFields,
     StackGraspFields,
@@ -19,9 +18,16 @@ from schemas.tableware_plan import (
     TablewareStep,
     TimesOfActions,
 )
-from schemas.tableware_scene import TablewareItem, TablewareSceneFile
-from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluationFile, TablewareTrialFile, TrialCounts, TrialStep
-from stages.tableware.world.shape_files import write_shapes
+from scenewright.schemas.tableware_scene import TablewareItem, TablewareSceneFile
+from scenewright.schemas.tableware_trial import (
+    EvaluatedPolicy,
+    TablewareEvaluationFile,
+    TablewareTrialFile,
+    TrialCounts,
+    TrialStep,
+)
+from scenewright.stages.tableware.world.shape_files import write_shapes
+
 from tests.unit.viewing.artifacts import seal
 
 ITEMS = (

@@ -6,21 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.cli.viewing.desk import asking
+from scenewright.cli.viewing.desk.desk import Desk
+from scenewright.cli.viewing.splat_view import first_seen
+from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.splat import Splat, SplatFile, SplatView
+from scenewright.stages.kit.formats.trajectories import write_tum
+from scenewright.stages.kit.geometry.boxes import minimum_box
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from
+from scenewright.stages.kit.open_words.encoder import unit
+from scenewright.stages.kit.open_words.vectors import Vectors, write_vectors
+from scenewright.stages.kit.rendering.splatting.rasterizer import View
+from scenewright.stages.splat.ply import write_gaussians
 
-from cli.viewing.desk import asking
-from cli.viewing.desk.desk import Desk
-from cli.viewing.splat_view import first_seen
-from schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
-from schemas.scene_parts import Camera
-from schemas.sequence import Sequence
-from schemas.splat import Splat, SplatFile, SplatView
-from stages.kit.formats.trajectories import write_tum
-from stages.kit.geometry.boxes import minimum_box
-from stages.kit.geometry.transforms import inverse, transform_from
-from stages.kit.open_words.encoder import unit
-from stages.kit.open_words.vectors import Vectors, write_vectors
-from stages.kit.rendering.splatting.rasterizer import View
-from stages.splat.ply import write_gaussians
 from tests.browser import WEBGL, browser, needs_browser
 from tests.unit.open_words.stand_ins import COLORS, ColorEncoder
 from tests.unit.splat.test_language import BALLS, CAMERA, gaussians, poses

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from cli.viewing.view import view_artifact
+from scenewright.cli.viewing.view import view_artifact
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "v1"
 EXPECTED = {

@@ -17,16 +17,16 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 from pydantic import Field
+from scenewright.cli.main import run as scenewright
+from scenewright.cli.viewing.desk.desk import Desk
+from scenewright.cli.viewing.desk.forms import forms_of, kinds_of
+from scenewright.cli.viewing.desk.server import DeskServer
+from scenewright.schemas.edits import Anchor, AnyEdit, ClassName, Edit, MapEdit, Mark
+from scenewright.schemas.errors import BadInput, MachineFailure, UsageError
+from scenewright.schemas.hand_written import Point, UprightBox
+from scenewright.schemas.panoptic_map import EntitiesFile, PanopticMap
+from scenewright.stages.edit.edits_file import Changed, append_edits, read_edits, remove_edit, revision_of
 
-from cli.main import run as scenewright
-from cli.viewing.desk.desk import Desk
-from cli.viewing.desk.forms import forms_of, kinds_of
-from cli.viewing.desk.server import DeskServer
-from schemas.edits import Anchor, AnyEdit, ClassName, Edit, MapEdit, Mark
-from schemas.errors import BadInput, MachineFailure, UsageError
-from schemas.hand_written import Point, UprightBox
-from schemas.panoptic_map import EntitiesFile, PanopticMap
-from stages.edit.edits_file import Changed, append_edits, read_edits, remove_edit, revision_of
 from tests.browser import WEBGL, Browser, browser, needs_browser
 from tests.panoptic_maps import box_mesh, floor_mesh, write_map
 from tests.unit.edit.maps import dense, room_map

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenewright.cli.main import run as scenewright
+from scenewright.cli.viewing.desk.desk import Desk
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.stages.edit.edits_file import read_edits
 
-from cli.main import run as scenewright
-from cli.viewing.desk.desk import Desk
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from stages.edit.edits_file import read_edits
 from tests.browser import WEBGL, browser, needs_browser
 from tests.unit.edit.scenes import scene_room
 from tests.unit.viewing.test_desk import THINGS, asked, fill, fresh, look_at, opened, served, settled, until

@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenewright.cli.viewing.view import view_artifact
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.interactive_scene import SettledBody, SettleFile
+from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.viewing.canvas import JointedLink, Trust
+from scenewright.stages.kit.viewing.page import library, page_canvas
+from scenewright.stages.kit.viewing.page.library import three_js
+from scenewright.stages.kit.viewing.page.packing import STEPS
+from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas
 
-from cli.viewing.view import view_artifact
-from schemas.errors import BadInput, MissingDependency
-from schemas.interactive_scene import SettledBody, SettleFile
-from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.geometry.boxes import box_from_bounds
-from stages.kit.viewing.canvas import JointedLink, Trust
-from stages.kit.viewing.page import library, page_canvas
-from stages.kit.viewing.page.library import three_js
-from stages.kit.viewing.page.packing import STEPS
-from stages.kit.viewing.page.page_canvas import PageCanvas
 from tests.browser import WEBGL, Browser, browser, needs_browser
 from tests.unit.urdf.small_room import graph_of, layout
 from tests.unit.viewing.artifacts import seal

@@ -9,27 +9,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.cli.main import run as scenewright
+from scenewright.cli.viewing.library_view import row_places
+from scenewright.cli.viewing.rerun_canvas import import_rerun
+from scenewright.cli.viewing.segments_view import segment_images
+from scenewright.cli.viewing.sequence_view import draw_sequence
+from scenewright.cli.viewing.view import view_artifact, viewer_of
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.schemas.kinds import KINDS
+from scenewright.schemas.scene_parts import Relation
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.formats.link_poses import joint_motion, link_poses
+from scenewright.stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
+from scenewright.stages.kit.measurement.relation_evidence import evidence
+from scenewright.stages.kit.viewing.graphs import relation_table
+from scenewright.stages.kit.viewing.page.library import three_js
+from scenewright.stages.kit.viewing.page.page_canvas import LARGEST_PAGE
 
-from cli.main import run as scenewright
-from cli.viewing.library_view import row_places
-from cli.viewing.rerun_canvas import import_rerun
-from cli.viewing.segments_view import segment_images
-from cli.viewing.sequence_view import draw_sequence
-from cli.viewing.view import view_artifact, viewer_of
-from schemas.artifact import Artifact
-from schemas.cad_library import CadLibrary
-from schemas.contact_graph import ContactGraphFile
-from schemas.errors import BadInput, MissingDependency, UsageError
-from schemas.interactive_scene import InteractiveSceneFile
-from schemas.kinds import KINDS
-from schemas.scene_parts import Relation
-from schemas.sequence import Sequence
-from stages.kit.formats.link_poses import joint_motion, link_poses
-from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
-from stages.kit.measurement.relation_evidence import evidence
-from stages.kit.viewing.graphs import relation_table
-from stages.kit.viewing.page.library import three_js
-from stages.kit.viewing.page.page_canvas import LARGEST_PAGE
 from tests.unit.viewing import artifacts
 from tests.unit.viewing.suture_artifacts import make_suture
 from tests.unit.viewing.tableware_artifacts import make_tableware
@@ -267,7 +267,7 @@ def test_joint_motions() -> None:
 
 
 def test_links_that_are_no_tree_are_bad_input() -> None:
-    from stages.kit.formats.urdf_file import Link
+    from scenewright.stages.kit.formats.urdf_file import Link
 
     links = (Link("a"), Link("b"))
     loop = (UrdfJoint("1", "fixed", "a", "b", np.eye(4)), UrdfJoint("2", "fixed", "b", "a", np.eye(4)))
@@ -276,7 +276,7 @@ def test_links_that_are_no_tree_are_bad_input() -> None:
 
 
 def test_segment_images_look_up_class_and_instance() -> None:
-    from schemas.segments import FrameSegment, FrameSegments
+    from scenewright.schemas.segments import FrameSegment, FrameSegments
 
     records = (
         FrameSegment(id=70000, category_id=5, instance=2, is_thing=True, score=1, area=1),

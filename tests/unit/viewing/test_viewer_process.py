@@ -8,9 +8,8 @@ import sys
 from typing import Any
 
 import pytest
-
-from cli.viewing import viewer_process
-from schemas.errors import MachineFailure
+from scenewright.cli.viewing import viewer_process
+from scenewright.schemas.errors import MachineFailure
 
 
 class Started:

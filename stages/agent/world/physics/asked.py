@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.vocabulary import load_vocabulary
-from stages.agent.goals import FURNITURE, THINGS
-from stages.agent.world.physics.eyes import Mask
-from stages.kit.formats.frames import Frame
-from stages.kit.rendering.object_views import LEAST_PIXELS, Picture
-from stages.kit.services.segmentation_client import connect, read_info
-from stages.kit.services.segmentation_protocol import SEGMENT_PATH, SegmentRequest, encode_request, parse_reply
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.agent.goals import FURNITURE, THINGS
+from scenewright.stages.agent.world.physics.eyes import Mask
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.rendering.object_views import LEAST_PIXELS, Picture
+from scenewright.stages.kit.services.segmentation_client import connect, read_info
+from scenewright.stages.kit.services.segmentation_protocol import (
+    SEGMENT_PATH,
+    SegmentRequest,
+    encode_request,
+    parse_reply,
+)
 
 CAMERA = "robot"
 ALIASES = ("coco", "nyu40", "scannet", "ade20k")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import atan2, hypot
 
 import numpy as np
-
-from stages.agent.world.physics.fronts import Front
-from stages.kit.geometry.transforms import apply
-from stages.kit.motion.doors import body_from_moved, closing_direction
+from scenewright.stages.agent.world.physics.fronts import Front
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.motion.doors import body_from_moved, closing_direction
 
 AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
 """From where a side is looked at: before it, and beside its middle [m]."""

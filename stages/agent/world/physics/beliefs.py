@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.base import as_transform
-from stages.agent.world.physics.fronts import Front
-from stages.agent.world.physics.shapes import record_of, slab, urdf_of
-from stages.kit.motion.collision import CollisionChecker
-from stages.kit.motion.kinematics import arm_chain
-from stages.kit.simulation.robot import Configuration, Robot
-from stages.kit.simulation.robot_description import RobotDescription
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.schemas.base import as_transform
+from scenewright.stages.agent.world.physics.fronts import Front
+from scenewright.stages.agent.world.physics.shapes import record_of, slab, urdf_of
+from scenewright.stages.kit.motion.collision import CollisionChecker
+from scenewright.stages.kit.motion.kinematics import arm_chain
+from scenewright.stages.kit.simulation.robot import Configuration, Robot
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 HELD = "held"
 """Name of the box of what is in the hand."""

@@ -5,21 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from schemas.apartment import Apartment, Furniture
-from stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
-from stages.agent.world.events import Event
-from stages.agent.world.failures import Rates
-from stages.agent.world.physics.asked import AskedSegmenter
-from stages.agent.world.physics.driving import Driving
-from stages.agent.world.physics.handling import Handling
-from stages.agent.world.physics.looking import Looking
-from stages.agent.world.physics.oracle import NoisyOracle
-from stages.agent.world.physics.pulling import Pulling
-from stages.agent.world.physics.robot_in_room import RobotInRoom
-from stages.agent.world.physics.room import Body, Room
-from stages.agent.world.physics.seen import Seen
-from stages.kit.rendering.segmenter_errors import SegmenterErrors
+from scenewright.schemas.apartment import Apartment, Furniture
+from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
+from scenewright.stages.agent.world.events import Event
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.asked import AskedSegmenter
+from scenewright.stages.agent.world.physics.driving import Driving
+from scenewright.stages.agent.world.physics.handling import Handling
+from scenewright.stages.agent.world.physics.looking import Looking
+from scenewright.stages.agent.world.physics.oracle import NoisyOracle
+from scenewright.stages.agent.world.physics.pulling import Pulling
+from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
+from scenewright.stages.agent.world.physics.room import Body, Room
+from scenewright.stages.agent.world.physics.seen import Seen
+from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors
 
 CLEARANCE = 2.9
 """Cells of the obstacle map that the base keeps from what is occupied."""

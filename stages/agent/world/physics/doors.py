@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from math import atan2
 
 import numpy as np
-
-from schemas.apartment import Apartment, Furniture
-from schemas.scene_parts import Joint
-from stages.agent.world.physics.shapes import Piece, jointed_text, slab
-from stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.schemas.apartment import Apartment, Furniture
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.agent.world.physics.shapes import Piece, jointed_text, slab
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 DRAWERS = ("dresser",)
 """Furniture of which the top is a drawer as wide as itself; all other has a leaf as large as its front."""

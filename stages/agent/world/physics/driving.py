@@ -5,16 +5,15 @@ from __future__ import annotations
 from math import atan2, pi
 
 import numpy as np
-
-from stages.agent.obstacle_map import cell_of
-from stages.agent.senses import Base, Felt, Sweep
-from stages.agent.world.physics.robot_in_room import RobotInRoom
-from stages.agent.world.physics.seen import Seen
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.robot_errors import stop_error
-from stages.kit.motion.segments import Segment
-from stages.kit.simulation.engine import engine
-from stages.kit.simulation.robot import Configuration
+from scenewright.stages.agent.obstacle_map import cell_of
+from scenewright.stages.agent.senses import Base, Felt, Sweep
+from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
+from scenewright.stages.agent.world.physics.seen import Seen
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.robot_errors import stop_error
+from scenewright.stages.kit.motion.segments import Segment
+from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.robot import Configuration
 
 TRIES = 6
 """Ways that are tried on one drive, each around what was touched on those before."""

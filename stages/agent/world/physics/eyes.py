@@ -7,11 +7,10 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.agent.world.physics.shapes import COLORS, STAIN
+from scenewright.stages.kit.rendering.object_views import Picture, cloud
 from scipy.spatial import cKDTree
-
-from schemas.scene_parts import Camera
-from stages.agent.world.physics.shapes import COLORS, STAIN
-from stages.kit.rendering.object_views import Picture, cloud
 
 HEAD = Camera(width=160, height=120, fx=100.0, fy=100.0, cx=79.5, cy=59.5)
 WRIST = Camera(width=240, height=180, fx=175.0, fy=175.0, cx=119.5, cy=89.5)

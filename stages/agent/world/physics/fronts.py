@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from math import atan2
 
 import numpy as np
-
-from schemas.base import as_vector
-from schemas.scene_parts import Joint
-from stages.agent.senses import Position
-from stages.agent.world.physics.eyes import Surface
-from stages.agent.world.physics.shapes import jointed_text, slab
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.kit.motion.doors import body_from_moved
+from scenewright.schemas.base import as_vector
+from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.agent.senses import Position
+from scenewright.stages.agent.world.physics.eyes import Surface
+from scenewright.stages.agent.world.physics.shapes import jointed_text, slab
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.motion.doors import body_from_moved
 
 WITH_DRAWERS, WITH_LEAVES = ("dresser",), ("fridge",)
 PARTS = ("handle", "door", "drawer")

@@ -5,16 +5,15 @@ from __future__ import annotations
 from math import hypot
 
 import numpy as np
-
-from stages.agent.senses import Base, Felt, Position
-from stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
-from stages.agent.world.physics.letting_go import DROP, JUST_OVER, SOME_WAY_OVER, Spot, plan_release
-from stages.agent.world.physics.looking import Looking
-from stages.agent.world.physics.robot_in_room import RobotInRoom, felt
-from stages.agent.world.physics.seen import FLOOR, FOUND_WITHIN, Seen
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.segments import Segment, whole_body
+from scenewright.stages.agent.senses import Base, Felt, Position
+from scenewright.stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
+from scenewright.stages.agent.world.physics.letting_go import DROP, JUST_OVER, SOME_WAY_OVER, Spot, plan_release
+from scenewright.stages.agent.world.physics.looking import Looking
+from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom, felt
+from scenewright.stages.agent.world.physics.seen import FLOOR, FOUND_WITHIN, Seen
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.segments import Segment, whole_body
 
 CLOSED_ON_NOTHING = 0.004
 """Opening of the fingers below which they hold nothing [m]."""

@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from stages.agent.world.physics.beliefs import HELD, Beliefs, Box, Hold
-from stages.agent.world.physics.eyes import Surface
-from stages.agent.world.physics.grasps import FORWARD_PITCHES, STRAIGHT, antipodal_grasps, within_reach
-from stages.kit.geometry.transforms import inverse
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.grasps import narrowest_width
-from stages.kit.motion.kinematics import inverse_kinematics, random_starts
-from stages.kit.motion.segments import Segment, whole_body
-from stages.kit.simulation.robot import Configuration
+from scenewright.stages.agent.world.physics.beliefs import HELD, Beliefs, Box, Hold
+from scenewright.stages.agent.world.physics.eyes import Surface
+from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, STRAIGHT, antipodal_grasps, within_reach
+from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.grasps import narrowest_width
+from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_starts
+from scenewright.stages.kit.motion.segments import Segment, whole_body
+from scenewright.stages.kit.simulation.robot import Configuration
 
 CANDIDATES = 20
 """Grasps that are tried, those from above first (Han 2024, 3.3.3)."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scenewright.stages.agent.obstacle_map import CELL
+from scenewright.stages.kit.geometry.point_clouds import clusters
 from scipy.ndimage import maximum_filter, minimum_filter
-
-from stages.agent.obstacle_map import CELL
-from stages.kit.geometry.point_clouds import clusters
 
 TURNS = 6
 """Pictures of one turn."""

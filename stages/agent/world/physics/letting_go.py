@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.agent.world.physics.beliefs import HELD, Beliefs, Believed, Hold
+from scenewright.stages.agent.world.physics.hands import SAMPLES, SLOW, Motion, pointing
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.segments import Segment, whole_body
+from scenewright.stages.kit.simulation.robot import Configuration
 from scipy.spatial.transform import Rotation
-
-from stages.agent.world.physics.beliefs import HELD, Beliefs, Believed, Hold
-from stages.agent.world.physics.hands import SAMPLES, SLOW, Motion, pointing
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.segments import Segment, whole_body
-from stages.kit.simulation.robot import Configuration
 
 DROP = 0.15
 """Height over its target at which the thesis lets go [m]."""

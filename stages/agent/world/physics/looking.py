@@ -6,18 +6,27 @@ from itertools import product
 from math import atan2, cos, pi, sin
 
 import numpy as np
-
-from stages.agent.scene_map import quarter
-from stages.agent.senses import Base, Detection, Look, Position, Sweep
-from stages.agent.world.physics import head
-from stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Mask, Segmenter, Surface, fuse, seen_in
-from stages.agent.world.physics.fronts import PARTS, Front
-from stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
-from stages.agent.world.physics.seen import FOUND_WITHIN, Seen
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply, inverse, look_at
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.rendering.object_views import take
+from scenewright.stages.agent.scene_map import quarter
+from scenewright.stages.agent.senses import Base, Detection, Look, Position, Sweep
+from scenewright.stages.agent.world.physics import head
+from scenewright.stages.agent.world.physics.eyes import (
+    HEAD,
+    NEAR_BY,
+    STAINED,
+    WRIST,
+    Mask,
+    Segmenter,
+    Surface,
+    fuse,
+    seen_in,
+)
+from scenewright.stages.agent.world.physics.fronts import PARTS, Front
+from scenewright.stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
+from scenewright.stages.agent.world.physics.seen import FOUND_WITHIN, Seen
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.rendering.object_views import take
 
 VIEW = np.array([0.0, -0.9, 0.0, -2.2, 0.0, 2.1, 0.785])
 """Arm that holds the wrist camera over a surface in front, looking down by 45 degrees [rad]."""

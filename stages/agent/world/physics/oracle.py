@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.agent.world.physics.eyes import Mask
-from stages.agent.world.physics.room import Room
-from stages.kit.rendering.object_views import LEAST_PIXELS, Picture
-from stages.kit.rendering.segmenter_errors import SegmenterErrors
+from scenewright.stages.agent.world.physics.eyes import Mask
+from scenewright.stages.agent.world.physics.room import Room
+from scenewright.stages.kit.rendering.object_views import LEAST_PIXELS, Picture
+from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors
 
 
 class NoisyOracle:

@@ -9,18 +9,23 @@ from collections.abc import Iterator
 from math import atan2, pi
 
 import numpy as np
-
-from stages.agent.senses import Base, Felt, Position
-from stages.agent.world.physics.before_fronts import away_from, bases_before, bases_outside, before, sides_of
-from stages.agent.world.physics.driving import Driving
-from stages.agent.world.physics.fronts import PARTS, Front, front_seen
-from stages.agent.world.physics.looking import Looking
-from stages.agent.world.physics.robot_in_room import RobotInRoom, felt
-from stages.agent.world.physics.seen import Seen
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.motion.arcs import Arc, along_arc, arc_values
-from stages.kit.motion.arm_motion import ArmPlanner, Tally
-from stages.kit.motion.doors import (
+from scenewright.stages.agent.senses import Base, Felt, Position
+from scenewright.stages.agent.world.physics.before_fronts import (
+    away_from,
+    bases_before,
+    bases_outside,
+    before,
+    sides_of,
+)
+from scenewright.stages.agent.world.physics.driving import Driving
+from scenewright.stages.agent.world.physics.fronts import PARTS, Front, front_seen
+from scenewright.stages.agent.world.physics.looking import Looking
+from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom, felt
+from scenewright.stages.agent.world.physics.seen import Seen
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.motion.arcs import Arc, along_arc, arc_values
+from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.doors import (
     ContactPoint,
     body_from_moved,
     closing_direction,
@@ -29,12 +34,12 @@ from stages.kit.motion.doors import (
     open_value,
     push_points,
 )
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import forward
-from stages.kit.motion.rrt_connect import SearchSpace
-from stages.kit.motion.segments import Manipulation, Segment
-from stages.kit.simulation.robot import base_pose
-from stages.kit.simulation.shapes import joined, link_shapes
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import forward
+from scenewright.stages.kit.motion.rrt_connect import SearchSpace
+from scenewright.stages.kit.motion.segments import Manipulation, Segment
+from scenewright.stages.kit.simulation.robot import base_pose
+from scenewright.stages.kit.simulation.shapes import joined, link_shapes
 
 HEIGHT_OF_LOOK = 0.65
 """At which share of its height a side is looked at."""

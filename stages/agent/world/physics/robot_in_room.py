@@ -11,21 +11,20 @@ from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
-
-from stages.agent.senses import Base, Felt, FeltKind
-from stages.agent.world.events import EventLog
-from stages.agent.world.failures import Rates
-from stages.agent.world.physics.beliefs import Beliefs, Hold
-from stages.agent.world.physics.room import Room
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import forward
-from stages.kit.motion.physical_robot import PhysicalRobot
-from stages.kit.motion.robot_errors import encoder_errors
-from stages.kit.motion.segments import Segment, whole_body
-from stages.kit.rendering.segmenter_errors import Luck
-from stages.kit.simulation.robot import Configuration, base_pose
-from stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.agent.senses import Base, Felt, FeltKind
+from scenewright.stages.agent.world.events import EventLog
+from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.beliefs import Beliefs, Hold
+from scenewright.stages.agent.world.physics.room import Room
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import forward
+from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
+from scenewright.stages.kit.motion.robot_errors import encoder_errors
+from scenewright.stages.kit.motion.segments import Segment, whole_body
+from scenewright.stages.kit.rendering.segmenter_errors import Luck
+from scenewright.stages.kit.simulation.robot import Configuration, base_pose
+from scenewright.stages.kit.simulation.robot_description import load_robot
 
 TOOL_FROM_CAMERA = np.array([[0, -1, 0, 0.06], [1, 0, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]], float)
 LOOK_SECONDS = 3.0

@@ -7,15 +7,23 @@ from math import hypot
 
 import numpy as np
 import trimesh
-
-from schemas.apartment import Apartment, Furniture, Thing
-from schemas.base import as_transform
-from stages.agent.world.physics.doors import Doored, doored
-from stages.agent.world.physics.shapes import COLORS, joined, mesh_of, record_of, shape_of, slab, stained, urdf_of
-from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.motion.doors import body_from_moved, is_closed, open_value
-from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.kit.simulation.world import PhysicsWorld
+from scenewright.schemas.apartment import Apartment, Furniture, Thing
+from scenewright.schemas.base import as_transform
+from scenewright.stages.agent.world.physics.doors import Doored, doored
+from scenewright.stages.agent.world.physics.shapes import (
+    COLORS,
+    joined,
+    mesh_of,
+    record_of,
+    shape_of,
+    slab,
+    stained,
+    urdf_of,
+)
+from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.motion.doors import body_from_moved, is_closed, open_value
+from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 WALL_HEIGHT, WALL = 2.4, 0.05
 """Height and half thickness of walls [m]."""

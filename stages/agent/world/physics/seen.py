@@ -7,17 +7,16 @@ from dataclasses import replace
 from math import hypot
 
 import numpy as np
-
-from stages.agent.obstacle_map import ObstacleMap
-from stages.agent.senses import Base, Position, SeenFurniture
-from stages.agent.world.physics import head
-from stages.agent.world.physics.beliefs import Believed
-from stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
-from stages.agent.world.physics.fronts import WITH_DRAWERS, WITH_LEAVES, Front, footprint
-from stages.agent.world.physics.robot_in_room import RobotInRoom
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply
-from stages.kit.rendering.object_views import Picture
+from scenewright.stages.agent.obstacle_map import ObstacleMap
+from scenewright.stages.agent.senses import Base, Position, SeenFurniture
+from scenewright.stages.agent.world.physics import head
+from scenewright.stages.agent.world.physics.beliefs import Believed
+from scenewright.stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
+from scenewright.stages.agent.world.physics.fronts import WITH_DRAWERS, WITH_LEAVES, Front, footprint
+from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.rendering.object_views import Picture
 
 FOUND_WITHIN = 0.12
 """A surface this near to a position is meant by it [m]."""

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from schemas.apartment import Thing
-from schemas.base import Model, as_transform, as_vector
-from schemas.interactive_scene import SceneBody
-from schemas.outside import file_toml
-from schemas.scene_parts import Box, Joint
-from stages.kit.simulation.shapes import paint
+from scenewright.schemas.apartment import Thing
+from scenewright.schemas.base import Model, as_transform, as_vector
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.outside import file_toml
+from scenewright.schemas.scene_parts import Box, Joint
+from scenewright.stages.kit.simulation.shapes import paint
 
 SHAPES = Path(__file__).resolve().parents[4] / "data" / "agent" / "things.toml"
 COLORS = {

@@ -5,7 +5,7 @@ Formats: https://cocodataset.org/#format-data
 
 from __future__ import annotations
 
-from stages.export.registry import SequenceFormat
+from scenewright.stages.export.registry import SequenceFormat
 
 FORMAT = SequenceFormat(
     name="coco",

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.vocabulary import SemanticClass, load_vocabulary
-from stages.export.frames import ExportJob, FrameMasks
-from stages.export.pictures import picture_suffix
-from stages.kit.formats.masks import encode_panoptic_png, panoptic_name
-from stages.kit.formats.run_lengths import encode_rle
+from scenewright.schemas.vocabulary import SemanticClass, load_vocabulary
+from scenewright.stages.export.frames import ExportJob, FrameMasks
+from scenewright.stages.export.pictures import picture_suffix
+from scenewright.stages.kit.formats.masks import encode_panoptic_png, panoptic_name
+from scenewright.stages.kit.formats.run_lengths import encode_rle
 
 
 def write(job: ExportJob) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.export.registry import STREAMS, SequenceFormat
+from scenewright.stages.export.registry import STREAMS, SequenceFormat
 
 FORMAT = SequenceFormat(
     name="foxglove",

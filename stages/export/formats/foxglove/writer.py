@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stages.export.formats.foxglove import FORMAT
-from stages.export.frames import ExportJob
-from stages.kit.formats.frames import FrameWriter
+from scenewright.stages.export.formats.foxglove import FORMAT
+from scenewright.stages.export.frames import ExportJob
+from scenewright.stages.kit.formats.frames import FrameWriter
 
 
 def write(job: ExportJob) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.export.registry import SequenceFormat
+from scenewright.stages.export.registry import SequenceFormat
 
 FORMAT = SequenceFormat(
     name="nerfstudio",

@@ -6,10 +6,9 @@ import json
 from typing import Any
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.export.frames import ExportJob
-from stages.export.pictures import picture_suffix, write_depth_png
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.export.frames import ExportJob
+from scenewright.stages.export.pictures import picture_suffix, write_depth_png
 
 OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """OpenGL cameras look along -z with y up, ours along +z with y down."""

@@ -11,14 +11,13 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.export.formats.ros2 import FORMAT
-from stages.export.frames import ExportFrame, ExportJob
-from stages.export.pictures import picture_suffix
-from stages.kit.formats.frames import LABELS_METADATA, WORLD_FRAME, WORLD_METADATA
-from stages.kit.geometry.transforms import quaternion_of
-from stages.kit.ros2_bag import BagWriter, ros2_header, ros2_types
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.export.formats.ros2 import FORMAT
+from scenewright.stages.export.frames import ExportFrame, ExportJob
+from scenewright.stages.export.pictures import picture_suffix
+from scenewright.stages.kit.formats.frames import LABELS_METADATA, WORLD_FRAME, WORLD_METADATA
+from scenewright.stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.kit.ros2_bag import BagWriter, ros2_header, ros2_types
 
 IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO, TF_MESSAGE = "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"

@@ -5,7 +5,7 @@ Format: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats
 
 from __future__ import annotations
 
-from stages.export.registry import SequenceFormat
+from scenewright.stages.export.registry import SequenceFormat
 
 UNITS_PER_MILLIMETRE = 5
 """5000 depth units per metre."""

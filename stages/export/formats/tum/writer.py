@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.export.formats.tum import LARGEST_MILLIMETRES, UNITS_PER_MILLIMETRE
-from stages.export.frames import ExportJob
-from stages.export.pictures import picture_suffix, write_depth_png
-from stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.export.formats.tum import LARGEST_MILLIMETRES, UNITS_PER_MILLIMETRE
+from scenewright.stages.export.frames import ExportJob
+from scenewright.stages.export.pictures import picture_suffix, write_depth_png
+from scenewright.stages.kit.geometry.transforms import quaternion_of
 
 
 def depth_units(millimetres: np.ndarray) -> tuple[np.ndarray, int]:

@@ -1,7 +1,7 @@
 """Spark-DSG: scene graphs as Hydra keeps them."""
 
-from stages.export.scene_registry import SceneFormat
-from stages.kit.stage import Extra
+from scenewright.stages.export.scene_registry import SceneFormat
+from scenewright.stages.kit.stage import Extra
 
 FORMAT = SceneFormat(
     "hydra",

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import spark_dsg
+from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.export.scene_bodies import SceneToExport
+from scenewright.stages.export.scene_registry import Written
 from scipy.spatial.transform import Rotation
-
-from schemas.interactive_scene import SceneBody
-from schemas.vocabulary import load_vocabulary
-from stages.export.scene_bodies import SceneToExport
-from stages.export.scene_registry import Written
 
 ROOM = spark_dsg.NodeSymbol("R", 0)
 

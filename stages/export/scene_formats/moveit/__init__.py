@@ -1,6 +1,6 @@
 """MoveIt's planning scene as text, as `moveit_ros` loads it from a file."""
 
-from stages.export.scene_registry import SceneFormat
+from scenewright.stages.export.scene_registry import SceneFormat
 
 FORMAT = SceneFormat(
     "moveit",

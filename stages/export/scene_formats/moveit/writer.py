@@ -12,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
-from stages.export.scene_bodies import BodyToExport, SceneToExport
-from stages.export.scene_registry import Written
-from stages.kit.formats.link_meshes import GREY
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.urdf_file import Shape, numbers
-from stages.kit.geometry.transforms import inverse, quaternion_of
+from scenewright.stages.export.scene_bodies import BodyToExport, SceneToExport
+from scenewright.stages.export.scene_registry import Written
+from scenewright.stages.kit.formats.link_meshes import GREY
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.urdf_file import Shape, numbers
+from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of
 
 
 def write(folder: Path, scene: SceneToExport) -> Written:

@@ -1,6 +1,6 @@
 """SDF, for Gazebo and Drake."""
 
-from stages.export.scene_registry import SceneFormat
+from scenewright.stages.export.scene_registry import SceneFormat
 
 FORMAT = SceneFormat(
     "sdf",

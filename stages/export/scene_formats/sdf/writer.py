@@ -12,13 +12,12 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from scenewright.stages.export.scene_bodies import BodyToExport, SceneToExport
+from scenewright.stages.export.scene_registry import Written
+from scenewright.stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, number, numbers
+from scenewright.stages.kit.geometry.substances import SPINNING_FRICTION
+from scenewright.stages.kit.geometry.transforms import inverse
 from scipy.spatial.transform import Rotation
-
-from stages.export.scene_bodies import BodyToExport, SceneToExport
-from stages.export.scene_registry import Written
-from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, number, numbers
-from stages.kit.geometry.substances import SPINNING_FRICTION
-from stages.kit.geometry.transforms import inverse
 
 VERSION = "1.9"
 

@@ -1,7 +1,7 @@
 """OpenUSD with physics, for Isaac Sim, Omniverse and whatever reads UsdPhysics."""
 
-from stages.export.scene_registry import SceneFormat
-from stages.kit.stage import Extra
+from scenewright.stages.export.scene_registry import SceneFormat
+from scenewright.stages.kit.stage import Extra
 
 FORMAT = SceneFormat(
     "usd",

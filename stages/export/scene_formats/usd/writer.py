@@ -10,16 +10,15 @@ from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
+from scenewright.stages.export.scene_bodies import BodyToExport, SceneToExport
+from scenewright.stages.export.scene_registry import Written
+from scenewright.stages.kit.formats.link_meshes import Surface
+from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.urdf_file import Link, Shape, UrdfJoint
+from scenewright.stages.kit.geometry.solids import MassProperties
+from scenewright.stages.kit.geometry.transforms import quaternion_of, transform_from
+from scenewright.stages.kit.rendering.surfaces import srgb_to_linear
 from scipy.spatial.transform import Rotation
-
-from stages.export.scene_bodies import BodyToExport, SceneToExport
-from stages.export.scene_registry import Written
-from stages.kit.formats.link_meshes import Surface
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint
-from stages.kit.geometry.solids import MassProperties
-from stages.kit.geometry.transforms import quaternion_of, transform_from
-from stages.kit.rendering.surfaces import srgb_to_linear
 
 GRAVITY = 9.81
 WORLD = "/World"

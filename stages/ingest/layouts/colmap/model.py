@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.trajectories import read_text
-from stages.kit.geometry.transforms import inverse, transform_from_quaternion
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.trajectories import read_text
+from scenewright.stages.kit.geometry.transforms import inverse, transform_from_quaternion
 
 MODELS = {
     0: ("SIMPLE_PINHOLE", 3),

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.errors import BadInput
-from stages.ingest.folders.camera_groups import CameraGroup, grouped
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.camera_groups import CameraGroup, grouped
+from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     chosen_cameras,
@@ -27,11 +27,11 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
-from stages.ingest.folders.undistortion import PINHOLE, RecordedCamera, lens_of, overridden_recording
-from stages.ingest.layouts.colmap.model import ModelCamera, ModelImage, SparseModel, has_model, read_model
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
+from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.undistortion import PINHOLE, RecordedCamera, lens_of, overridden_recording
+from scenewright.stages.ingest.layouts.colmap.model import ModelCamera, ModelImage, SparseModel, has_model, read_model
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
 
 IMAGE_FOLDERS = ("images", "image", "rgb", "color")
 DENSE_MAPS = "stereo/depth_maps"

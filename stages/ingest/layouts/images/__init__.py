@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout("images", order=120, recognised_by="image files, or one video", reader=f"{__name__}.reader")

@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES
-from stages.ingest.folders.files import COLOR_SUFFIXES, DEPTH_SUFFIXES, files_of, images_by_stem, natural_key
-from stages.ingest.layouts.images.video_frames import SUFFIXES as VIDEO_SUFFIXES
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES
+from scenewright.stages.ingest.folders.files import (
+    COLOR_SUFFIXES,
+    DEPTH_SUFFIXES,
+    files_of,
+    images_by_stem,
+    natural_key,
+)
+from scenewright.stages.ingest.layouts.images.video_frames import SUFFIXES as VIDEO_SUFFIXES
 
 STEREO_FOLDERS = (
     ("left", "right"),

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput, UsageError
-from schemas.scene_parts import Camera
-from stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
+from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
@@ -28,18 +27,18 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
-from stages.ingest.folders.stamped_poses import LATEST_STAMP, StampedPoses
-from stages.ingest.images import depth_millimetres, usable_color
-from stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
-from stages.ingest.layouts.images.video_frames import VideoFrames
-from stages.ingest.lenses import Lens, lens_of
-from stages.ingest.messages.records import CalibrationRecord
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, StreamInfo, Unusable
-from stages.ingest.stereo import stereo_lenses
-from stages.kit.formats.foxglove import decode_color
-from stages.kit.formats.trajectories import number_rows
+from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
+from scenewright.stages.ingest.folders.stamped_poses import LATEST_STAMP, StampedPoses
+from scenewright.stages.ingest.images import depth_millimetres, usable_color
+from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
+from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
+from scenewright.stages.ingest.lenses import Lens, lens_of
+from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, StreamInfo, Unusable
+from scenewright.stages.ingest.stereo import stereo_lenses
+from scenewright.stages.kit.formats.foxglove import decode_color
+from scenewright.stages.kit.formats.trajectories import number_rows
 
 TIMES = ("times.txt", "timestamps.txt", "timestamp.txt")
 OPTIONS = ("fx", "fy", "cx", "cy")

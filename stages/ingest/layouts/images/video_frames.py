@@ -6,10 +6,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.source import Unusable
-from stages.kit.formats.image_headers import LARGEST_IMAGE
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE
 
 SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".webm")
 MOST_FRAMES = 10_000_000

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout("mcap", order=10, recognised_by="a file with the MCAP magic", reader=f"{__name__}.reader")

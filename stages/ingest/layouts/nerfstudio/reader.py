@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import opened
-from stages.ingest.folders.camera_groups import grouped
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.ingest.folders.camera_groups import grouped
+from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     all_intrinsics_given,
     chosen_cameras,
@@ -33,12 +32,12 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
-from stages.ingest.folders.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
-from stages.ingest.layouts.nerfstudio import replica
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.geometry.transforms import inverse, is_rigid
+from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
+from scenewright.stages.ingest.layouts.nerfstudio import replica
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.geometry.transforms import inverse, is_rigid
 
 NAMES = ("transforms.json", "transforms_train.json")
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.files import (
     camera_from_options,
     depth_image_size,
     depth_units,
@@ -20,9 +20,9 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.trajectories import number_rows
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.formats.trajectories import number_rows
 
 TRAJECTORY, RESULTS, CAMERA = "traj.txt", "results", "cam_params.json"
 UNITS_PER_METRE = 6553.5

@@ -9,10 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.folders.calibration_files import calibration_file
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.calibration_files import calibration_file
+from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     camera_from_options,
@@ -26,10 +25,10 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.folders.pose_files import columns_of
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.trajectories import number_rows, transform_from_numbers
+from scenewright.stages.ingest.folders.pose_files import columns_of
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.formats.trajectories import number_rows, transform_from_numbers
 
 COLOR_FOLDERS = ("color", "rgb", "image")
 POSES = ("pose.txt", "poses.txt")

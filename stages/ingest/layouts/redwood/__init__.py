@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout(
     "redwood", order=100, recognised_by="image|color|rgb/, depth/ and trajectory.log", reader=f"{__name__}.reader"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     depth_image_size,
@@ -21,9 +21,9 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.trajectories import read_open3d_log
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.formats.trajectories import read_open3d_log
 
 COLOR_FOLDERS = ("image", "color", "rgb")
 TRAJECTORY = "trajectory.log"

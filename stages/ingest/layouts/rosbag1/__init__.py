@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout("rosbag1", order=20, recognised_by="a file with the magic of ROS bags", reader=f"{__name__}.reader")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout(
     "rosbag2", order=30, recognised_by="a folder with metadata.yaml, or an SQLite file", reader=f"{__name__}.reader"

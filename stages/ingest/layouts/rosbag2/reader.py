@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from stages.ingest.messages.message_source import open_messages
-from stages.ingest.messages.opening import container_of
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import LogSource
+from scenewright.stages.ingest.messages.message_source import open_messages
+from scenewright.stages.ingest.messages.opening import container_of
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import LogSource
 
 
 def matches(path: Path) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout(
     "scannet", order=50, recognised_by="color/, depth/, pose/ and intrinsic/ or _info.txt", reader=f"{__name__}.reader"

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.color_registration import registered_loader
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.color_registration import registered_loader
+from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     color_image_size,
@@ -30,10 +29,10 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.images import usable_color, usable_depth
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
-from stages.kit.formats.trajectories import read_matrix, read_text
+from scenewright.stages.ingest.images import usable_color, usable_depth
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
+from scenewright.stages.kit.formats.trajectories import read_matrix, read_text
 
 INTRINSIC_FILES = ("intrinsic/intrinsic_depth.txt", "intrinsic_depth.txt")
 INFO = "_info.txt"

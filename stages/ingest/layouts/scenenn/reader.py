@@ -11,10 +11,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     all_intrinsics_given,
@@ -30,9 +29,9 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.trajectories import read_numbered_open3d_log, read_text
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.formats.trajectories import read_numbered_open3d_log, read_text
 
 COLOR_FOLDERS = ("image", "rgb")
 TRAJECTORY, TIMES = "trajectory.log", "timestamp.txt"

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout("7scenes", order=90, recognised_by="frame-<number>.depth.png files", reader=f"{__name__}.reader")

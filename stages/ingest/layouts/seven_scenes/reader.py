@@ -6,15 +6,14 @@ import re
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from stages.ingest.color_registration import registered_loader
-from stages.ingest.folders.files import depth_image_size, depth_units, image_loader, overridden, stream
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.trajectories import read_matrix
-from stages.kit.geometry.transforms import transform_from
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.color_registration import registered_loader
+from scenewright.stages.ingest.folders.files import depth_image_size, depth_units, image_loader, overridden, stream
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.formats.trajectories import read_matrix
+from scenewright.stages.kit.geometry.transforms import transform_from
 
 FILE = re.compile(r"frame-(\d+)\.(color|depth|pose)\.(jpg|jpeg|png|txt)$")
 DEFAULT_FOCAL_LENGTH, DEFAULT_CENTER = 585.0, (320.0, 240.0)

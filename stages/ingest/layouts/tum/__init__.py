@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stages.ingest.registry import LogLayout
+from scenewright.stages.ingest.registry import LogLayout
 
 LAYOUT = LogLayout("tum", order=80, recognised_by="rgb.txt, or a file of associations", reader=f"{__name__}.reader")

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.ingest.association import mutual_nearest
-from stages.ingest.folders.files import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.association import mutual_nearest
+from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
@@ -28,12 +27,12 @@ from stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
-from stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
-from stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.trajectories import read_text
+from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
+from scenewright.stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.kit.formats.trajectories import read_text
 
 COLOR_LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
 ASSOCIATIONS = ("associated.txt", "associations.txt", "association.txt", "associate.txt")

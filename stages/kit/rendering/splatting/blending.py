@@ -10,8 +10,7 @@ import math
 
 import numba
 import numpy as np
-
-from stages.kit.rendering.splatting import rasterizer
+from scenewright.stages.kit.rendering.splatting import rasterizer
 
 TILE = 16
 """Edge of a tile [px]."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.rendering.splatting.blending import TILE, blend, blend_back, gathered, list_tiles
-from stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
-from stages.kit.rendering.splatting.harmonics import view_basis
-from stages.kit.rendering.splatting.projection import project, project_back
-from stages.kit.rendering.splatting.rasterizer import Picture, View, direction_limits
+from scenewright.stages.kit.rendering.splatting.blending import TILE, blend, blend_back, gathered, list_tiles
+from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
+from scenewright.stages.kit.rendering.splatting.harmonics import view_basis
+from scenewright.stages.kit.rendering.splatting.projection import project, project_back
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, View, direction_limits
 
 
 class CompiledRasterizer:

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 import torch
-
-from schemas.errors import MissingDependency
-from stages.kit.rendering.splatting import rasterizer
-from stages.kit.rendering.splatting.compiled import CompiledRasterizer
-from stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
-from stages.kit.rendering.splatting.harmonics import view_basis
-from stages.kit.rendering.splatting.rasterizer import Drawn, Picture, View
-from stages.kit.rendering.splatting.reference import moved
+from scenewright.schemas.errors import MissingDependency
+from scenewright.stages.kit.rendering.splatting import rasterizer
+from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
+from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
+from scenewright.stages.kit.rendering.splatting.harmonics import view_basis
+from scenewright.stages.kit.rendering.splatting.rasterizer import Drawn, Picture, View
+from scenewright.stages.kit.rendering.splatting.reference import moved
 
 
 class GpuRasterizer:

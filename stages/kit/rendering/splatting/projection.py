@@ -10,8 +10,7 @@ import math
 
 import numba
 import numpy as np
-
-from stages.kit.rendering.splatting import rasterizer
+from scenewright.stages.kit.rendering.splatting import rasterizer
 
 DILATION, NEAR, SMALLEST_ALPHA = rasterizer.DILATION, rasterizer.NEAR, rasterizer.SMALLEST_ALPHA
 CHUNK = 256

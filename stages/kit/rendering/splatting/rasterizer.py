@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
 
 DILATION = 0.3
 """Added to both variances in the picture [px^2]."""

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-
-from stages.kit.rendering.splatting import rasterizer
-from stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
-from stages.kit.rendering.splatting.harmonics import view_basis
-from stages.kit.rendering.splatting.rasterizer import Picture, View
+from scenewright.stages.kit.rendering.splatting import rasterizer
+from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
+from scenewright.stages.kit.rendering.splatting.harmonics import view_basis
+from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, View
 
 TILE = 16
 """Edge of the squares of pixels that are blended at a time [px]."""

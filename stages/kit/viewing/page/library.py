@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from importlib.resources import files
 
-from schemas.errors import MissingDependency
+from scenewright.schemas.errors import MissingDependency
 
 TEMPLATE = ("resources", "templates", "viewer.zip")
 PAGE = "viewer.html.template"

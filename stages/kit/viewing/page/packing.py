@@ -8,8 +8,7 @@ import hashlib
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from stages.kit.geometry.cells import cell_keys
+from scenewright.stages.kit.geometry.cells import cell_keys
 
 STEPS = 65_535
 """Of a coordinate, between the least and the largest of its mesh: 0.15 mm over 10 m."""

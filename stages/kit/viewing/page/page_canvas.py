@@ -14,17 +14,16 @@ from typing import Any
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
-
-from schemas.errors import BadInput, MachineFailure
-from schemas.plain_text import cleaned
-from schemas.scene_parts import Box, Camera
-from stages.kit.formats.foxglove import PNG_START
-from stages.kit.geometry.boxes import box_corners
-from stages.kit.geometry.cells import cell_keys
-from stages.kit.geometry.transforms import apply
-from stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_color, vertex_colors
-from stages.kit.viewing.page.library import three_js
-from stages.kit.viewing.page.packing import STEPS, Block, thinned_mesh
+from scenewright.schemas.errors import BadInput, MachineFailure
+from scenewright.schemas.plain_text import cleaned
+from scenewright.schemas.scene_parts import Box, Camera
+from scenewright.stages.kit.formats.foxglove import PNG_START
+from scenewright.stages.kit.geometry.boxes import box_corners
+from scenewright.stages.kit.geometry.cells import cell_keys
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_color, vertex_colors
+from scenewright.stages.kit.viewing.page.library import three_js
+from scenewright.stages.kit.viewing.page.packing import STEPS, Block, thinned_mesh
 
 FOLDER = Path(__file__).resolve().parent
 LARGEST_PAGE = 15_000_000

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.agent_episode import AgentEpisode
-from stages.report.section import Section
+from scenewright.schemas.agent_episode import AgentEpisode
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "agent",

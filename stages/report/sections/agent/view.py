@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.agent_episode import AgentEpisode, EpisodeTurn
-from stages.report.images import animation, from_file
-from stages.report.page import Page
+from scenewright.schemas.agent_episode import AgentEpisode, EpisodeTurn
+from scenewright.stages.report.images import animation, from_file
+from scenewright.stages.report.page import Page
 
 WIDTH, MOST_ROWS = 1100, 80
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from stages.report.section import Section
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "cad",

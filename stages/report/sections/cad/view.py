@@ -6,19 +6,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene, Replacement
-from schemas.ground_truth import GroundTruth
-from schemas.panoptic_map import PanopticMap
-from schemas.sequence import Sequence
-from stages.report.candidates import object_views
-from stages.report.global_check import checked_scenes
-from stages.report.page import Page
-from stages.report.placed_models import ModelShelf
-from stages.report.room import DrawnView, draw
-from stages.report.surfaces import cad_model, true_model
-from stages.report.views import View, top_view
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import CadScene, Replacement
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.report.candidates import object_views
+from scenewright.stages.report.global_check import checked_scenes
+from scenewright.stages.report.page import Page
+from scenewright.stages.report.placed_models import ModelShelf
+from scenewright.stages.report.room import DrawnView, draw
+from scenewright.stages.report.surfaces import cad_model, true_model
+from scenewright.stages.report.views import View, top_view
 
 
 def view(page: Page) -> dict[str, Any] | None:

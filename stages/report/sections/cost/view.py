@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from stages.report.page import Page
+from scenewright.stages.report.page import Page
 
 
 def view(page: Page) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.cutting_plan import CuttingPlan, CuttingTrial
-from stages.report.section import Section
+from scenewright.schemas.cutting_plan import CuttingPlan, CuttingTrial
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "cutting",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.artifact import Artifact
-from schemas.cutting_plan import CuttingPlan, CuttingTrial
-from schemas.outside import LARGEST_SHOWN, file_text
-from stages.report.images import Picture, from_file
-from stages.report.page import Page
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.cutting_plan import CuttingPlan, CuttingTrial
+from scenewright.schemas.outside import LARGEST_SHOWN, file_text
+from scenewright.stages.report.images import Picture, from_file
+from scenewright.stages.report.page import Page
 
 WIDTH = 1100
 """Of pictures, at most [px]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.evaluation import Evaluation
-from stages.report.section import Section
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.stages.report.section import Section
 
 SECTION = Section("figures", "Figures", order=110, reads={"evaluation": Evaluation, "baseline_evaluation": Evaluation})

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.evaluation import Evaluation
-from stages.report.figures import GROUPS, all_metrics, metric_groups, read_plots, read_tables
-from stages.report.page import Page
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.stages.report.figures import GROUPS, all_metrics, metric_groups, read_plots, read_tables
+from scenewright.stages.report.page import Page
 
 HEADLINES = (
     "counts/frames",

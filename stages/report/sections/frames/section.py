@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.ground_truth import GroundTruth
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.trajectory import Trajectory
-from stages.report.section import Section
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "frames",

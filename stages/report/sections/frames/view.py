@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from stages.report.frames import frame_views
-from stages.report.page import Page
+from scenewright.schemas.segments import Segments
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.report.frames import frame_views
+from scenewright.stages.report.page import Page
 
 
 def view(page: Page) -> dict[str, Any] | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.contact_graph import ContactGraph
-from stages.report.section import Section
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "graph",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.contact_graph import ContactGraph
-from schemas.errors import BadInput
-from schemas.evaluation import Evaluation
-from stages.report.graph_drawing import draw_graph, marks_from_evaluation
-from stages.report.page import Page
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.evaluation import Evaluation
+from scenewright.stages.report.graph_drawing import draw_graph, marks_from_evaluation
+from scenewright.stages.report.page import Page
 
 
 def view(page: Page) -> dict[str, Any] | None:

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stages.report.section import Section
+from scenewright.stages.report.section import Section
 
 SECTION = Section("made", "How it was made", order=130)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.manifest import CONVENTIONS
-from stages.report.page import Page
+from scenewright.schemas.manifest import CONVENTIONS
+from scenewright.stages.report.page import Page
 
 
 def view(page: Page) -> dict[str, Any]:

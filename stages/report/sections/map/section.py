@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.panoptic_map import PanopticMap
-from stages.report.section import Section
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "map", "Map", order=30, reads={"panoptic_map": PanopticMap}, became={"panoptic_map": "a labelled map"}

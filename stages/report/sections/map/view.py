@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.panoptic_map import PanopticMap
-from stages.report.page import Page
-from stages.report.room import draw
-from stages.report.views import top_view
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.report.page import Page
+from scenewright.stages.report.room import draw
+from scenewright.stages.report.views import top_view
 
 
 def view(page: Page) -> dict[str, Any] | None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.cad_scene import CadScene
-from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from stages.report.section import Section
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "outlook",

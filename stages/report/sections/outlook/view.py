@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from stages.report.outlook import Facts, outlook
-from stages.report.page import Page
+from scenewright.stages.report.outlook import Facts, outlook
+from scenewright.stages.report.page import Page
 
 
 def view(page: Page) -> dict[str, Any] | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.packing import Packing
-from stages.report.section import Section
+from scenewright.schemas.packing import Packing
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "packing",

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from schemas.packing import Packing, PackingAttempt
-from stages.report.images import Picture, from_file
-from stages.report.page import Page
+from scenewright.schemas.packing import Packing, PackingAttempt
+from scenewright.stages.report.images import Picture, from_file
+from scenewright.stages.report.page import Page
 
 WIDTH = 1100
 """Of pictures, at most [px]."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.plan import Plan
-from stages.report.section import Section
+from scenewright.schemas.plan import Plan
+from scenewright.stages.report.section import Section
 
 BECAME = {
     "executed": "a plan that a robot executed",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.plan import Plan
-from stages.report.acting import plan_view
-from stages.report.page import Page
+from scenewright.schemas.plan import Plan
+from scenewright.stages.report.acting import plan_view
+from scenewright.stages.report.page import Page
 
 WIDTH = 640
 

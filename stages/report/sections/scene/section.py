@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.interactive_scene import InteractiveScene
-from stages.report.section import Section
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "scene",

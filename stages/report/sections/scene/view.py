@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.errors import BadInput
-from schemas.interactive_scene import InteractiveScene
-from stages.report.acting import body_rows
-from stages.report.kinematic_tree import Corresponding, corresponding_trees, read_joints
-from stages.report.page import Page
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.report.acting import body_rows
+from scenewright.stages.report.kinematic_tree import Corresponding, corresponding_trees, read_joints
+from scenewright.stages.report.page import Page
 
 
 def view(page: Page) -> dict[str, Any] | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.splat import SplatViews
-from stages.report.section import Section
+from scenewright.schemas.splat import SplatViews
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "splat",

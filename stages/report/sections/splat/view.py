@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.splat import SplatViews
-from stages.report.images import animation, from_file
-from stages.report.page import Page
+from scenewright.schemas.splat import SplatViews
+from scenewright.stages.report.images import animation, from_file
+from scenewright.stages.report.page import Page
 
 WIDTH, MOST_PICTURES = 1100, 4
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.disparity import Disparity
-from stages.report.section import Section
+from scenewright.schemas.disparity import Disparity
+from scenewright.stages.report.section import Section
 
 SECTION = Section("stereo", "Stereo", order=20, reads={"sequence": Disparity})

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from schemas.disparity import Disparity, RowReport
-from stages.kit.formats.disparity_file import DisparityReader
-from stages.kit.formats.frames import FrameReader
-from stages.kit.stereo.pictures import confidence_colors, disparity_colors
-from stages.report.frames import choose_frames
-from stages.report.images import Picture, jpeg
-from stages.report.page import Page
+from scenewright.schemas.disparity import Disparity, RowReport
+from scenewright.stages.kit.formats.disparity_file import DisparityReader
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.stereo.pictures import confidence_colors, disparity_colors
+from scenewright.stages.report.frames import choose_frames
+from scenewright.stages.report.images import Picture, jpeg
+from scenewright.stages.report.page import Page
 
 MOST_FRAMES = 3
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.suture_needle import SutureNeedle, SutureThread
-from schemas.suture_trial import SutureEvaluation, SutureTrial
-from stages.report.section import Section
+from scenewright.schemas.suture_needle import SutureNeedle, SutureThread
+from scenewright.schemas.suture_trial import SutureEvaluation, SutureTrial
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "suture",

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.artifact import Artifact
-from schemas.outside import LARGEST_SHOWN, file_text
-from schemas.suture_needle import NeedleFrame, SutureNeedle, SutureThread
-from schemas.suture_trial import SutureEvaluation, SutureRun, SutureTrial
-from stages.report.images import Picture, from_file
-from stages.report.page import Page
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.outside import LARGEST_SHOWN, file_text
+from scenewright.schemas.suture_needle import NeedleFrame, SutureNeedle, SutureThread
+from scenewright.schemas.suture_trial import SutureEvaluation, SutureRun, SutureTrial
+from scenewright.stages.report.images import Picture, from_file
+from scenewright.stages.report.page import Page
 
 WIDTH = 1100
 """Of pictures, at most [px]."""

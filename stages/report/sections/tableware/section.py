@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewarePlan
-from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
-from stages.report.section import Section
+from scenewright.schemas.tableware_detections import TablewareDetections
+from scenewright.schemas.tableware_plan import TablewarePlan
+from scenewright.schemas.tableware_trial import TablewareEvaluation, TablewareTrial
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "tableware",

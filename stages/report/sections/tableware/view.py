@@ -6,11 +6,11 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewarePlan
-from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
-from stages.report.images import Picture, animation, from_file
-from stages.report.page import Page
+from scenewright.schemas.tableware_detections import TablewareDetections
+from scenewright.schemas.tableware_plan import TablewarePlan
+from scenewright.schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
+from scenewright.stages.report.images import Picture, animation, from_file
+from scenewright.stages.report.page import Page
 
 WIDTH = 1100
 """Of pictures, at most [px]."""

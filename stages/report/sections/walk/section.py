@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from stages.report.section import Section
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "walk",

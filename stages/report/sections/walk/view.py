@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.interactive_scene import InteractiveScene
-from schemas.panoptic_map import PanopticMap
-from stages.kit.viewing.canvas import SHELL
-from stages.kit.viewing.graphs import DRAWN, draw_graph
-from stages.kit.viewing.maps import LAYERS, draw_panoptic_map
-from stages.kit.viewing.page.page_canvas import PageCanvas, script_digests
-from stages.kit.viewing.scenes import draw_settling, trust_of_models
-from stages.report.page import Page
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.viewing.canvas import SHELL
+from scenewright.stages.kit.viewing.graphs import DRAWN, draw_graph
+from scenewright.stages.kit.viewing.maps import LAYERS, draw_panoptic_map
+from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas, script_digests
+from scenewright.stages.kit.viewing.scenes import draw_settling, trust_of_models
+from scenewright.stages.report.page import Page
 
 LARGEST = 9_000_000
 """Bytes of the page within the page: the pictures want the rest of 15 MB."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
-from schemas.learned_domain import LearnedDomain
-from stages.report.section import Section
+from scenewright.schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
+from scenewright.schemas.learned_domain import LearnedDomain
+from scenewright.stages.report.section import Section
 
 SECTION = Section(
     "words",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from schemas.artifact import Artifact
-from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
-from schemas.learned_domain import LearnedDomain, LearnedDomainFile
-from schemas.outside import LARGEST_SHOWN, file_text
-from stages.report.images import Picture, from_file
-from stages.report.page import Page
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
+from scenewright.schemas.learned_domain import LearnedDomain, LearnedDomainFile
+from scenewright.schemas.outside import LARGEST_SHOWN, file_text
+from scenewright.stages.report.images import Picture, from_file
+from scenewright.stages.report.page import Page
 
 WIDTH = 1100
 """Of pictures, at most [px]."""

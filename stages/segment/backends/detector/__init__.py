@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pydantic import Field
-
-from stages.kit.stage import Extra, Parameters
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.kit.stage import Extra, Parameters
+from scenewright.stages.segment.registry import BackendDeclaration
 
 
 class DetectorParameters(Parameters):

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from schemas.vocabulary import SemanticClass
+from scenewright.schemas.vocabulary import SemanticClass
 
 CONFIRMING_SHARE = 0.3
 """The witness confirms a detection when it gives this share of its mask a name of the same kind, ..."""

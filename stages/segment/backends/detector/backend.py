@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-
-from schemas.errors import MissingDependency
-from schemas.sequence import SequenceFile
-from schemas.vocabulary import UNNAMED, SemanticClass, Vocabulary, load_vocabulary
-from stages.kit.class_extents import extent_of, is_plausible
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.segment.backends.detector import DetectorParameters
-from stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
-from stages.segment.backends.detector.box_masks import box_mask, frame_geometry
-from stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
-from stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
-from stages.segment.backends.detector.yolox import Detections, Detector
-from stages.segment.choice import BackendRequest
-from stages.segment.coco import COCO_NAMES
-from stages.segment.geometric import GeometricFrame, GeometricSettings, pixels_at, segment_depth
-from stages.segment.panoptic import PanopticFrame, PanopticMask
-from stages.segment.settings import geometric_settings
+from scenewright.schemas.errors import MissingDependency
+from scenewright.schemas.sequence import SequenceFile
+from scenewright.schemas.vocabulary import UNNAMED, SemanticClass, Vocabulary, load_vocabulary
+from scenewright.stages.kit.class_extents import extent_of, is_plausible
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.segment.backends.detector import DetectorParameters
+from scenewright.stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
+from scenewright.stages.segment.backends.detector.box_masks import box_mask, frame_geometry
+from scenewright.stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
+from scenewright.stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
+from scenewright.stages.segment.backends.detector.yolox import Detections, Detector
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.coco import COCO_NAMES
+from scenewright.stages.segment.geometric import GeometricFrame, GeometricSettings, pixels_at, segment_depth
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.settings import geometric_settings
 
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
 """A box around a part of these is still a detection of the whole: one face fills most of the box."""

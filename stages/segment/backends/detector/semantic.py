@@ -8,8 +8,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.errors import BadInput, MissingDependency
 
 VOC_NAMES = (
     "background",

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
-from stages.segment.coco import COCO_NAMES
-from stages.segment.suppression import suppress
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.stages.segment.coco import COCO_NAMES
+from scenewright.stages.segment.suppression import suppress
 
 STRIDES = (8, 16, 32)
 PAD_VALUE = 114

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.segment.registry import BackendDeclaration
 
 BACKEND = BackendDeclaration(name="geometric", summary="every geometric segment is an `object`", order=20, apart=True)

@@ -7,12 +7,11 @@ geometry alone can do.
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame, pixels_at
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 
 class GeometricBackend:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
-
-from stages.kit.stage import Parameters
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.registry import BackendDeclaration
 
 
 class GroundTruthParameters(Parameters):

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.sequence import SequenceFile
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.kit.geometry.transforms import apply
-from stages.segment.backends.ground_truth import GroundTruthParameters
-from stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
-from stages.segment.backends.ground_truth.lasting import LastingErrors, View
-from stages.segment.backends.ground_truth.lasting_rates import RATES
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.sequence import SequenceFile
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.segment.backends.ground_truth import GroundTruthParameters
+from scenewright.stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
+from scenewright.stages.segment.backends.ground_truth.lasting import LastingErrors, View
+from scenewright.stages.segment.backends.ground_truth.lasting_rates import RATES
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 
 class GroundTruthBackend:

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 FLIP_AT_ONE = 0.5
 MISS_AT_ONE = 0.3

@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-
-from stages.kit.rendering.segmenter_errors import Luck, view_region
-from stages.segment.backends.ground_truth.corruption import displace_boundaries
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.kit.rendering.segmenter_errors import Luck, view_region
+from scenewright.stages.segment.backends.ground_truth.corruption import displace_boundaries
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 CELL = 0.5
 """Edge of the cubes of which each is one place for a false mask [m]."""

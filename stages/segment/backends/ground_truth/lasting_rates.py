@@ -7,7 +7,7 @@ one, which only few sights can do, both have the greater value.
 
 from __future__ import annotations
 
-from stages.segment.backends.ground_truth.lasting import Alike, LastingRates
+from scenewright.stages.segment.backends.ground_truth.lasting import Alike, LastingRates
 
 RATES = {
     "detector": LastingRates(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pydantic import Field
-
-from stages.kit.labels import LABEL_TABLES
-from stages.kit.stage import Extra, Parameters
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.kit.labels import LABEL_TABLES
+from scenewright.stages.kit.stage import Extra, Parameters
+from scenewright.stages.segment.registry import BackendDeclaration
 
 
 class HuggingFaceParameters(Parameters):

@@ -7,19 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency, UsageError
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.kit.formats.transformers_folder import read_config, short_name
-from stages.kit.labels import LabelSet, parse_words, read_label_file
-from stages.segment.backends.huggingface import HuggingFaceParameters
-from stages.segment.backends.huggingface.open_vocabulary import OpenVocabularySegmenter
-from stages.segment.backends.huggingface.panoptic import FAMILIES, PanopticSegmenter
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame, pixels_at
-from stages.segment.naming import name_instances, name_segments
-from stages.segment.panoptic import PanopticFrame
+from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.formats.transformers_folder import read_config, short_name
+from scenewright.stages.kit.labels import LabelSet, parse_words, read_label_file
+from scenewright.stages.segment.backends.huggingface import HuggingFaceParameters
+from scenewright.stages.segment.backends.huggingface.open_vocabulary import OpenVocabularySegmenter
+from scenewright.stages.segment.backends.huggingface.panoptic import FAMILIES, PanopticSegmenter
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
+from scenewright.stages.segment.naming import name_instances, name_segments
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 GROUNDING = "grounding-dino"
 MASKS = "sam"

@@ -8,18 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.transformers_folder import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
     load_tokenizer,
     processor_class,
     short_name,
 )
-from stages.kit.labels import Label
-from stages.segment.naming import InstanceMask
-from stages.segment.suppression import suppress
+from scenewright.stages.kit.labels import Label
+from scenewright.stages.segment.naming import InstanceMask
+from scenewright.stages.segment.suppression import suppress
 
 MOST_TOKENS = 200
 """Tokens of one prompt; published models read 256. Longer lists of words are asked in several goes."""

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.transformers_folder import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
     load_tokenizer,
@@ -19,8 +18,8 @@ from stages.kit.formats.transformers_folder import (
     short_name,
     transformers_library,
 )
-from stages.kit.labels import LabelSet, match_labels
-from stages.segment.naming import NamedSegment
+from scenewright.stages.kit.labels import LabelSet, match_labels
+from scenewright.stages.segment.naming import NamedSegment
 
 OVERLAP_SHARE = 0.8
 """A segment of which others leave less than this is dropped (the value of the published models)."""

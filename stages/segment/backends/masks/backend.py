@@ -6,20 +6,19 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.vocabulary import load_vocabulary
-from stages.kit.declared import declared_in
-from stages.kit.formats.frames import Frame
-from stages.kit.labels import ANYTHING, Label, LabelSet, match_labels, read_label_file
-from stages.segment.backends.masks import MasksParameters
-from stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
-from stages.segment.backends.masks.listing import HINT, Listing
-from stages.segment.backends.masks.matching import WAYS, match_pictures
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame, pixels_at
-from stages.segment.naming import NamedSegment, name_segments
-from stages.segment.panoptic import PanopticFrame
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.labels import ANYTHING, Label, LabelSet, match_labels, read_label_file
+from scenewright.stages.segment.backends.masks import MasksParameters
+from scenewright.stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
+from scenewright.stages.segment.backends.masks.listing import HINT, Listing
+from scenewright.stages.segment.backends.masks.matching import WAYS, match_pictures
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
+from scenewright.stages.segment.naming import NamedSegment, name_segments
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 UNCLASSED = Label(name=ANYTHING, class_name=ANYTHING)
 
@@ -136,7 +135,7 @@ class MasksBackend:
 
 def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
     """Return the format of a folder and its masks. Raises BadInput when it is of none, or broken."""
-    formats = declared_in("stages.segment.backends.masks.formats", MaskFormat, "FORMAT")
+    formats = declared_in("scenewright.stages.segment.backends.masks.formats", MaskFormat, "FORMAT")
     for form in formats:
         source = form.open(listing)
         if source is not None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.errors import BadInput
-from schemas.outside import LARGEST_SETTINGS, file_text
-from stages.segment.backends.masks.given import Category, entry
-from stages.segment.backends.masks.listing import Listing
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_text
+from scenewright.stages.segment.backends.masks.given import Category, entry
+from scenewright.stages.segment.backends.masks.listing import Listing
 
 LONGEST_NAME = 200
 HINT = 'classes.json: {"1": "chair", "2": "wall"}, or classes.txt with a line `1 chair` for each'

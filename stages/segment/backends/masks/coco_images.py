@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.errors import BadInput
-from stages.segment.backends.masks.given import Picture, entry, stem_of
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.masks.given import Picture, entry, stem_of
 
 
 def pictures_by_id(data: Any, where: str) -> dict[int, Picture]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from schemas.errors import BadInput
-from stages.kit.formats.run_lengths import decode_rle
-from stages.segment.backends.masks.given import MOST_PIXELS, GivenFrame, GivenMask, ReadSettings
-from stages.segment.backends.masks.overlapping import flatten
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.run_lengths import decode_rle
+from scenewright.stages.segment.backends.masks.given import MOST_PIXELS, GivenFrame, GivenMask, ReadSettings
+from scenewright.stages.segment.backends.masks.overlapping import flatten
 
 
 def flatten_encoded(

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from stages.segment.backends.masks.listing import Listing
+from scenewright.stages.segment.backends.masks.listing import Listing
 
 MOST_PIXELS = 2**30
 """Pixels of all masks of one frame together: 3495 masks of 640x480."""

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
-from stages.kit.formats.image_headers import image_size, may_be_decoded
-from stages.kit.formats.masks import decode_panoptic_png
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.image_headers import image_size, may_be_decoded
+from scenewright.stages.kit.formats.masks import decode_panoptic_png
 
 LARGEST_PNG = 512 * 2**20
 """Bytes."""

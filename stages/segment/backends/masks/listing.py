@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import Any, NoReturn
 
-from schemas.errors import BadInput
-from schemas.outside import file_content
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
 
 LARGEST_JSON = 512 * 2**20
 """Bytes."""

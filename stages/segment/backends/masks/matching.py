@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.segment.backends.masks.given import Picture
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.masks.given import Picture
 
 NAME = re.compile(r"\d{6,9}", re.ASCII)
 """A frame's name in artifacts: its number in the sequence with six digits."""

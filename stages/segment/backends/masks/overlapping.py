@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from stages.segment.backends.masks.given import GivenFrame, GivenMask, ReadSettings
-from stages.segment.naming import KEPT_SHARE, SAME_OVERLAP
+from scenewright.stages.segment.backends.masks.given import GivenFrame, GivenMask, ReadSettings
+from scenewright.stages.segment.naming import KEPT_SHARE, SAME_OVERLAP
 
 
 def flatten(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.segment.registry import BackendDeclaration
 
 BACKEND = BackendDeclaration(
     name="network",

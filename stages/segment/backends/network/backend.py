@@ -9,18 +9,24 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-from schemas.errors import UsageError
-from schemas.scene_parts import Camera
-from schemas.sequence import SequenceFile
-from schemas.vocabulary import UNNAMED, Vocabulary, load_vocabulary
-from stages.kit.formats.frames import Frame, FrameReader
-from stages.segment.backends.network.features import STRIDE, Mount, features, input_camera, mount_of_pose, resized
-from stages.segment.backends.network.grouping import GroupingSettings, Named, group, raise_to_depth
-from stages.segment.backends.network.weights import BUNDLED, Checkpoint, load_checkpoint
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame
-from stages.segment.panoptic import PanopticFrame
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.sequence import SequenceFile
+from scenewright.schemas.vocabulary import UNNAMED, Vocabulary, load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.segment.backends.network.features import (
+    STRIDE,
+    Mount,
+    features,
+    input_camera,
+    mount_of_pose,
+    resized,
+)
+from scenewright.stages.segment.backends.network.grouping import GroupingSettings, Named, group, raise_to_depth
+from scenewright.stages.segment.backends.network.weights import BUNDLED, Checkpoint, load_checkpoint
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 LEAST_CONTRAST = 4.0
 """Standard deviation of the brightest channel (0..255) under which a picture shows nothing."""

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
-from stages.segment.geometric import smooth_depth
-from stages.segment.normals import surface_normals
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.segment.geometric import smooth_depth
+from scenewright.stages.segment.normals import surface_normals
 
 INPUT_WIDTH = 320
 """Images are brought to this width [pixels]."""

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.network.features import STRIDE
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.backends.network.features import STRIDE
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 
 @dataclass(frozen=True)

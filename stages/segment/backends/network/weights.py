@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from schemas.errors import BadInput
-from schemas.vocabulary import Vocabulary
-from stages.kit.formats.network_file import put_tensors, write_network
-from stages.kit.formats.safetensors_file import read_safetensors
-from stages.segment.backends.network.features import CHANNELS, INPUT_WIDTH
-from stages.segment.backends.network.model import PanopticNetwork, Widths
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.vocabulary import Vocabulary
+from scenewright.stages.kit.formats.network_file import put_tensors, write_network
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors
+from scenewright.stages.segment.backends.network.features import CHANNELS, INPUT_WIDTH
+from scenewright.stages.segment.backends.network.model import PanopticNetwork, Widths
 
 FORMAT = "scenewright panoptic network"
 VERSION = 1

@@ -10,19 +10,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.segment.backends.objects import ObjectsParameters
-from stages.segment.backends.objects.boosting import read_trees
-from stages.segment.backends.objects.cuts import pixels_by_label
-from stages.segment.backends.objects.grouping import PairScorer, by_trees
-from stages.segment.backends.objects.pairs import FEATURES
-from stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.segment.backends.objects import ObjectsParameters
+from scenewright.stages.segment.backends.objects.boosting import read_trees
+from scenewright.stages.segment.backends.objects.cuts import pixels_by_label
+from scenewright.stages.segment.backends.objects.grouping import PairScorer, by_trees
+from scenewright.stages.segment.backends.objects.pairs import FEATURES
+from scenewright.stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "tabletop_pairs.safetensors"
 GREY = 128

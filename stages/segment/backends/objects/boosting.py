@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 from numba import njit
-
-from schemas.errors import BadInput
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 
 Trees = tuple[np.ndarray, np.ndarray, np.ndarray, float]
 """Feature of every inner node (T, 2^d - 1) int32, its threshold (T, 2^d - 1) float32 (above goes right), value of every

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.objects.regions import color_difference
+from scenewright.stages.segment.backends.objects.regions import color_difference
 
 
 @dataclass(frozen=True)

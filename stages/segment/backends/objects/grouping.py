@@ -11,10 +11,9 @@ from collections.abc import Callable
 
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.objects.boosting import Trees, score_rows
-from stages.segment.backends.objects.groups import Groups
-from stages.segment.backends.objects.rules import rule_score
+from scenewright.stages.segment.backends.objects.boosting import Trees, score_rows
+from scenewright.stages.segment.backends.objects.groups import Groups
+from scenewright.stages.segment.backends.objects.rules import rule_score
 
 PairScorer = Callable[[np.ndarray], np.ndarray]
 """Features (P, COUNT) float32 of pairs -> how certainly each is one object (P,)."""

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.objects.hulls import convex_hull, hull_content
-from stages.segment.backends.objects.pairs import CONTENT_STEP, COUNT, HIDING_MARGIN, inverse_plane, pair_features
-from stages.segment.backends.objects.regions import Regions
+from scenewright.stages.segment.backends.objects.hulls import convex_hull, hull_content
+from scenewright.stages.segment.backends.objects.pairs import (
+    CONTENT_STEP,
+    COUNT,
+    HIDING_MARGIN,
+    inverse_plane,
+    pair_features,
+)
+from scenewright.stages.segment.backends.objects.regions import Regions
 
 LARGEST_GAP = 3.0
 """Groups that do not touch are a pair when their hulls' corners are closer than this times the root of the pixels of

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.objects.hulls import convex_hull, hull_content, inside_hull
-from stages.segment.backends.objects.regions import HEIGHT_BIN
+from scenewright.stages.segment.backends.objects.hulls import convex_hull, hull_content, inside_hull
+from scenewright.stages.segment.backends.objects.regions import HEIGHT_BIN
 
 FEATURES = (
     "smaller_pixels",

@@ -11,11 +11,15 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numba import njit, prange
-
-from schemas.scene_parts import Camera
-from stages.segment.backends.objects.support import SupportSettings, SupportSurface, find_supports, ray_slopes
-from stages.segment.geometric import label_regions, pixels_at, smooth_depth
-from stages.segment.normals import surface_normals
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.segment.backends.objects.support import (
+    SupportSettings,
+    SupportSurface,
+    find_supports,
+    ray_slopes,
+)
+from scenewright.stages.segment.geometric import label_regions, pixels_at, smooth_depth
+from scenewright.stages.segment.normals import surface_normals
 
 Window = tuple[slice, slice]
 NORMAL_DISTANCE = 0.02

@@ -8,12 +8,11 @@ with the longest common border.
 from __future__ import annotations
 
 import numpy as np
-
-from schemas.scene_parts import Camera
-from stages.segment.backends.objects.patches import foreground_of
-from stages.segment.backends.objects.regions import measure_regions
-from stages.segment.backends.objects.support import SupportSettings, find_supports
-from stages.segment.geometric import pixels_at, relabel, segment_depth
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.segment.backends.objects.patches import foreground_of
+from scenewright.stages.segment.backends.objects.regions import measure_regions
+from scenewright.stages.segment.backends.objects.support import SupportSettings, find_supports
+from scenewright.stages.segment.geometric import pixels_at, relabel, segment_depth
 
 ON_SURFACE = 0.6
 """A segment with more than this share of its pixels on a support surface is part of it."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.objects.hulls import convex_hull
+from scenewright.stages.segment.backends.objects.hulls import convex_hull
 
 LIGHTNESS_BINS, CHROMA_BINS = 5, 6
 COLOR_BINS = LIGHTNESS_BINS * CHROMA_BINS * CHROMA_BINS

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
-from stages.segment.backends.objects.pairs import FEATURES
+from scenewright.stages.segment.backends.objects.pairs import FEATURES
 
 _AT = {name: k for k, name in enumerate(FEATURES)}
 CONNECTED, CONVEX, SHARE, BORDER_COLOR = _AT["connected"], _AT["convex"], _AT["border_share"], _AT["border_color"]

@@ -7,16 +7,15 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 from numba import njit
-
-from schemas.scene_parts import Camera
-from stages.segment.backends.objects.cuts import CutSettings, cut_patches
-from stages.segment.backends.objects.grouping import PairScorer, by_rules, group_patches
-from stages.segment.backends.objects.groups import Groups
-from stages.segment.backends.objects.patches import PatchFrame, PatchSettings, find_patches
-from stages.segment.backends.objects.regions import lab_image, measure_regions
-from stages.segment.backends.objects.rules import RULES, START, rule_table
-from stages.segment.backends.objects.support import SupportSettings
-from stages.segment.geometric import pixels_at, relabel
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.segment.backends.objects.cuts import CutSettings, cut_patches
+from scenewright.stages.segment.backends.objects.grouping import PairScorer, by_rules, group_patches
+from scenewright.stages.segment.backends.objects.groups import Groups
+from scenewright.stages.segment.backends.objects.patches import PatchFrame, PatchSettings, find_patches
+from scenewright.stages.segment.backends.objects.regions import lab_image, measure_regions
+from scenewright.stages.segment.backends.objects.rules import RULES, START, rule_table
+from scenewright.stages.segment.backends.objects.support import SupportSettings
+from scenewright.stages.segment.geometric import pixels_at, relabel
 
 UP_WITHOUT_SURFACE = np.array([0.0, -1.0, 0.0])
 """Where no support surface is seen, the camera is taken to be upright."""

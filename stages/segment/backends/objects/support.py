@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-
-from schemas.scene_parts import Camera
+from scenewright.schemas.scene_parts import Camera
 
 SAMPLE_STEP = 6
 """Every how many-th row and column takes part in the search and in the fit."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stages.kit.labels import LABEL_TABLES
-from stages.kit.stage import Extra
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.kit.labels import LABEL_TABLES
+from scenewright.stages.kit.stage import Extra
+from scenewright.stages.segment.registry import BackendDeclaration
 
 BACKEND = BackendDeclaration(
     name="onnx",

@@ -6,18 +6,17 @@ import logging
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.kit.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
-from stages.segment.backends.onnx import decoding
-from stages.segment.backends.onnx.network import HINT, Network, fit
-from stages.segment.backends.onnx.sidecar import read_sidecar
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame, pixels_at
-from stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
-from stages.segment.panoptic import PanopticFrame
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
+from scenewright.stages.segment.backends.onnx import decoding
+from scenewright.stages.segment.backends.onnx.network import HINT, Network, fit
+from scenewright.stages.segment.backends.onnx.sidecar import read_sidecar
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
+from scenewright.stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
+from scenewright.stages.segment.panoptic import PanopticFrame
 
 SETS_BY_SIZE = {80: "coco-80", 133: "coco-panoptic", 150: "ade20k"}
 """Number of classes -> label set of published networks, in its order."""

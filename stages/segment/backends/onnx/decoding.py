@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from stages.segment.backends.onnx.network import Fitted
-from stages.segment.suppression import suppress
+from scenewright.stages.segment.backends.onnx.network import Fitted
+from scenewright.stages.segment.suppression import suppress
 
 MOST_CANDIDATES = 300
 """Instances of one image that are looked at, the best scored."""

@@ -10,9 +10,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
-from stages.segment.backends.onnx.sidecar import Sidecar, find_layout
+from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.stages.segment.backends.onnx.sidecar import Sidecar, find_layout
 
 DEFAULT_SIZE = (640, 640)
 """Width and height [pixels] of the trial image when a network takes any size."""

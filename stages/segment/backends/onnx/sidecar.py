@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import ValidationError
-
-from schemas.base import Model
-from schemas.errors import BadInput, first_problem
-from schemas.outside import file_toml
+from scenewright.schemas.base import Model
+from scenewright.schemas.errors import BadInput, first_problem
+from scenewright.schemas.outside import file_toml
 
 Layout = Literal["yolo-seg", "instances", "panoptic"]
 LARGEST_FILE = 2**20

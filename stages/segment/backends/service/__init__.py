@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pydantic import Field
-
-from stages.kit.labels import LABEL_TABLES
-from stages.kit.services.address import SEGMENTATION
-from stages.kit.stage import Parameters
-from stages.segment.registry import BackendDeclaration
+from scenewright.stages.kit.labels import LABEL_TABLES
+from scenewright.stages.kit.services.address import SEGMENTATION
+from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.registry import BackendDeclaration
 
 
 class ServiceParameters(Parameters):

@@ -5,14 +5,13 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-
-from schemas.errors import BadInput, MachineFailure
-from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.kit.labels import Label, LabelSet, match_labels, read_label_file
-from stages.kit.services.connection import Connection
-from stages.kit.services.segmentation_client import connect, read_info
-from stages.kit.services.segmentation_protocol import (
+from scenewright.schemas.errors import BadInput, MachineFailure
+from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.labels import Label, LabelSet, match_labels, read_label_file
+from scenewright.stages.kit.services.connection import Connection
+from scenewright.stages.kit.services.segmentation_client import connect, read_info
+from scenewright.stages.kit.services.segmentation_protocol import (
     SEGMENT_PATH,
     Category,
     Reply,
@@ -21,12 +20,12 @@ from stages.kit.services.segmentation_protocol import (
     encode_request,
     parse_reply,
 )
-from stages.segment.backends.service import ServiceParameters
-from stages.segment.backends.service.reply_cache import ReplyCache, prune
-from stages.segment.choice import BackendRequest
-from stages.segment.geometric import GeometricFrame
-from stages.segment.naming import NamedSegment, name_segments
-from stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.backends.service import ServiceParameters
+from scenewright.stages.segment.backends.service.reply_cache import ReplyCache, prune
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.naming import NamedSegment, name_segments
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 logger = logging.getLogger("scenewright")
 

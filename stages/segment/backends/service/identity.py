@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from stages.kit.services.segmentation_client import read_identity
-from stages.segment.backends.service import ServiceParameters
-from stages.segment.backends.service.backend import connected
-from stages.segment.parameters import SegmentParameters
+from scenewright.stages.kit.services.segmentation_client import read_identity
+from scenewright.stages.segment.backends.service import ServiceParameters
+from scenewright.stages.segment.backends.service.backend import connected
+from scenewright.stages.segment.parameters import SegmentParameters
 
 LABEL = "2"
 """Of the words under which segments.json has a service's masks."""

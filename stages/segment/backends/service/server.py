@@ -10,13 +10,12 @@ import logging
 import threading
 
 import numpy as np
-
-from schemas.base import canonical_json
-from schemas.errors import ScenewrightError
-from schemas.vocabulary import load_vocabulary
-from stages.kit.digests import sha256_of_text
-from stages.kit.services.receiving import BoundedHandler, BoundedServer
-from stages.kit.services.segmentation_protocol import (
+from scenewright.schemas.base import canonical_json
+from scenewright.schemas.errors import ScenewrightError
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.digests import sha256_of_text
+from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedServer
+from scenewright.stages.kit.services.segmentation_protocol import (
     HEALTH_PATH,
     INFO_PATH,
     PROTOCOL,
@@ -30,8 +29,8 @@ from stages.kit.services.segmentation_protocol import (
     encode_reply,
     parse_request,
 )
-from stages.segment.choice import Backend
-from stages.segment.geometric import GeometricSettings, segment_depth
+from scenewright.stages.segment.choice import Backend
+from scenewright.stages.segment.geometric import GeometricSettings, segment_depth
 
 MOST_WAITING = 16
 """Requests that may wait for the model; more are told to come back."""

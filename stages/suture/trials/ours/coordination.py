@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.motion.primitives import straight
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.places import BESIDE, GRASPING
-from stages.suture.trials.wound import exit_
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.motion.primitives import straight
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.places import BESIDE, GRASPING
+from scenewright.stages.suture.trials.wound import exit_
 
 BACK = np.array([0.015, 0.0, 0.005])
 """How far [m] the left driver gives way for the look before another try."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.motion import primitives
-from stages.suture.motion.constants import APPROACH_OFFSET, EXTRACTION_TURN, INSERTION_TURN
-from stages.suture.motion.needle import point_at
-from stages.suture.trials.bench import HOME, Bench
-from stages.suture.trials.perception import Seen, farther_end
-from stages.suture.trials.places import GRASPING
-from stages.suture.trials.wound import SPANNED
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.constants import APPROACH_OFFSET, EXTRACTION_TURN, INSERTION_TURN
+from scenewright.stages.suture.motion.needle import point_at
+from scenewright.stages.suture.trials.bench import HOME, Bench
+from scenewright.stages.suture.trials.perception import Seen, farther_end
+from scenewright.stages.suture.trials.places import GRASPING
+from scenewright.stages.suture.trials.wound import SPANNED
 
 INWARDS, LEAST_TURN = np.radians(12.0), np.radians(10.0)
 

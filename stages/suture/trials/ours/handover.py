@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.motion.constants import OpenConstants
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.looking import trusted_look
-from stages.suture.trials.perception import Seen, farther_end
-from stages.suture.trials.policy import Trust
+from scenewright.stages.suture.motion.constants import OpenConstants
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.looking import trusted_look
+from scenewright.stages.suture.trials.perception import Seen, farther_end
+from scenewright.stages.suture.trials.policy import Trust
 
 LOOKS, TURNED, TURNED_EACH = 3, np.radians(4.0), np.radians(1.5)
 

@@ -6,16 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from stages.kit.geometry.transforms import apply, inverse, transform_from
-from stages.suture.motion import primitives
-from stages.suture.motion.needle import UP_THE_WOUND, upright
-from stages.suture.trials.belief import START_ANGLE, Belief, believed, mean_normal, middle_ends
-from stages.suture.trials.bench import CORNER, Bench
-from stages.suture.trials.looking import corner_looks
-from stages.suture.trials.perception import Seen
-from stages.suture.trials.places import NOMINAL
-from stages.suture.trials.policy import Trust
+from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.needle import UP_THE_WOUND, upright
+from scenewright.stages.suture.trials.belief import START_ANGLE, Belief, believed, mean_normal, middle_ends
+from scenewright.stages.suture.trials.bench import CORNER, Bench
+from scenewright.stages.suture.trials.looking import corner_looks
+from scenewright.stages.suture.trials.perception import Seen
+from scenewright.stages.suture.trials.places import NOMINAL
+from scenewright.stages.suture.trials.policy import Trust
 
 SERVO_TURNS, SERVO_LOOKS, FEWEST_POSES, SERVOED = 4, 5, 2, np.radians(3.0)
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.motion.constants import THROWS, OpenConstants
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.places import TAKING
-from stages.suture.trials.pulling import LONGEST_PULL, OUTWARDS, pull_by, pull_to
-from stages.suture.trials.thread import draw, pull_on
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.motion.constants import THROWS, OpenConstants
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.places import TAKING
+from scenewright.stages.suture.trials.pulling import LONGEST_PULL, OUTWARDS, pull_by, pull_to
+from scenewright.stages.suture.trials.thread import draw, pull_on
 
 TAIL_TO_LEAVE = 0.030
 """What bookkeeping leaves behind the first hole [m]."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.motion.needle import ARC_POINTS
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.looking import until_known
-from stages.suture.trials.perception import Seen
-from stages.suture.trials.wound import exit_
+from scenewright.stages.suture.motion.needle import ARC_POINTS
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.looking import until_known
+from scenewright.stages.suture.trials.perception import Seen
+from scenewright.stages.suture.trials.wound import exit_
 
 PASSES = 0.010
 """A needle seen farther than this [m] from where it must be is not believed: jaws are 12 mm deep, and thread that pulls

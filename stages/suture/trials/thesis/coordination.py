@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.kit.geometry.transforms import transform_from
-from stages.suture.trials.bench import HOME, Bench
+from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.suture.trials.bench import HOME, Bench
 
 HOVER = np.array([-0.015, 0.0, 0.02])
 """From the place of insertion to where the right driver comes from [m]."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.motion import primitives
-from stages.suture.motion.constants import EXTRACTION_ADVANCE, EXTRACTION_TURN, OpenConstants, cinch_length
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.perception import Seen, farther_end, nearer_end
-from stages.suture.trials.places import GRASPING
-from stages.suture.trials.policy import Coordination
-from stages.suture.trials.pulling import LONGEST_PULL, pull_to
-from stages.suture.trials.wound import exit_
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.constants import EXTRACTION_ADVANCE, EXTRACTION_TURN, OpenConstants, cinch_length
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.perception import Seen, farther_end, nearer_end
+from scenewright.stages.suture.trials.places import GRASPING
+from scenewright.stages.suture.trials.policy import Coordination
+from scenewright.stages.suture.trials.pulling import LONGEST_PULL, pull_to
+from scenewright.stages.suture.trials.wound import exit_
 
 
 class NoSweep:

@@ -9,12 +9,11 @@ trials end in handover (measured: docs/STITCH_TRIALS.md).
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.motion.constants import OpenConstants
-from stages.suture.trials.bench import Bench
-from stages.suture.trials.looking import until_known
-from stages.suture.trials.perception import Seen
-from stages.suture.trials.policy import Trust
+from scenewright.stages.suture.motion.constants import OpenConstants
+from scenewright.stages.suture.trials.bench import Bench
+from scenewright.stages.suture.trials.looking import until_known
+from scenewright.stages.suture.trials.perception import Seen
+from scenewright.stages.suture.trials.policy import Trust
 
 
 class ThreadAsItHangs:

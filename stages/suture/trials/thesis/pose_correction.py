@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from stages.suture.motion import primitives
-from stages.suture.motion.constants import CORRECTION_TURN, NORMAL_SAMPLES
-from stages.suture.motion.needle import UP_THE_WOUND
-from stages.suture.trials.belief import Belief, believed, mean_normal, middle_ends
-from stages.suture.trials.bench import CORNER, Bench, Failed
-from stages.suture.trials.looking import corner_looks, until_known
-from stages.suture.trials.places import NOMINAL
-from stages.suture.trials.policy import Trust
+from scenewright.stages.suture.motion import primitives
+from scenewright.stages.suture.motion.constants import CORRECTION_TURN, NORMAL_SAMPLES
+from scenewright.stages.suture.motion.needle import UP_THE_WOUND
+from scenewright.stages.suture.trials.belief import Belief, believed, mean_normal, middle_ends
+from scenewright.stages.suture.trials.bench import CORNER, Bench, Failed
+from scenewright.stages.suture.trials.looking import corner_looks, until_known
+from scenewright.stages.suture.trials.places import NOMINAL
+from scenewright.stages.suture.trials.policy import Trust
 
 
 class NoCorrection:

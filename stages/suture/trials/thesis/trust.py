@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from stages.suture.motion.constants import MOVED
-from stages.suture.trials.bench import HOME, Bench
-from stages.suture.trials.looking import until_known
-from stages.suture.trials.perception import Seen, nearer_end
+from scenewright.stages.suture.motion.constants import MOVED
+from scenewright.stages.suture.trials.bench import HOME, Bench
+from scenewright.stages.suture.trials.looking import until_known
+from scenewright.stages.suture.trials.perception import Seen, nearer_end
 
 
 class EveryEstimate:

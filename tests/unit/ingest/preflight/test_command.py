@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.cli.main import run
+from scenewright.stages.engine.given_inputs import check_given_inputs
+from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
+from scenewright.stages.ingest.preflight.report import InspectionReport
 
-from cli.main import run
-from stages.engine.given_inputs import check_given_inputs
-from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
-from stages.ingest.preflight.report import InspectionReport
 from tests.unit.ingest import tiny_room
 from tests.unit.ingest.preflight.textured_room import CAMERA, painted, walk
 from tests.unit.ingest.tiny_room import jpeg, millimetres, png, room_depth

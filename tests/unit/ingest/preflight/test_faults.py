@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenewright.stages.ingest.preflight.page import render
+from scenewright.stages.ingest.preflight.report import InspectionReport
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
 
 from benchmarks.experiments.preflight.faults import FAULTS, doubled, on_poses, scaled_depth, shifted_color, stretched
-from stages.ingest.preflight.page import render
-from stages.ingest.preflight.report import InspectionReport
-from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
 from tests.unit.ingest.preflight.textured_room import CAMERA, inspected, source, walk
 
 COUNT = 48

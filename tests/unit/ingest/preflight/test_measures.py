@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.preflight.calibration import calibration_findings, calibration_report, other_size
+from scenewright.stages.ingest.preflight.charts import ticks
+from scenewright.stages.ingest.preflight.choice import RUN_LENGTH, choose, turn
+from scenewright.stages.ingest.preflight.depth import depth_findings, depth_report, plausible_factors, units_per_metre
+from scenewright.stages.ingest.preflight.epipolar import Matches, epipolar_distances
+from scenewright.stages.ingest.preflight.fits import relative_pose
+from scenewright.stages.ingest.preflight.looking import Look, look_at_entry
+from scenewright.stages.ingest.preflight.pictures import sharpness
+from scenewright.stages.ingest.preflight.pose_findings import depth_is_blamed
+from scenewright.stages.ingest.preflight.poses import round_scale
+from scenewright.stages.ingest.preflight.registration import Edges, best_offset, lag_scores
+from scenewright.stages.ingest.preflight.steps import step_reports
+from scenewright.stages.ingest.preflight.streams import clock_lines, stream_findings, stream_report
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, StreamInfo
+from scenewright.stages.kit.geometry.cameras import project
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at, transform_from_yaw
 
-from schemas.scene_parts import Camera
-from stages.ingest.preflight.calibration import calibration_findings, calibration_report, other_size
-from stages.ingest.preflight.charts import ticks
-from stages.ingest.preflight.choice import RUN_LENGTH, choose, turn
-from stages.ingest.preflight.depth import depth_findings, depth_report, plausible_factors, units_per_metre
-from stages.ingest.preflight.epipolar import Matches, epipolar_distances
-from stages.ingest.preflight.fits import relative_pose
-from stages.ingest.preflight.looking import Look, look_at_entry
-from stages.ingest.preflight.pictures import sharpness
-from stages.ingest.preflight.pose_findings import depth_is_blamed
-from stages.ingest.preflight.poses import round_scale
-from stages.ingest.preflight.registration import Edges, best_offset, lag_scores
-from stages.ingest.preflight.steps import step_reports
-from stages.ingest.preflight.streams import clock_lines, stream_findings, stream_report
-from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, StreamInfo
-from stages.kit.geometry.cameras import project
-from stages.kit.geometry.transforms import apply, inverse, look_at, transform_from_yaw
 from tests.unit.ingest.preflight.textured_room import CAMERA, walk
 
 MILLION = 1_000_000

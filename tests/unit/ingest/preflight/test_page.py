@@ -8,11 +8,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from scenewright.schemas.errors import MachineFailure
+from scenewright.stages.ingest.preflight.page import render, write_page
+from scenewright.stages.ingest.preflight.text import as_text
 
 from benchmarks.experiments.preflight.faults import FAULTS
-from schemas.errors import MachineFailure
-from stages.ingest.preflight.page import render, write_page
-from stages.ingest.preflight.text import as_text
 from tests.unit.ingest.preflight.textured_room import inspected, source
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS, POSE_CONVENTIONS
+from scenewright.stages.ingest.pose_conventions import converted
+from scenewright.stages.kit.geometry.transforms import apply, is_rigid
 from scipy.spatial.transform import Rotation
-
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.pose_convention_names import CONVENTION_WORDS, POSE_CONVENTIONS
-from stages.ingest.pose_conventions import converted
-from stages.kit.geometry.transforms import apply, is_rigid
 
 POINT = np.array([0.3, -0.2, 1.5])
 """Right, up and ahead of the camera, in OpenCV axes."""

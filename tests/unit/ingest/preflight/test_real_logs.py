@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenewright.stages.ingest.preflight.settings import ingest_parameters
 
 from benchmarks.experiments.preflight.experiment import judge
 from benchmarks.experiments.preflight.faults import FAULTS
-from stages.ingest.preflight.settings import ingest_parameters
 from tests.real_data import real_data
 
 DINING_ROOM = ("fx=518", "fy=519", "cx=325.5", "cy=253.5")

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.preflight.inspection import Inspection, inspect_source
+from scenewright.stages.ingest.preflight.settings import ingest_parameters
+from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.transforms import apply, look_at
+from scenewright.stages.kit.progress import SilentProgress
 
-from schemas.scene_parts import Camera
-from stages.ingest.preflight.inspection import Inspection, inspect_source
-from stages.ingest.preflight.settings import ingest_parameters
-from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera
-from stages.kit.geometry.cameras import back_project
-from stages.kit.geometry.transforms import apply, look_at
-from stages.kit.progress import SilentProgress
 from tests.unit.ingest.tiny_room import TABLE, millimetres, room_depth
 
 CAMERA = Camera(width=160, height=120, fx=130.0, fy=130.0, cx=79.5, cy=59.5)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.segment.backends.network.backend import camera_of_points, shows_something
+from scenewright.stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
+from scenewright.stages.segment.parameters import SegmentParameters
 
-from schemas.errors import BadInput, UsageError
-from schemas.sequence import Sequence
-from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.cameras import back_project
-from stages.segment.backends.network.backend import camera_of_points, shows_something
-from stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
-from stages.segment.parameters import SegmentParameters
 from tests.unit.segment.network.test_weights import tiny_checkpoint
 from tests.unit.segment.test_box_masks import WIDE
 from tests.unit.segment.test_stage import Written, payload, segment, write_sequence
@@ -60,7 +60,7 @@ def test_colour_may_be_missing_in_the_log_and_in_a_frame(room: Written) -> None:
     with FrameReader(room.sequence.path("frames.mcap")) as reader:
         backend = choose_backend(BackendRequest(parameters, sequence=room.sequence, reader=reader))
         frame = reader.read(0, streams=("depth",))
-        from stages.segment.geometric import segment_depth
+        from scenewright.stages.segment.geometric import segment_depth
 
         assert frame.color is None and frame.depth is not None
         geometric = segment_depth(frame.depth, WIDE)

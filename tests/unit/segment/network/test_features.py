@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from schemas.scene_parts import Camera
-from stages.kit.geometry.transforms import look_at
-from stages.segment.backends.network.features import (
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.segment.backends.network.features import (
     CHANNELS,
     Mount,
     features,

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-
-from benchmarks.training.targets import IGNORED, make_targets
-from stages.segment.backends.network.grouping import (
+from scenewright.stages.segment.backends.network.grouping import (
     GroupingSettings,
     Named,
     assign_to_centres,
@@ -12,6 +10,8 @@ from stages.segment.backends.network.grouping import (
     group,
     raise_to_depth,
 )
+
+from benchmarks.training.targets import IGNORED, make_targets
 
 CLASSES = (Named(1, False), Named(2, False), Named(4, True), Named(5, True))
 

@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-
-from schemas.errors import BadInput
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
-from stages.segment.backends.network.features import CHANNELS
-from stages.segment.backends.network.model import PanopticNetwork, Widths
-from stages.segment.backends.network.weights import BUNDLED, load_checkpoint, save_checkpoint
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from scenewright.stages.segment.backends.network.features import CHANNELS
+from scenewright.stages.segment.backends.network.model import PanopticNetwork, Widths
+from scenewright.stages.segment.backends.network.weights import BUNDLED, load_checkpoint, save_checkpoint
 
 TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
 CLASSES = ("floor", "wall", "chair")

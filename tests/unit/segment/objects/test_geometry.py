@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.stages.segment.backends.objects.cuts import pixels_by_label
+from scenewright.stages.segment.backends.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
+from scenewright.stages.segment.backends.objects.pairs import inverse_plane
+from scenewright.stages.segment.backends.objects.regions import POINT_SUMS, lab_image
+from scenewright.stages.segment.backends.objects.segmentation import _holes_closed
+from scenewright.stages.segment.backends.objects.support import SupportSettings, find_supports, surface_inverse
 
-from stages.segment.backends.objects.cuts import pixels_by_label
-from stages.segment.backends.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
-from stages.segment.backends.objects.pairs import inverse_plane
-from stages.segment.backends.objects.regions import POINT_SUMS, lab_image
-from stages.segment.backends.objects.segmentation import _holes_closed
-from stages.segment.backends.objects.support import SupportSettings, find_supports, surface_inverse
 from tests.unit.segment.scenes import CAMERA, plane_depth, rays
 
 

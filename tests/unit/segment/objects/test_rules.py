@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from benchmarks.training.pair_rules import JOINS, choose_rules, fit_weights
-from stages.segment.backends.objects.pairs import FEATURES
-from stages.segment.backends.objects.rules import (
+from scenewright.stages.segment.backends.objects.pairs import FEATURES
+from scenewright.stages.segment.backends.objects.rules import (
     APART,
     CUT,
     OVER,
@@ -21,6 +19,8 @@ from stages.segment.backends.objects.rules import (
     rule_score,
     rule_table,
 )
+
+from benchmarks.training.pair_rules import JOINS, choose_rules, fit_weights
 
 
 def features(**values: float) -> np.ndarray:

@@ -6,24 +6,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from benchmarks.training.pair_recording import record_pairs
-from schemas.errors import BadInput
-from schemas.scene_parts import Camera
-from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.frames import Frame
-from stages.segment.backends.objects.backend import BUNDLED, ObjectsBackend
-from stages.segment.backends.objects.boosting import read_trees, score_rows, write_trees
-from stages.segment.backends.objects.grouping import by_trees
-from stages.segment.backends.objects.pairs import FEATURES
-from stages.segment.backends.objects.plain import segment_plain
-from stages.segment.backends.objects.segmentation import (
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.scene_parts import Camera
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.segment.backends.objects.backend import BUNDLED, ObjectsBackend
+from scenewright.stages.segment.backends.objects.boosting import read_trees, score_rows, write_trees
+from scenewright.stages.segment.backends.objects.grouping import by_trees
+from scenewright.stages.segment.backends.objects.pairs import FEATURES
+from scenewright.stages.segment.backends.objects.plain import segment_plain
+from scenewright.stages.segment.backends.objects.segmentation import (
     BY_SET_RULES,
     ObjectFrame,
     ObjectSettings,
     cut_pieces,
     segment_objects,
 )
+
+from benchmarks.training.pair_recording import record_pairs
 from tests.unit.segment.scenes import best_overlap, box_depth, combine, plane_depth, rays
 
 CAMERA = Camera(width=320, height=240, fx=262.5, fy=262.5, cx=159.5, cy=119.5)

@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import Any
 
-from schemas.errors import BadInput
-from stages.segment.backends.masks.classes import categories_of, read_classes, score_of
-from stages.segment.backends.masks.coco_images import picture_of, pictures_by_id
-from stages.segment.backends.masks.encoded import flatten_encoded
-from stages.segment.backends.masks.given import GivenFrame, GivenMask, MaskFormat, MaskSource, ReadSettings, entry
-from stages.segment.backends.masks.listing import Listing
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.masks.classes import categories_of, read_classes, score_of
+from scenewright.stages.segment.backends.masks.coco_images import picture_of, pictures_by_id
+from scenewright.stages.segment.backends.masks.encoded import flatten_encoded
+from scenewright.stages.segment.backends.masks.given import (
+    GivenFrame,
+    GivenMask,
+    MaskFormat,
+    MaskSource,
+    ReadSettings,
+    entry,
+)
+from scenewright.stages.segment.backends.masks.listing import Listing
 
 
 def open_source(listing: Listing) -> MaskSource | None:

@@ -6,13 +6,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.segment.backends.masks.classes import categories_of, read_classes, score_of
-from stages.segment.backends.masks.coco_images import picture_of, pictures_by_id
-from stages.segment.backends.masks.given import GivenFrame, GivenMask, MaskFormat, MaskSource, ReadSettings, entry
-from stages.segment.backends.masks.images import read_panoptic
-from stages.segment.backends.masks.listing import Listing
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.masks.classes import categories_of, read_classes, score_of
+from scenewright.stages.segment.backends.masks.coco_images import picture_of, pictures_by_id
+from scenewright.stages.segment.backends.masks.given import (
+    GivenFrame,
+    GivenMask,
+    MaskFormat,
+    MaskSource,
+    ReadSettings,
+    entry,
+)
+from scenewright.stages.segment.backends.masks.images import read_panoptic
+from scenewright.stages.segment.backends.masks.listing import Listing
 
 HINT = "panopticapi describes the format"
 

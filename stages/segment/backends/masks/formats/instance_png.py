@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.segment.backends.masks.classes import read_classes, score_of
-from stages.segment.backends.masks.given import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.masks.classes import read_classes, score_of
+from scenewright.stages.segment.backends.masks.given import (
     Category,
     GivenFrame,
     GivenMask,
@@ -22,8 +21,8 @@ from stages.segment.backends.masks.given import (
     Picture,
     ReadSettings,
 )
-from stages.segment.backends.masks.images import read_instances
-from stages.segment.backends.masks.listing import Listing
+from scenewright.stages.segment.backends.masks.images import read_instances
+from scenewright.stages.segment.backends.masks.listing import Listing
 
 HINT = 'classes.json: {"1": "chair"}, or beside 000012.png a 000012.json: {"7": {"class": "chair", "score": 0.8}}'
 

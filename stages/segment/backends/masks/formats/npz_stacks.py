@@ -10,13 +10,12 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-
-from schemas.errors import BadInput
-from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.formats.zip_files import zip_errors
-from stages.segment.backends.masks.classes import read_classes, score_of
-from stages.segment.backends.masks.encoded import check_amount
-from stages.segment.backends.masks.given import (
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.formats.zip_files import zip_errors
+from scenewright.stages.segment.backends.masks.classes import read_classes, score_of
+from scenewright.stages.segment.backends.masks.encoded import check_amount
+from scenewright.stages.segment.backends.masks.given import (
     Category,
     GivenFrame,
     GivenMask,
@@ -25,8 +24,8 @@ from stages.segment.backends.masks.given import (
     Picture,
     ReadSettings,
 )
-from stages.segment.backends.masks.listing import Listing
-from stages.segment.backends.masks.overlapping import flatten
+from scenewright.stages.segment.backends.masks.listing import Listing
+from scenewright.stages.segment.backends.masks.overlapping import flatten
 
 HINT = "np.savez(name, masks=..., classes=..., scores=...); docs/MASKS.md"
 NAMES = ("masks", "ids", "id", "classes", "scores")

@@ -8,11 +8,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.errors import BadInput
-from stages.segment.backends.masks.coco_images import picture_of
-from stages.segment.backends.masks.encoded import flatten_encoded
-from stages.segment.backends.masks.given import GivenFrame, GivenMask, MaskFormat, MaskSource, ReadSettings, entry
-from stages.segment.backends.masks.listing import Listing, read_json
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.masks.coco_images import picture_of
+from scenewright.stages.segment.backends.masks.encoded import flatten_encoded
+from scenewright.stages.segment.backends.masks.given import (
+    GivenFrame,
+    GivenMask,
+    MaskFormat,
+    MaskSource,
+    ReadSettings,
+    entry,
+)
+from scenewright.stages.segment.backends.masks.listing import Listing, read_json
 
 HINT = 'write SamAutomaticMaskGenerator(output_mode="coco_rle").generate(image) as JSON, a file a picture'
 

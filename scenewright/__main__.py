@@ -1,4 +1,4 @@
-"""`python -m cli`: the command line without an installed console script."""
+"""`python -m scenewright`: the command line without an installed console script."""
 
 import sys
 from importlib.util import find_spec
@@ -10,6 +10,6 @@ if find_spec("typer") is None or find_spec("pydantic") is None:
     )
     raise SystemExit(5)
 
-from cli.main import main  # noqa: E402
+from scenewright.cli.main import main  # noqa: E402
 
 main()
