@@ -13,9 +13,8 @@ import shutil
 import sys
 import time
 import traceback
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -23,15 +22,17 @@ from urllib.parse import unquote
 from pydantic import TypeAdapter
 from scenewright.schemas.base import canonical_json
 from scenewright.schemas.errors import BadInput, ScenewrightError, UsageError
+from scenewright.stages.engine.code.digests import code_of, step_code
 from scenewright.stages.engine.discovery import stage_by_name
 from scenewright.stages.engine.reading import read_manifest
 from scenewright.stages.kit.digests import external_digest, sha256_of_text
 
-from benchmarks.code_digest import code_digest
 from benchmarks.discovery import load_experiment
 from benchmarks.experiment import Bench, Experiment, Trial
 
 RECORD = "record.json"
+PACKAGE = "benchmarks"
+"""Followed beside scenewright where the code of a trial is read."""
 
 
 def key_of(experiment: Experiment, bench: Bench, trial: Trial) -> str:
@@ -60,14 +61,12 @@ def _digest_of(path: Path) -> str:
     return _DIGESTS[stamp]
 
 
-def _code_of(experiment: Experiment, arm: str) -> str:
-    folders = tuple(f"scenewright.stages.{stage_by_name(step).folder}" for step in experiment.steps)
-    return _code(experiment.measure, tuple(experiment.code.get(arm, ())), folders)
-
-
-@cache
-def _code(measure: Callable[..., Any], modules: tuple[str, ...], folders: tuple[str, ...]) -> str:
-    return code_digest(None if modules else measure, modules=modules, folders=folders)
+def _code_of(experiment: Experiment, arm: str) -> list[str]:
+    """The digests of the experiment's steps, and of its own modules for the arm, or else of its measuring function."""
+    module, name = experiment.measure.__module__, experiment.measure.__name__
+    roots = [f"{other}:" for other in experiment.code.get(arm, ())] or [f"{module}:{name}"]
+    followed = tuple(sorted({PACKAGE, module.partition(".")[0]}))
+    return [code_of(*roots, also=followed).digest, *(step_code(stage_by_name(s)).digest for s in experiment.steps)]
 
 
 def read_record(experiment: Experiment, bench: Bench, trial: Trial, *, any_code: bool = False) -> Any | None:

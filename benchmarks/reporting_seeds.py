@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from scenewright.schemas.base import canonical_json
+from scenewright.stages.engine.code.digests import step_code
 from scenewright.stages.engine.discovery import stage_by_name
 
 FILE = Path(__file__).with_name("reporting_seeds.toml")
@@ -31,13 +32,8 @@ class Method:
     """Arm -> plain values."""
 
     def digest(self) -> str:
-        """Return the sha256 over version and code of every step as it stands (tests/freshness), and the settings."""
-        from tests.freshness.program import Program
-        from tests.freshness.records import REPOSITORY, code_of
-
-        program = Program(REPOSITORY)
-        stages = [stage_by_name(name) for name in self.steps]
-        facts = {stage.name: [stage.version, code_of(program, stage).digest] for stage in stages}
+        """Return the sha256 over the code of every step as it stands, and the settings."""
+        facts = {name: step_code(stage_by_name(name)).digest for name in self.steps}
         return hashlib.sha256(canonical_json({"steps": facts, "arms": dict(self.settings)}).encode()).hexdigest()[:16]
 
 

@@ -174,6 +174,22 @@ def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int
     return 0
 
 
+def accept_code(
+    run: Annotated[Path, typer.Argument(help="Folder of a run.")], json_output: Json = False, debug: Debug = False
+) -> int:
+    """Let a finished run stand though the code of its steps has changed; its manifests say so from then on."""
+    from scenewright.stages.engine.accepted_code import accept_code as accept
+
+    accepted = accept(run)
+    for entry in accepted:
+        _say(f"{entry.step}: made with {entry.made_with[:12] or 'unknown code'}, accepted as {entry.accepted[:12]}")
+    if not accepted:
+        _say("nothing to accept: every artifact was made with today's code, or that is accepted already")
+    if json_output:
+        _out(json.dumps({"accepted": [entry.model_dump() for entry in accepted]}, sort_keys=True))
+    return 0
+
+
 def migrate(
     path: Annotated[Path, typer.Argument(help="Artifact of an older schema version.")],
     out: Annotated[Path, typer.Option("--out", help="New folder.")],
@@ -272,6 +288,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (verify, "Artifacts"),
     (urdf_check, "Artifacts"),
     (urdf_settle, "Artifacts"),
+    (accept_code, "Artifacts"),
     (migrate, "Artifacts"),
     (diff, "Artifacts"),
     (timeline, "Artifacts"),

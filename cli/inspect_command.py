@@ -136,7 +136,7 @@ def _manifest_text(artifact: Artifact) -> str:
         ("kind", f"{manifest.kind} version {manifest.schema_version}"),
         ("outcome", manifest.outcome),
         *(("summary", f"{name} = {value}") for name, value in manifest.summary.items()),
-        ("made by", f"{manifest.stage} version {manifest.stage_version}, seed {manifest.seed}"),
+        ("made by", f"{manifest.stage}, code {manifest.code[:12] or 'unknown'}, seed {manifest.seed}"),
         *(("input", f"{i.role}: {i.kind} {i.digest[:12]} {i.path}") for i in manifest.inputs),
         *(("parameter", f"{name} = {value}") for name, value in manifest.parameters.items()),
         ("content", manifest.content_digest),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.engine.code.digests import step_code
 from scenewright.stages.engine.keys import data_file_digests, library_versions, parameters_as_json
 from scenewright.stages.engine.model_cache import resolve_weights
 from scenewright.stages.engine.runner import choose_device
@@ -69,7 +70,7 @@ def open_server(
             "files": {role: external_digest(path) for role, path in resolved.items()},
             "libraries": library_versions(STAGE, parameters),
             "data_files": data_file_digests(STAGE, parameters),
-            "stage_version": STAGE.version,
+            "code": step_code(STAGE).digest,
             "scenewright": library_version("scenewright"),
             "device": device,
         }

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
+from scenewright.schemas.accepted_code import AcceptedCode
 from scenewright.schemas.base import Count, Model
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import check_bounds
 
 MANIFEST_NAME = "manifest.json"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""1: a number of the step, raised by hand, stood in place of the digest of its code."""
 LARGEST_MANIFEST = 64 * 2**20
 """A manifest over this size [bytes] is no manifest: 64 MiB list about 300,000 files."""
 
@@ -90,7 +92,8 @@ class Manifest(Model):
     kind: str
     schema_version: int
     stage: str
-    stage_version: int
+    code: str = ""
+    """Digest of the code of the step that made it (stages/engine/code); empty below format 2."""
     key: str
     content_digest: str
     files: tuple[FileRecord, ...]
@@ -102,6 +105,15 @@ class Manifest(Model):
     """Files of data/ that decided the output -> sha256."""
     device_kind: str = "cpu"
     conventions: dict[str, str] = CONVENTIONS
+    accepted_code: Annotated[tuple[AcceptedCode, ...], Field(max_length=MOST_INPUTS)] = ()
+    """What `accept-code` let stand, here and in what this was made from."""
     outcome: str = "ok"
     summary: Values = {}
     provenance: Provenance = Provenance()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_step_number(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("format_version") == 1:
+            return {name: value for name, value in values.items() if name != "stage_version"}
+        return values

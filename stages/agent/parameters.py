@@ -94,7 +94,6 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
 
 RUN = Stage(
     name="agent run",
-    version=12,
     summary="Tell a mobile robot in words what to do in an apartment that it has never seen (COME-robot)",
     parameters=RunParameters,
     reads={
@@ -113,7 +112,6 @@ RUN = Stage(
 )
 REPLAY = Stage(
     name="agent replay",
-    version=12,
     summary="Do an episode again with the programs that its brain wrote: the same bytes, nobody is asked",
     parameters=ReplayParameters,
     reads={"episode": AgentEpisode},
@@ -126,7 +124,6 @@ REPLAY = Stage(
 )
 EVALUATE = Stage(
     name="agent evaluate",
-    version=7,
     summary="Compare arms of the agent over tasks and seeds in the fast world",
     parameters=EvaluateParameters,
     reads={},

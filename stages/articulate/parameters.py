@@ -32,7 +32,6 @@ class ArticulateParameters(Parameters):
 
 STAGE = Stage(
     name="articulate",
-    version=1,
     summary="Find doors and drawers that a log shows in two states, and the joint of each from its motion",
     parameters=ArticulateParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},

@@ -141,7 +141,6 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=13,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={

@@ -115,7 +115,6 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
 
 DEMONSTRATE = Stage(
     name="cutting demonstrate",
-    version=2,
     summary="Demonstrations: of a scripted cutter, who misses as people do, or what a person recorded",
     parameters=DemonstrateParameters,
     reads={"record": Optionally(External("what was cut by clicking on pictures (scenewright cutting record FILE)"))},
@@ -126,7 +125,6 @@ DEMONSTRATE = Stage(
 )
 LEARN = Stage(
     name="cutting learn",
-    version=1,
     summary="Learn types of fragments and rules of cutting from demonstrations",
     parameters=LearnParameters,
     reads={"demonstrations": CuttingDemonstrations},
@@ -138,7 +136,6 @@ LEARN = Stage(
 )
 PLAN = Stage(
     name="cutting plan",
-    version=3,
     summary="Plan cuts towards fragments that are wanted, or say why that cannot be",
     parameters=PlanParameters,
     reads={
@@ -156,7 +153,6 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="cutting simulate",
-    version=3,
     summary="Cut on a board in physics, planning anew after each cut from what lies there",
     parameters=SimulateParameters,
     reads={"plan": CuttingPlan, "model": CuttingModel},
@@ -169,7 +165,6 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="cutting evaluate",
-    version=2,
     summary="Compare methods of cutting over many seeded goals, with intervals",
     parameters=EvaluateParameters,
     reads={"model": CuttingModel},

@@ -76,7 +76,6 @@ def check_inputs(parameters: DisparityParameters, inputs: Mapping[str, Any]) -> 
 
 STAGE = Stage(
     name="disparity",
-    version=2,
     summary="Match the stereo pairs of a sequence: disparity, confidence, and the depth that the other steps read",
     parameters=DisparityParameters,
     reads={

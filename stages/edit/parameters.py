@@ -58,7 +58,6 @@ class EditMasksParameters(Parameters):
 
 MAP = Stage(
     name="edit map",
-    version=4,
     summary="Apply edits (edits.toml) to a panoptic map; what no longer fits is a conflict, and not applied",
     parameters=EditMapParameters,
     reads={"panoptic_map": PanopticMap, "edits": External("edits.toml, as `edit rename` and the like write it")},
@@ -71,7 +70,6 @@ MAP = Stage(
 
 GRAPH = Stage(
     name="edit graph",
-    version=1,
     summary="Apply edits (edits.toml) to a contact graph: supports that a person pins, things that are fixed or free",
     parameters=EditMapParameters,
     reads={"contact_graph": ContactGraph, "edits": External("edits.toml, as `edit support` and the like write it")},
@@ -84,7 +82,6 @@ GRAPH = Stage(
 
 SCENE = Stage(
     name="edit scene",
-    version=1,
     summary="Apply edits (edits.toml) to a CAD scene: another model or none, another place, joints",
     parameters=EditMapParameters,
     reads={
@@ -102,7 +99,6 @@ SCENE = Stage(
 
 MASKS = Stage(
     name="edit masks",
-    version=1,
     summary="Draw masks for every frame from a map that was put right, to train with (`export --layout coco`)",
     parameters=EditMasksParameters,
     reads={"sequence": Sequence, "panoptic_map": PanopticMap},

@@ -25,6 +25,7 @@ from scenewright.schemas.errors import BadInput, MachineFailure, ScenewrightErro
 from scenewright.schemas.kinds import KINDS
 from scenewright.schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from scenewright.stages.engine import store
+from scenewright.stages.engine.code.digests import step_code
 from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.engine.keys import artifact_key
 from scenewright.stages.engine.reading import input_place, read_manifest
@@ -310,8 +311,10 @@ def _cannot_be_remade(artifact: _Artifact) -> str:
     """
     manifest = artifact.manifest
     stage = all_stages().get(manifest.stage)
-    if stage is None or manifest.stage_version != stage.version:
-        return f"this scenewright has no {manifest.stage} version {manifest.stage_version}"
+    if stage is None:
+        return f"this scenewright has no step {manifest.stage}"
+    if manifest.code != step_code(stage).digest:
+        return f"the code of {manifest.stage} has changed since"
     try:
         parameters = stage.parameters(**manifest.parameters)
         digests = {record.role: record.digest for record in manifest.inputs}

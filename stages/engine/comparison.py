@@ -180,10 +180,14 @@ def _compare_one(name: str, first: Path | None, second: Path | None) -> Artifact
 def _changes(before: Manifest, after: Manifest) -> list[Change]:
     """List what differs in how the two were made and in what they say of themselves."""
     found = []
-    for field in ("stage", "stage_version", "schema_version", "seed", "device_kind"):
+    for field in ("stage", "code", "schema_version", "seed", "device_kind"):
         found += _differences("stage", {field: getattr(before, field)}, {field: getattr(after, field)})
     for group, field in (("parameter", "parameters"), ("library", "libraries"), ("data file", "data_files")):
         found += _differences(group, getattr(before, field), getattr(after, field))
+    found += _differences(
+        "accepted code",
+        *({a.step: f"{a.made_with:.12} -> {a.accepted:.12}" for a in m.accepted_code} for m in (before, after)),
+    )
     found += _differences("input", *({record.role: record.digest for record in m.inputs} for m in (before, after)))
     found += _differences("version", *({f: getattr(m.provenance, f) for f in VERSIONS} for m in (before, after)))
     found += _differences("outcome", {"outcome": before.outcome}, {"outcome": after.outcome})

@@ -24,6 +24,7 @@ from contextlib import contextmanager, suppress
 from typing import IO, BinaryIO, NoReturn
 
 from scenewright.stages.engine import interruption
+from scenewright.stages.engine.code import inherited
 
 AT_WORK = 1.0
 """A child that runs for so long makes something [s]."""
@@ -103,6 +104,7 @@ def module_words(command: Sequence[str]) -> tuple[str, list[str]] | None:
 def become(module: str, words: Sequence[str]) -> NoReturn:
     """Be `python -m module words` in this fork, and end it with its exit code."""
     before = set(sys.modules)
+    inherited.note(before)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGUSR1):
         signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
     sys.argv = [module, *words]

@@ -10,11 +10,12 @@ from typing import Any
 from scenewright.schemas.base import canonical_json
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.vocabulary import VOCABULARY_FILE
+from scenewright.stages.engine.code.digests import step_code
 from scenewright.stages.kit.digests import sha256_of_file, sha256_of_text
 from scenewright.stages.kit.library_versions import library_version
 from scenewright.stages.kit.stage import Parameters, Stage
 
-KEY_FORMAT = 1
+KEY_FORMAT = 2
 """Raised whenever what goes into the key changes."""
 
 
@@ -65,7 +66,7 @@ def artifact_key(
                 "kind": stage.writes.kind,
                 "schema_version": stage.writes.schema_version,
                 "stage": stage.name,
-                "stage_version": stage.version,
+                "code": step_code(stage).digest,
                 "parameters": parameters_as_json(parameters),
                 "inputs": dict(inputs),
                 "seed": seed,

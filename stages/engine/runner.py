@@ -17,6 +17,8 @@ from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
 from scenewright.schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
 from scenewright.stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
+from scenewright.stages.engine.accepted_code import carried_on, is_accepted
+from scenewright.stages.engine.code.digests import changed_modules, step_code
 from scenewright.stages.engine.digests import content_digest, record_files
 from scenewright.stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from scenewright.stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
@@ -60,6 +62,9 @@ NO_CODE_CACHE = "cannot cache function"
 """How numba begins what it says when every folder for it is read-only."""
 NO_CODE_CACHE_TEXT = "compiled code can be kept nowhere, neither beside the program nor in a home folder"
 NO_CODE_CACHE_HINT = "set NUMBA_CACHE_DIR to a folder that can be written"
+
+MODULES_SHOWN = 3
+"""Changed modules that a reason to run names."""
 
 PROCESSOR = "processor"
 """Entry of timings.json beside the parts of the step, which are wall clock: processor time of all of its process."""
@@ -188,11 +193,15 @@ def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
     return opened
 
 
-def _reason_to_run(out: Path, key: str, manifest: Manifest | None, force: bool, changed: list[str]) -> str | None:
+def _reason_to_run(
+    stage: Stage, out: Path, key: str, manifest: Manifest | None, force: bool, facts: dict[str, Any]
+) -> str | None:
     """Why the step has to run, or None when the artifact on disk is what it would make."""
     if manifest is None:
         return "nothing is made yet"
-    if manifest.key != key:
+    accepted = is_accepted(manifest, facts["code"])
+    changed = _what_changed(stage, manifest, facts, accepted) if manifest.key != key else []
+    if changed or (manifest.key != key and not accepted):
         return f"changed: {', '.join(changed) or 'key format'}"
     if force:
         return "--force"
@@ -203,9 +212,11 @@ def _reason_to_run(out: Path, key: str, manifest: Manifest | None, force: bool, 
     return None
 
 
-def _what_changed(old: Manifest, new: dict[str, Any]) -> list[str]:
+def _what_changed(stage: Stage, old: Manifest, new: dict[str, Any], accepted: bool) -> list[str]:
     changed = []
-    for name in ("stage_version", "schema_version", "seed", "device_kind"):
+    if old.code != new["code"] and not accepted:
+        changed.append(f"code{_modules_of(stage, old.code)}" if old.code else "its manifest names no code")
+    for name in ("schema_version", "seed", "device_kind"):
         if getattr(old, name) != new[name]:
             changed.append(f"{name} {getattr(old, name)} -> {new[name]}")
     for group, before, after in (
@@ -219,6 +230,14 @@ def _what_changed(old: Manifest, new: dict[str, Any]) -> list[str]:
                 detail = "" if group in ("input", "data file") else f" {before.get(name)!r} -> {after.get(name)!r}"
                 changed.append(f"{group} {name}{detail}")
     return changed
+
+
+def _modules_of(stage: Stage, old: str) -> str:
+    modules = changed_modules(stage, old)
+    if not modules:
+        return ""
+    shown = ", ".join(name.removeprefix("scenewright.") for name in modules[:MODULES_SHOWN])
+    return f" ({shown}{', …' if len(modules) > MODULES_SHOWN else ''})"
 
 
 @contextmanager
@@ -278,7 +297,7 @@ def run_stage(
     with _machine_errors(out):
         store.check_target(out, stage.writes.kind)
     facts: dict[str, Any] = {
-        "stage_version": stage.version,
+        "code": step_code(stage).digest,
         "schema_version": stage.writes.schema_version,
         "seed": seed,
         "device_kind": device,
@@ -290,14 +309,14 @@ def run_stage(
 
     if dry_run:
         previous = _previous_manifest(out)
-        reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
+        reason = _reason_to_run(stage, out, key, previous, force, facts)
         status: Status = "up to date" if reason is None else "would run"
         expected = estimation.estimate_step(stage, parameters, inputs) if reason is not None else None
         return RunResult(status, reason or "", out, key, previous if reason is None else None, estimate=expected)
 
     with _machine_errors(out), store.locked(out):
         previous = _previous_manifest(out)
-        reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
+        reason = _reason_to_run(stage, out, key, previous, force, facts)
         if reason is None:
             return RunResult("up to date", "", out, key, previous)
         if shared is not None and not force:
@@ -325,7 +344,7 @@ def run_stage(
                 kind=stage.writes.kind,
                 schema_version=stage.writes.schema_version,
                 stage=stage.name,
-                stage_version=stage.version,
+                code=facts["code"],
                 key=key,
                 content_digest=content_digest(records),
                 files=records,
@@ -337,6 +356,7 @@ def run_stage(
                 libraries=facts["libraries"],
                 data_files=facts["data_files"],
                 device_kind=device,
+                accepted_code=carried_on(item.value.manifest for item in opened if isinstance(item.value, Artifact)),
                 outcome=made.outcome,
                 summary=made.summary,
                 provenance=provenance_now(command, device, started),

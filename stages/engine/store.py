@@ -20,6 +20,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, MachineFailure, UsageError
 from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
 from scenewright.schemas.outside import file_content, json_of
@@ -235,3 +236,17 @@ def take_place(partial: Path, target: Path) -> None:
     elif not exchange(partial, target):
         _journalled_replace(partial, target)
     sync_folder(target.parent)
+
+
+def replace_document(document: Model, path: Path) -> None:
+    """Write a JSON document in place of another, whole or not at all. It is written beside the file's folder first, so
+    that no artifact holds a file that its manifest does not list."""
+    partial = path.parent.parent / f".{path.parent.name}.{path.name}-{os.getpid()}"
+    try:
+        document.write(partial)
+        with partial.open("rb") as file:
+            os.fsync(file.fileno())
+        partial.replace(path)
+        sync_folder(path.parent)
+    finally:
+        partial.unlink(missing_ok=True)

@@ -7,7 +7,10 @@ from pathlib import Path
 
 from scenewright.schemas.errors import BadInput, ScenewrightError
 from scenewright.schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
+from scenewright.stages.engine.accepted_code import is_accepted
+from scenewright.stages.engine.code.digests import step_code
 from scenewright.stages.engine.digests import content_digest, payload_files
+from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.engine.reading import check_sizes, check_version, input_place, read_manifest
 from scenewright.stages.engine.store import TIMINGS_NAME
 from scenewright.stages.kit.digests import external_digest, sha256_of_file
@@ -137,9 +140,28 @@ def _opened(root: Path) -> _Visit | Finding:
         return Finding(root, "unknown", (str(error),))
     try:
         check_sizes(root, manifest)
-        return _Visit(root, manifest, _check_bytes(root, manifest) + _check_models(root, manifest))
+        problems = _check_bytes(root, manifest) + _check_models(root, manifest)
+        return _Visit(root, manifest, problems, _notes_on_code(manifest))
     except BadInput as error:
         return _Visit(root, manifest, [str(error)])
+
+
+def _notes_on_code(manifest: Manifest) -> list[str]:
+    """What cannot be said of the code that made an artifact, and what somebody accepted."""
+    notes = [
+        f"code of {entry.step}: {entry.made_with[:12] or 'unknown'} was accepted as {entry.accepted[:12]}, not checked"
+        for entry in manifest.accepted_code
+    ]
+    stage = all_stages().get(manifest.stage)
+    unchecked = "that its bytes come from its inputs is not checked"
+    if not manifest.code:
+        return [*notes, f"its manifest names no code (it was made before manifests did): {unchecked}"]
+    if stage is None:
+        return [*notes, f"this scenewright has no step {manifest.stage!r}: {unchecked}"]
+    today = step_code(stage).digest
+    if today != manifest.code and not is_accepted(manifest, today):
+        notes.append(f"made with code {manifest.code[:12]} of {stage.name}, which is {today[:12]} here: {unchecked}")
+    return notes
 
 
 def _checked_input(visit: _Visit, record: InputRecord, digests: _Digests) -> Path | None:

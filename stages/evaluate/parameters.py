@@ -55,7 +55,6 @@ def check_inputs(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> N
 
 STAGE = Stage(
     name="evaluate",
-    version=7,
     summary="Measure a reconstruction against ground truth (PQ, AP, graph edit distance, ...), or count what is in it",
     parameters=EvaluateParameters,
     reads={

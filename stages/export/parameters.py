@@ -84,7 +84,6 @@ class SceneExportParameters(Parameters):
 
 EXPORT = Stage(
     name="export",
-    version=1,
     summary="Write a sequence back as TUM RGB-D, nerfstudio or MCAP, or with its masks as COCO, for other tools",
     parameters=ExportParameters,
     reads={"sequence": Sequence, "segments": Optionally(Segments)},
@@ -97,7 +96,6 @@ EXPORT = Stage(
 
 EXPORT_SCENE = Stage(
     name="export scene",
-    version=1,
     summary="Write a scene as USD, SDF, MoveIt planning scene or Hydra graph; MJCF and GLB stand in it already",
     parameters=SceneExportParameters,
     reads={"scene": InteractiveScene},

@@ -147,7 +147,6 @@ def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="fuse",
-    version=12,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={

@@ -86,7 +86,6 @@ class GraphParameters(Parameters):
 
 STAGE = Stage(
     name="graph",
-    version=11,
     summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},

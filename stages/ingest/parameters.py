@@ -106,7 +106,6 @@ def _estimate(parameters: IngestParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="ingest",
-    version=4,
     summary="Turn a camera log into a sequence: calibrated, posed, gravity-aligned frames",
     parameters=IngestParameters,
     reads={"log": External("log: a file (MCAP, bag) or a folder")},

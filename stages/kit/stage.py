@@ -123,13 +123,11 @@ class Stage:
     """One step: `stages/<folder>/parameters.py` holds it as STAGE (or several as STAGES), the function
     `run(**inputs, parameters=..., context=...) -> Artifact` stands in `stages/<folder>/<module>.py`.
 
-    `name` is the command (`fuse`, or `library build` for a command within a group). `version` is raised by
-    hand when the meaning of the output changes. `libraries` are the distributions whose versions decide the bytes of
-    the output. `summary` is one line for the help.
+    `name` is the command (`fuse`, or `library build` for a command within a group). `libraries` are the distributions
+    whose versions decide the bytes of the output. `summary` is one line for the help.
     """
 
     name: str
-    version: int
     summary: str
     parameters: type[Parameters]
     reads: Reads

@@ -51,7 +51,6 @@ def _estimate(parameters: LibraryParameters, inputs: Inputs) -> Estimate:
 
 BUILD = Stage(
     name="library build",
-    version=2,
     summary="Make a CAD library of parametric furniture, articulated, with collision shapes and masses",
     parameters=LibraryParameters,
     reads={},
@@ -63,7 +62,6 @@ BUILD = Stage(
 
 ADD = Stage(
     name="library add",
-    version=4,
     summary="Import models of other people into a CAD library: URDF, MJCF, SDF, meshes, PartNet, ShapeNetSem",
     parameters=AdditionParameters,
     reads={

@@ -71,7 +71,6 @@ def check_inputs(parameters: PackParameters, inputs: Mapping[str, Any]) -> None:
 
 STAGE = Stage(
     name="pack",
-    version=2,
     summary="Pack boxes into a basket with an arm: plans are proposed, motion planning says what is wrong (LLM3)",
     parameters=PackParameters,
     reads={

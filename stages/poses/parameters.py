@@ -74,7 +74,6 @@ def check(parameters: PosesParameters, inputs: Mapping[str, Any]) -> None:
 
 STAGE = Stage(
     name="poses",
-    version=4,
     summary="Estimate the camera's path of an RGB-D log: odometry, loop closure, pose graph",
     parameters=PosesParameters,
     reads={"sequence": Sequence},

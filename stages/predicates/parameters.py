@@ -84,7 +84,6 @@ def kitchen_files(parameters: Any) -> tuple[str, ...]:
 
 TEACH = Stage(
     name="predicates teach",
-    version=3,
     summary="Learn predicates and operators from a simulated teacher's corrections in a planar kitchen",
     parameters=TeachParameters,
     reads={
@@ -101,7 +100,6 @@ TEACH = Stage(
 )
 PLAN = Stage(
     name="predicates plan",
-    version=3,
     summary="Plan for a goal in words with what was learned, and try it in the kitchen",
     parameters=PlanParameters,
     reads={"learned": LearnedDomain},
@@ -114,7 +112,6 @@ PLAN = Stage(
 )
 EVALUATE = Stage(
     name="predicates evaluate",
-    version=3,
     summary="Count what is reached of sets of tasks with what was learned, beside the teacher's own operators",
     parameters=EvaluateParameters,
     reads={"learned": LearnedDomain, "scene": Optionally(External("rooms to try in what was learned in rooms"))},

@@ -35,7 +35,6 @@ def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> Non
 
 STAGE = Stage(
     name="report",
-    version=10,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
     reads={role: Optionally(kind) for role, kind in all_roles().items()},

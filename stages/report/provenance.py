@@ -66,7 +66,7 @@ def _made(role: str, artifact: Artifact, report_folder: Path, slowest: float) ->
         outcome=described.outcome,
         summary=tuple((str(name), _short(value)) for name, value in described.summary.items()),
         command=shlex.join(_without_folders(provenance.command)),
-        stage=f"{described.stage} v{described.stage_version}" if manifest else "",
+        stage=f"{described.stage}, code {_code(described)}" if manifest else "",
         seconds=provenance.seconds,
         memory=provenance.peak_memory_bytes / 1e6,
         share=provenance.seconds / slowest if slowest else 0.0,
@@ -87,13 +87,19 @@ def _nothing(artifact: Artifact) -> Manifest:
         kind=artifact.kind,
         schema_version=artifact.schema_version,
         stage="",
-        stage_version=0,
         key="",
         content_digest="",
         files=(),
         outcome=artifact.outcome,
         summary=artifact.summary,
     )
+
+
+def _code(manifest: Manifest) -> str:
+    accepted = ", ".join(
+        f"{entry.step} {entry.made_with:.12} as {entry.accepted:.12}" for entry in manifest.accepted_code
+    )
+    return f"{manifest.code[:12] or 'unknown'}{f' (accepted by hand: {accepted})' if accepted else ''}"
 
 
 def _without_folders(command: tuple[str, ...]) -> list[str]:

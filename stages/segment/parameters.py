@@ -121,7 +121,6 @@ def _estimate(parameters: SegmentParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="segment",
-    version=7,
     summary="Segment every frame: panoptic masks of a backend fused with geometric segments of the depth",
     parameters=SegmentParameters,
     reads={

@@ -101,7 +101,6 @@ def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
 
 BUILD = Stage(
     name="splat build",
-    version=6,
     summary="Learn a room as 3-D Gaussians from posed pictures that arrive one after another",
     parameters=BuildParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},
@@ -112,7 +111,6 @@ BUILD = Stage(
 )
 RENDER = Stage(
     name="splat render",
-    version=3,
     summary="Show what a splat shows where the camera stood, beside what the camera saw, and from all sides",
     parameters=RenderParameters,
     reads={"splat": Splat, "sequence": Sequence},
@@ -123,7 +121,6 @@ RENDER = Stage(
 )
 LANGUAGE = Stage(
     name="splat language",
-    version=3,
     summary="Keep in a splat what its pictures say, so that words find places",
     parameters=LanguageParameters,
     reads={"splat": Splat, "sequence": Sequence, "panoptic_map": Optionally(PanopticMap), "weights": WEIGHTS},
@@ -137,7 +134,6 @@ LANGUAGE = Stage(
 )
 LABEL = Stage(
     name="splat label",
-    version=2,
     summary="Keep what pictures show of every entity of a panoptic map, so that words find it",
     parameters=LabelParameters,
     reads={"panoptic_map": PanopticMap, "sequence": Sequence, "trajectory": Optionally(Trajectory), "weights": WEIGHTS},
@@ -151,7 +147,6 @@ LABEL = Stage(
 )
 QUERY = Stage(
     name="splat query",
-    version=5,
     summary="Find what words ask for, with probabilities, or say that the room has none",
     parameters=QueryParameters,
     reads={"language": LanguageMap, "contact_graph": Optionally(ContactGraph), "weights": WEIGHTS},
@@ -165,7 +160,6 @@ QUERY = Stage(
 )
 EVALUATE = Stage(
     name="splat evaluate",
-    version=2,
     summary="Ask a place for what somebody knows is there, and is not, and count what is found and rejected",
     parameters=EvaluateParameters,
     reads={"language": LanguageMap, "queries": QUERIES, "weights": WEIGHTS},

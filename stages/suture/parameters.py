@@ -146,7 +146,6 @@ def perception_files(parameters: SimulateParameters) -> tuple[str, ...]:
 
 SCENE = Stage(
     name="suture scene",
-    version=1,
     summary="Render stereo pairs of a suture needle with thread, drivers and a wound pad, and the truth",
     parameters=SceneParameters,
     reads={},
@@ -157,7 +156,6 @@ SCENE = Stage(
 )
 NEEDLE = Stage(
     name="suture needle",
-    version=8,
     summary="Find the needle's pose in stereo pairs, with its covariance, or say why it cannot be known (STITCH)",
     parameters=NeedleParameters,
     reads={"sequence": Sequence, "disparity": Optionally(Disparity), "masks": MASKS, "segmenter": SEGMENTER},
@@ -172,7 +170,6 @@ NEEDLE = Stage(
 )
 THREAD = Stage(
     name="suture thread",
-    version=1,
     summary="Trace the thread in both eyes and give its curve in space and its length",
     parameters=ThreadParameters,
     reads={"sequence": Sequence, "needle": Optionally(SutureNeedle), "masks": MASKS, "segmenter": SEGMENTER},
@@ -186,7 +183,6 @@ THREAD = Stage(
 )
 SIMULATE = Stage(
     name="suture simulate",
-    version=6,
     summary="Throw running sutures with two simulated arms until a failure that ends the trial, or six",
     parameters=SimulateParameters,
     reads={"perception": Optionally(External("error model of perception (TOML) that every arm sees by"))},
@@ -199,7 +195,6 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="suture evaluate",
-    version=3,
     summary="Figures of trials (table 4.1, figure 4.1) and of needle poses and threads against the truth",
     parameters=EvaluateParameters,
     reads={

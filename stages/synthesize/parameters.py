@@ -76,7 +76,6 @@ def _estimate(parameters: SynthesizeParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="synthesize",
-    version=3,
     summary="Make a room by support rules and record it with a simulated RGB-D camera, with all ground truth",
     parameters=SynthesizeParameters,
     reads={"library": CadLibrary},

@@ -58,7 +58,6 @@ def check_inputs(parameters: DetectParameters, inputs: Mapping[str, Any]) -> Non
 
 DETECT = Stage(
     name="tableware detect",
-    version=4,
     summary="See what is on a table: dishes, stacks, forks and spoons in an RGB-D image, and what is in doubt",
     parameters=DetectParameters,
     reads={

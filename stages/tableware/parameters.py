@@ -106,7 +106,6 @@ def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) ->
 
 SCENE = Stage(
     name="tableware scene",
-    version=2,
     summary="Make a seeded table with tableware and its overhead RGB-D image",
     parameters=SceneParameters,
     reads={"dishes": Optionally(DISHES_FILE)},
@@ -117,7 +116,6 @@ SCENE = Stage(
 )
 PLAN = Stage(
     name="tableware plan",
-    version=7,
     summary="Plan how to clear a table: pulls, stackings, multi-object and single grasps (TIDY)",
     parameters=PlanParameters,
     reads={"detections": Optionally(TablewareDetections), "scene": Optionally(TablewareScene)},
@@ -140,7 +138,6 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="tableware simulate",
-    version=7,
     summary="Let a policy, or a plan, clear a table in the fast simulator or in physics",
     parameters=SimulateParameters,
     reads={"scene": TablewareScene, "plan": Optionally(TablewarePlan)},
@@ -157,7 +154,6 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="tableware evaluate",
-    version=5,
     summary="Compare policies over many seeded tables in the fast simulator, with intervals",
     parameters=EvaluateParameters,
     reads={},

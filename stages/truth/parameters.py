@@ -48,7 +48,6 @@ class EditedParameters(Parameters):
 
 SCENENN = Stage(
     name="truth scenenn",
-    version=2,
     summary="Make ground truth out of SceneNN's annotation, in the world frame of a sequence of that scene",
     parameters=SceneNNParameters,
     reads={
@@ -65,7 +64,6 @@ SCENENN = Stage(
 
 SUPPORTS = Stage(
     name="truth supports",
-    version=1,
     summary="Make ground truth with a contact graph out of a support annotation (JSON) of a real sequence",
     parameters=SupportsParameters,
     reads={
@@ -82,7 +80,6 @@ SUPPORTS = Stage(
 
 EDITED = Stage(
     name="truth edited",
-    version=1,
     summary="Make ground truth out of a map, graph and scene that somebody put right by hand (`edit`)",
     parameters=EditedParameters,
     reads={

@@ -26,7 +26,6 @@ def artifact(path: Path, *inputs: str, **fields: Any) -> Path:
         "kind": "trajectory",
         "schema_version": 1,
         "stage": "poses",
-        "stage_version": 1,
         "key": "k",
         "files": [],
         "content_digest": NOTHING,

@@ -27,7 +27,6 @@ class ProbeParameters(Parameters):
 
 PROBE = Stage(
     "probe",
-    1,
     "Probe of the contract tests",
     ProbeParameters,
     {"upstream": Optionally(Trajectory), "log": Optionally(External("a file"))},
@@ -65,6 +64,7 @@ def run(upstream: Trajectory | None, log: Path | None, *, parameters: ProbeParam
 
 class _ProbePackage:
     run = staticmethod(run)
+    __file__ = __file__
 
 
 sys.modules.setdefault("scenewright.stages.probe.stage", _ProbePackage)  # type: ignore[arg-type]

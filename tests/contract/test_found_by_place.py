@@ -39,7 +39,7 @@ from scenewright.stages.kit.stage import Parameters, Stage
 class BrandnewParameters(Parameters):
     text: str = Field("hello", description="What it says")
 
-STAGE = Stage("brandnew", 1, "Something new", BrandnewParameters, {}, Novelty,
+STAGE = Stage("brandnew", "Something new", BrandnewParameters, {}, Novelty,
               estimate=lambda parameters, inputs: Estimate(3.0, 0.0, 1.0))
 """,
     "stages/brandnew/stage.py": """

@@ -60,7 +60,6 @@ def write(root: Path, version: int, payload: str) -> Path:
         kind="test_sample",
         schema_version=version,
         stage="sample",
-        stage_version=1,
         key="k",
         content_digest=content_digest(records),
         files=records,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenewright.schemas.base import canonical_json
+from scenewright.stages.engine.code.digests import step_code
 from scenewright.stages.engine.discovery import stage_by_name
 from scenewright.stages.engine.pipelines import Pipeline
 from scenewright.stages.kit.digests import sha256_of_text
@@ -39,10 +40,10 @@ def file_state(path: str) -> State:
 
 
 def pipeline_facts(pipeline: Pipeline) -> dict[str, Any]:
-    """Return the declaration of a pipeline with the versions of its steps."""
+    """Return the declaration of a pipeline with the code of its steps."""
     return {
         "pipeline": pipeline.model_dump(mode="json"),
-        "stage_versions": {step.stage: stage_by_name(step.stage).version for step in pipeline.step},
+        "code": {step.stage: step_code(stage_by_name(step.stage)).digest for step in pipeline.step},
         "package": library_version("scenewright"),
     }
 

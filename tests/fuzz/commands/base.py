@@ -12,11 +12,11 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from tests.freshness.runs import Run
 from tests.fuzz.harness import CORPUS
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -26,6 +26,17 @@ ALL = (
     "--cad-scene @cad --cad-library @library --interactive-scene @urdf --plan @plan"
 )
 SEEN = "--sequence @needle_scene"
+
+
+@dataclass(frozen=True)
+class Run:
+    """One command line; its `--out` is the folder `name`, and a word `@name` in it the output of another."""
+
+    name: str
+    step: str
+    options: str = ""
+
+
 RUNS = (
     Run("library", "library build", "--shapes-per-class 2 --small-shapes-per-class 2 --seed 1"),
     Run("truth", "synthesize", f"--library @library --frames 8 {SMALL}"),

@@ -27,7 +27,6 @@ def write_artifact(folder: Path, text: str, outcome: str = "ok") -> None:
         "kind": "sequence",
         "schema_version": 2,
         "stage": "ingest",
-        "stage_version": 1,
         "key": "k",
         "content_digest": digest,
         "files": [{"path": "data.txt", "bytes": len(text.encode()), "sha256": digest}],

@@ -13,9 +13,7 @@ from pydantic import Field
 from scenewright.schemas.errors import UsageError
 from scenewright.stages.kit.stage import Parameters
 
-from benchmarks import code_digest as digesting
 from benchmarks import command, discovery, keeping
-from benchmarks.code_digest import code_digest
 from benchmarks.command import run
 from benchmarks.discovery import experiment_files, load_experiment
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean, share
@@ -159,45 +157,6 @@ def test_tries_that_all_came_out_alike_have_an_interval_with_a_width() -> None:
     assert (found.value, found.low, found.high) == pytest.approx((1.0, 20 / (20 + 1.959964**2), 1.0))
     rooms = Results(replace(tries, cluster=lambda seed: seed[0]), bench, records).interval("ours", "one", "value")
     assert rooms is not None and (rooms.low, rooms.high) == (1.0, 1.0), "several tries a room: rooms are drawn anew"
-
-
-@pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package of our own outside of the repository: benchmarks.toy is measured, it reaches benchmarks.toy_core."""
-    monkeypatch.setattr(digesting, "REPOSITORY", tmp_path)
-    for function in (digesting._path_of, digesting._tree, digesting._imports_of):
-        function.cache_clear()
-    (tmp_path / "benchmarks").mkdir()
-    (tmp_path / "benchmarks" / "toy_core.py").write_text('"""A core."""\ndef core():\n    return 1\n')
-    (tmp_path / "benchmarks" / "toy.py").write_text(
-        "from benchmarks.toy_core import core\nLIMIT = 3\ndef measure():\n    return core() + LIMIT\n"
-        "def table():\n    return 'a table'\n"
-    )
-    yield tmp_path / "benchmarks"
-    for function in (digesting._path_of, digesting._tree, digesting._imports_of):
-        function.cache_clear()
-
-
-def digest_after(file: Path, old: str, new: str) -> str:
-    text = file.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new))
-    for function in (digesting._path_of, digesting._tree, digesting._imports_of):
-        function.cache_clear()
-
-    def measured() -> None: ...
-
-    measured.__module__, measured.__name__ = "benchmarks.toy", "measure"
-    return code_digest(measured)
-
-
-def test_the_digest_follows_what_is_measured_with_and_nothing_else(package: Path) -> None:
-    same = digest_after(package / "toy.py", "a table", "another table")
-    assert digest_after(package / "toy_core.py", "A core.", "Words.") == same, "docstrings are no code"
-    assert digest_after(package / "toy.py", "LIMIT = 3", "LIMIT = 4") != same
-    changed = digest_after(package / "toy.py", "LIMIT = 4", "LIMIT = 3")
-    assert changed == same
-    assert digest_after(package / "toy_core.py", "return 1", "return 2") != same
 
 
 def test_every_experiment_is_found_by_its_place_and_says_what_it_shows() -> None:

@@ -207,7 +207,6 @@ def test_an_export_is_a_log_by_its_payload(tmp_path: Path) -> None:
         kind="sequence",
         schema_version=Sequence.schema_version,
         stage="test",
-        stage_version=1,
         key="k",
         content_digest=content_digest(records),
         files=records,

@@ -226,16 +226,7 @@ def test_depth_range_must_hold_something() -> None:
 def test_segments_of_another_sequence_are_refused(scene: tuple[Sequence, Segments]) -> None:
     def manifest(kind: str, digest: str, source: str = "") -> Manifest:
         inputs = (InputRecord(role="sequence", kind="sequence", digest=source, path="../x"),) if source else ()
-        return Manifest(
-            kind=kind,
-            schema_version=1,
-            stage="x",
-            stage_version=1,
-            key="k",
-            content_digest=digest,
-            files=(),
-            inputs=inputs,
-        )
+        return Manifest(kind=kind, schema_version=1, stage="x", key="k", content_digest=digest, files=(), inputs=inputs)
 
     sequence = replace(scene[0], manifest=manifest("sequence", "aaa"))
     check_origin(sequence, replace(scene[1], manifest=manifest("segments", "bbb", "aaa")))

@@ -34,7 +34,7 @@ def make_artifact(
             listed.append((role, manifest.kind, manifest.content_digest, path))
         else:
             listed.append((role, "external", external_digest(path), path))
-    defaults = {"stage": "probe", "stage_version": 1, "schema_version": KINDS[kind].schema_version, "key": "k"}
+    defaults = {"stage": "probe", "schema_version": KINDS[kind].schema_version, "key": "k"}
     Manifest(
         kind=kind,
         files=records,

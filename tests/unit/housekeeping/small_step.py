@@ -19,7 +19,6 @@ class SmallParameters(Parameters):
 
 SMALL = Stage(
     "small",
-    1,
     "Step of the housekeeping tests",
     SmallParameters,
     {"upstream": Optionally(Trajectory), "log": Optionally(External("a file"))},
@@ -37,6 +36,7 @@ def run(upstream: Trajectory | None, log: Path | None, *, parameters: SmallParam
 
 class _SmallPackage:
     run = staticmethod(run)
+    __file__ = __file__
 
 
 sys.modules.setdefault("scenewright.stages.small.stage", _SmallPackage)  # type: ignore[arg-type]

@@ -287,7 +287,7 @@ def test_where_a_key_may_not_go() -> None:
     "given", [{"key_variable": KEY}, {"base_url": f"https://user:{KEY}@models.example/v1"}, {"base_url": f"x?k={KEY}"}]
 )
 def test_a_key_given_as_an_option_is_not_said_back(given: dict[str, str]) -> None:
-    stage = Stage("probe", 1, "", LanguageParameters, PLAN.reads, PLAN.writes)
+    stage = Stage("probe", "", LanguageParameters, PLAN.reads, PLAN.writes)
     with pytest.raises(UsageError) as caught:
         parameters_for(stage, given)
     assert KEY not in str(caught.value) and next(iter(given)).replace("_", "-") in str(caught.value)

@@ -295,7 +295,6 @@ def manifest(command: tuple[str, ...] = ("scenewright", "ingest", "--log", "a b"
         kind="sequence",
         schema_version=1,
         stage="ingest",
-        stage_version=2,
         key="k" * 64,
         content_digest="d" * 64,
         files=(),

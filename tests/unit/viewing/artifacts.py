@@ -57,7 +57,6 @@ def seal(root: Path, kind: str, **inputs: Path) -> Path:
         kind=kind,
         schema_version=KINDS[kind].schema_version,
         stage="test",
-        stage_version=1,
         key="0" * 64,
         content_digest=content_digest(records),
         files=records,

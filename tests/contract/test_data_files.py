@@ -6,19 +6,13 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from scenewright.stages.engine.code.digests import step_code
 from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.kit.stage import Stage
 
-from tests.freshness.program import Program
-from tests.freshness.records import REPOSITORY, code_of
-
+REPOSITORY = Path(__file__).resolve().parents[2]
 FILES = {path.name for path in (REPOSITORY / "data").rglob("*") if path.is_file()}
 ALWAYS = {"vocabulary.toml"}
-
-
-@pytest.fixture(scope="module")
-def program() -> Program:
-    return Program(REPOSITORY)
 
 
 def declared(stage: Stage) -> set[str]:
@@ -35,7 +29,7 @@ def declared(stage: Stage) -> set[str]:
 
 
 @pytest.mark.parametrize("name", all_stages())
-def test_files_that_the_code_names_are_in_the_key(program: Program, name: str) -> None:
+def test_files_that_the_code_names_are_in_the_key(name: str) -> None:
     stage = all_stages()[name]
-    named = {Path(text).name for text in code_of(program, stage).texts} & FILES
+    named = {Path(text).name for text in step_code(stage).texts} & FILES
     assert named <= declared(stage), "data_files of the declaration has to name them"

@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-OURS = ("stages", "schemas")
+from scenewright.stages.engine.code.places import OURS, Places
+
 DECLARED_IN = {"Field", "Stage", "External"}
 """Calls whose `description`, `summary` and `example` are for people."""
 FOR_PEOPLE = {"description", "summary", "example", "title"}
@@ -83,32 +84,18 @@ class Code:
 
 
 class Program:
-    """The modules of a checkout, read when they are asked for."""
+    """The modules of some places, read when they are asked for."""
 
-    def __init__(self, root: Path) -> None:
-        self.root = root
+    def __init__(self, places: Places) -> None:
+        self.places = places
         self.module = cache(self._read)
-        self.beneath = cache(self._beneath)
+        self.file = cache(places.file)
+        self.beneath = cache(places.beneath)
         self._written: dict[int, Written] = {}
 
-    def file(self, name: str) -> Path | None:
-        """The file of a dotted name; None when it is not ours."""
-        if name.split(".")[0] not in OURS:
-            return None
-        path = self.root.joinpath(*name.split("."))
-        files = (path / "__init__.py", path.with_suffix(".py"))
-        return next((file for file in files if file.is_file()), None)
-
     def is_ours(self, name: str) -> bool:
-        """Whether a dotted name is a module or package of ours."""
+        """Whether a dotted name is a module or package that is followed."""
         return self.file(name) is not None
-
-    def _beneath(self, name: str) -> tuple[str, ...]:
-        """A module and, when it is a package, all below it."""
-        folder = self.root.joinpath(*name.split("."))
-        below = sorted(folder.rglob("*.py")) if folder.is_dir() else []
-        parts = (file.relative_to(self.root).with_suffix("").parts for file in below)
-        return tuple(sorted({name, *(".".join(p[:-1] if p[-1] == "__init__" else p) for p in parts)}))
 
     def _read(self, name: str) -> Module:
         file = self.file(name)
@@ -173,14 +160,16 @@ class Program:
             self._written[id(statement)] = _Writer(self, self.module(module), statement).written()
         return self._written[id(statement)]
 
-    def code_of(self, roots: list[Definition]) -> Code:
-        """Digest everything that the definitions reach. Raises KeyError for a root that does not exist."""
+    def code_of(self, roots: list[Definition | Whole]) -> Code:
+        """Digest everything that definitions, or whole modules, reach. Raises KeyError for one that does not exist."""
         for root in roots:
-            if root.name not in self.module(root.module).definitions:
+            if not self.is_ours(root.module):
+                raise KeyError(f"no module {root.module}")
+            if isinstance(root, Definition) and root.name not in self.module(root.module).definitions:
                 raise KeyError(f"{root.module} defines no {root.name}")
-        reach = _Reach(self, ".".join(roots[0].module.split(".")[:2]))
+        reach = _Reach(self, roots[0].module.rpartition(".")[0])
         for root in roots:
-            reach.number(root)
+            reach.text(root)
         whole = hashlib.sha256()
         per_module: dict[str, list[str]] = defaultdict(list)
         texts: set[str] = set()
@@ -409,10 +398,11 @@ class _Writer:
 
     def _constant(self, value: object) -> None:
         """A text that is the name of one of our modules is an import."""
-        if isinstance(value, str) and "." in value and value.split(".")[0] in OURS and self._program.is_ours(value):
+        if isinstance(value, str) and "." in value and self._program.is_ours(value):
             self._put(Whole(value))
         else:
-            self._put(f"{type(value).__name__}={value!r}")
+            shown = value.removeprefix(f"{OURS}.") if isinstance(value, str) else value
+            self._put(f"{type(value).__name__}={shown!r}")
             if isinstance(value, str) and Path(value[:200]).suffix and "\n" not in value:
                 self._texts.add(value)
 
@@ -421,12 +411,12 @@ class _Writer:
         of the package in which this stands."""
         if isinstance(node, ast.JoinedStr):
             first = node.values[0] if node.values else None
-            if isinstance(first, ast.Constant) and isinstance(first.value, str) and first.value.split(".")[0] in OURS:
+            if isinstance(first, ast.Constant) and isinstance(first.value, str) and "." in first.value:
                 package = first.value.rpartition(".")[0]
-                if self._program.is_ours(package):
+                if self._program.is_ours(package) and "." in package:
                     self._put(Whole(package))
         elif _called(node) in ("import_module", "iter_modules", "walk_packages") and not self._is_followed(node):
-            if len(self._module.name.split(".")) > 3:
+            if len(self._module.name.split(".")) > 4:
                 self._put(Whole(self._module.name.rpartition(".")[0]))
             self._put(None)
 
@@ -440,6 +430,10 @@ class _Writer:
             argument = argument.value
         if isinstance(argument, ast.Attribute) and argument.attr in ("__name__", "__path__"):
             argument = argument.value
+            while isinstance(argument, ast.Attribute) and isinstance(argument.value, (ast.Attribute, ast.Name)):
+                argument = argument.value  # `import a.b`, then `a.b.__path__`
+                if isinstance(argument, ast.Name):
+                    return argument.id not in self._locals and bool(self._targets(argument.id))
         if isinstance(argument, ast.Call):
             return _called(argument) == "import_module"  # looked at by itself
         if isinstance(argument, ast.Constant):
