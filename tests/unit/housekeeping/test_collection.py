@@ -145,7 +145,7 @@ def test_kinds_to_keep(tmp_path: Path) -> None:
         survey([folder], keep=["nonsense"])
 
 
-@pytest.mark.parametrize("change", ["log gone", "log edited", "version", "key"])
+@pytest.mark.parametrize("change", ["log gone", "log edited", "code", "key"])
 def test_what_cannot_be_remade_stays(tmp_path: Path, change: str) -> None:
     folder = chain(tmp_path / "run")
     if change == "log gone":
@@ -154,7 +154,7 @@ def test_what_cannot_be_remade_stays(tmp_path: Path, change: str) -> None:
         (folder / "room.log").write_text("gol")
     else:
         manifest = Manifest.read(folder / "a" / MANIFEST_NAME)
-        update = {"stage_version": 0} if change == "version" else {"libraries": {}, "key": "another"}
+        update = {"code": "another"} if change == "code" else {"libraries": {}, "key": "another"}
         manifest.model_copy(update=update).write(folder / "a" / MANIFEST_NAME)
     collect(survey([folder], intermediate=True))
     assert (folder / "a" / MANIFEST_NAME).exists() and not (folder / "b").exists()
