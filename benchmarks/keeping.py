@@ -65,8 +65,7 @@ def _code_of(experiment: Experiment, arm: str) -> list[str]:
     """The digests of the experiment's steps, and of its own modules for the arm, or else of its measuring function."""
     module, name = experiment.measure.__module__, experiment.measure.__name__
     roots = [f"{other}:" for other in experiment.code.get(arm, ())] or [f"{module}:{name}"]
-    followed = tuple(sorted({PACKAGE, module.partition(".")[0]}))
-    return [code_of(*roots, also=followed).digest, *(step_code(stage_by_name(s)).digest for s in experiment.steps)]
+    return [code_of(*roots, also=(PACKAGE,)).digest, *(step_code(stage_by_name(s)).digest for s in experiment.steps)]
 
 
 def read_record(experiment: Experiment, bench: Bench, trial: Trial, *, any_code: bool = False) -> Any | None:

@@ -137,6 +137,7 @@ def _manifest_text(artifact: Artifact) -> str:
         ("outcome", manifest.outcome),
         *(("summary", f"{name} = {value}") for name, value in manifest.summary.items()),
         ("made by", f"{manifest.stage}, code {manifest.code[:12] or 'unknown'}, seed {manifest.seed}"),
+        *(("accepted", f"code of {a.step}: {a.made_with[:12]} as {a.accepted[:12]}") for a in manifest.accepted_code),
         *(("input", f"{i.role}: {i.kind} {i.digest[:12]} {i.path}") for i in manifest.inputs),
         *(("parameter", f"{name} = {value}") for name, value in manifest.parameters.items()),
         ("content", manifest.content_digest),

@@ -18,6 +18,7 @@ from scenewright.schemas.errors import BadInput, MachineFailure, UsageError
 from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
 from scenewright.schemas.vocabulary import VOCABULARY_FILE
 from scenewright.stages.engine import store
+from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.engine.runner import RunResult, run_stage
 from scenewright.stages.engine.verification import verify
 
@@ -289,7 +290,8 @@ def test_verify_follows_inputs_back(tmp_path: Path) -> None:
     assert len(problems) == 1 and "a.log" in problems[0]
 
 
-def test_a_moved_run_still_verifies(tmp_path: Path) -> None:
+def test_a_moved_run_still_verifies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(all_stages(), "probe", PROBE)
     make(tmp_path / "run" / "up")
     make(tmp_path / "run" / "down", {"upstream": tmp_path / "run" / "up"})
     shutil.move(tmp_path / "run", tmp_path / "moved")

@@ -18,7 +18,7 @@ from typing import Any
 
 from scenewright.schemas.errors import MachineFailure
 from scenewright.stages.engine.code import inherited
-from scenewright.stages.engine.code.places import places_here
+from scenewright.stages.engine.code.places import OURS, places_here
 from scenewright.stages.engine.code.program import Code, Definition, Program, Whole
 from scenewright.stages.engine.user_cache import cache_folder
 from scenewright.stages.kit.digests import sha256_of_text
@@ -52,7 +52,8 @@ def changed_modules(stage: Stage, before: str) -> list[str]:
     """Return the modules whose code differs from that of an earlier digest of the step, or is gone; one that only moved
     is none of them. Empty where that code was not seen here lately."""
     code = step_code(stage)
-    modules = _kept(_roots_of(stage)).get("earlier", {}).get(before, {})
+    roots = _roots_of(stage)
+    modules = _kept((*roots, *_followed(roots))).get("earlier", {}).get(before, {})
     if not modules:
         return []
     new, gone = (
@@ -72,8 +73,10 @@ def _roots_of(stage: Stage) -> tuple[str, str]:
 def code_of(*roots: str, also: tuple[str, ...] = ()) -> Code:
     """Return the code that definitions reach, each given as `module:name`, or a whole module as `module:`.
 
-    Packages at the top that `also` names are followed too. Raises KeyError for one that is not there.
+    What is followed is scenewright, the packages at the top of these, and those that `also` names. Raises KeyError for
+    one that is not there.
     """
+    also = _followed(roots, also)
     kept = _read_kept((*roots, *also))
     if kept is not None:
         return kept
@@ -83,6 +86,11 @@ def code_of(*roots: str, also: tuple[str, ...] = ()) -> Code:
     code = program.code_of([Definition(module, name) if name else Whole(module) for module, name in pairs])
     _keep((*roots, *also), program, code, before)
     return code
+
+
+def _followed(roots: Sequence[str], also: Sequence[str] = ()) -> tuple[str, ...]:
+    """Packages at the top that are followed beside scenewright."""
+    return tuple(sorted({*also, *(root.partition(".")[0] for root in roots)} - {OURS}))
 
 
 @cache
