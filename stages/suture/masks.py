@@ -135,9 +135,9 @@ def _from_spoiled(sequence: Sequence, masks: Path | None, segmenter: Path | None
 
     def make(pair: Pair) -> EyeMasks:
         left, right, seed = true_eyes(pair)
-        shown = Eye(pair.left, left.bodies, left.depth, left.sees)
-        other = Eye(pair.right, right.bodies, right.depth, right.sees)
-        return spoiled_masks(shown, other, seed)[0]
+        left_eye = Eye(pair.left, left.bodies, left.depth, left.sees)
+        right_eye = Eye(pair.right, right.bodies, right.depth, right.sees)
+        return spoiled_masks(left_eye, right_eye, seed)[0]
 
     return make
 

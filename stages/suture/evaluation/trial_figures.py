@@ -66,9 +66,9 @@ def metrics(runs: Sequence[SutureRun], pairs: Pairs = PAIRS) -> dict[str, float]
         put(arm, "full_wound_rate", (thrown >= 6).astype(float))
         put(arm, "seconds_per_suture", seconds, tried)
         put(arm, "seconds_per_completed", seconds, thrown)
-        asked = np.array([run.interventions for run in rows], dtype=float)
-        if asked.sum() > 0:
-            put(arm, "sutures_to_intervention", thrown, asked)
+        interventions = np.array([run.interventions for run in rows], dtype=float)
+        if interventions.sum() > 0:
+            put(arm, "sutures_to_intervention", thrown, interventions)
         for kind in KINDS:
             figures[f"{arm}/trials/errors_{kind.lower()}"] = float(sum(run.errors.count(kind) for run in rows))
         figures[f"{arm}/trials/seen_right_share"] = sum(run.right for run in rows) / max(1, sum(r.looks for r in rows))

@@ -94,8 +94,8 @@ def estimate(
     answer = _answer(rivals, presence_probability(features), np.random.default_rng(seed))
     answer = replace(answer, presence_features=tuple(features.tolist()))
     if not answer.abstained:
-        rest = left_over(observation.rig, eyes, sheets, rivals[0].outline)
-        return replace(answer, abstained=_second_needle(observation, rivals[0], rest, seed))
+        rest_masks = left_over(observation.rig, eyes, sheets, rivals[0].outline)
+        return replace(answer, abstained=_second_needle(observation, rivals[0], rest_masks, seed))
     return answer
 
 
@@ -152,15 +152,15 @@ def _hypotheses(
 
 def _finalists(coarse: list[Outline], most: int) -> list[Outline]:
     """Return the best few outlines, none of them like another with tip and swage exchanged or not."""
-    kept: list[Outline] = []
+    finalists: list[Outline] = []
     for outline in coarse:
         if NEAREST < outline.pose.centre[2] < FARTHEST and not any(
-            _near(either_way(outline.pose, other.pose)[0], SAME) for other in kept
+            _near(either_way(outline.pose, finalist.pose)[0], SAME) for finalist in finalists
         ):
-            kept.append(outline)
-        if len(kept) == most:
+            finalists.append(outline)
+        if len(finalists) == most:
             break
-    return kept
+    return finalists
 
 
 def _fine(rig: StereoRig, sheets: tuple[Sheet, Sheet], finalists: list[Outline]) -> list[Outline]:
@@ -243,15 +243,15 @@ def _answer(rivals: list[Hypothesis], presence: float, random: np.random.Generat
     chances = [_chance(rival, rivals, draws) for rival in rivals]
     chance = max(chances)
     # rivals are ordered: of those about one place the likeliest says where on its circle the needle lies
-    best = next(rival for rival, own in zip(rivals, chances, strict=True) if own >= 0.9 * chance)
-    about = [other for other in rivals if _about(best.pose, other.pose)]
-    along = sum(other.probability for other in about if best.pose.normal @ other.pose.normal > 0)
-    everything = sum(other.probability for other in about)
+    best = next(rival for rival, rival_chance in zip(rivals, chances, strict=True) if rival_chance >= 0.9 * chance)
+    about = [candidate for candidate in rivals if _about(best.pose, candidate.pose)]
+    along = sum(candidate.probability for candidate in about if best.pose.normal @ candidate.pose.normal > 0)
+    everything = sum(candidate.probability for candidate in about)
     pose = best.pose if 2.0 * along >= everything else best.pose.swapped()
     sure = max(along, everything - along) / everything
     why = _why_abstain(best, chance, presence, about)
-    near = [other for other in about if _near(either_way(best.pose, other.pose)[0], BASIN)]
-    covariance = _covariance(best, rivals if why else near)
+    in_basin = [candidate for candidate in about if _near(either_way(best.pose, candidate.pose)[0], BASIN)]
+    covariance = _covariance(best, rivals if why else in_basin)
     return NeedleEstimate(pose, covariance, float(np.clip(sure, 0.5, MOST_SURE)), why)
 
 
@@ -275,22 +275,22 @@ def _chance(hypothesis: Hypothesis, rivals: list[Hypothesis], draws: np.ndarray)
 def _covariance(best: Hypothesis, others: list[Hypothesis]) -> np.ndarray:
     """Return the covariance (6, 6) about the best pose of what `others` (the best among them) say together."""
     total = np.zeros((6, 6))
-    for other in others:
-        step, _ = either_way(best.pose, other.pose)
-        total += other.probability * (other.covariance() + np.outer(step, step))
-    return total / sum(other.probability for other in others)
+    for outline in others:
+        step, _ = either_way(best.pose, outline.pose)
+        total += outline.probability * (outline.covariance() + np.outer(step, step))
+    return total / sum(outline.probability for outline in others)
 
 
 def _why_abstain(best: Hypothesis, chance: float, presence: float, about: list[Hypothesis]) -> str:
     """Return why the pose should not be used, or nothing."""
     if presence < LEAST_PRESENCE:
         return f"What both eyes show is hardly a needle: the best outline is one with {100 * presence:.0f} %."
-    seen = float(best.evidence.seen.mean(axis=1).min())
-    if seen < LEAST_SEEN:
-        return f"One eye sees {100 * seen:.0f} % of the needle where it best fits."
+    least_seen = float(best.evidence.seen.mean(axis=1).min())
+    if least_seen < LEAST_SEEN:
+        return f"One eye sees {100 * least_seen:.0f} % of the needle where it best fits."
     if chance >= LEAST_PROBABILITY:
         return ""
-    if sum(other.probability for other in about) < MOST_OF_IT:
+    if sum(rival.probability for rival in about) < MOST_OF_IT:
         return f"Different poses explain what both eyes see; the likeliest is right with {100 * chance:.0f} %."
     covariance = _covariance(best, about)
     shift = 1000.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))

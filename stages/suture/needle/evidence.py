@@ -71,9 +71,11 @@ class Evidence:
     @property
     def terms(self) -> np.ndarray:
         """What WEIGHTS (13,) weigh."""
-        rest = self.misfit - self.lost - self.hidden
-        left = min(self.left_over, MOST_LEFT_OVER)
-        return np.array([rest, left, self.lost, self.hidden, self.missing, self.taper, *self.threads])
+        explained_misfit = self.misfit - self.lost - self.hidden
+        capped_left_over = min(self.left_over, MOST_LEFT_OVER)
+        return np.array(
+            [explained_misfit, capped_left_over, self.lost, self.hidden, self.missing, self.taper, *self.threads]
+        )
 
     @property
     def log_weight(self) -> float:
@@ -169,14 +171,14 @@ def _threads(rig: StereoRig, eye: EyeMask, outline: Outline, which: int) -> np.n
 
 def _crossings(thread: np.ndarray, middle: np.ndarray, radius: float) -> int:
     """Return how often thread (h, w) bool crosses a circle about a place (column, row) [px]."""
-    there = np.zeros(len(ON_UNIT_CIRCLE), dtype=bool)
+    on_thread = np.zeros(len(ON_UNIT_CIRCLE), dtype=bool)
     # two circles, as a line of pixels may slip through one
     for reach in (radius, radius + 1.0):
         columns, rows = np.round(middle + reach * ON_UNIT_CIRCLE).astype(int).T
         inside = (columns >= 0) & (rows >= 0) & (columns < thread.shape[1]) & (rows < thread.shape[0])
-        there[inside] |= thread[rows[inside], columns[inside]]
-    there |= np.roll(there, 1) & np.roll(there, -1)
-    return int((there & ~np.roll(there, 1)).sum())
+        on_thread[inside] |= thread[rows[inside], columns[inside]]
+    on_thread |= np.roll(on_thread, 1) & np.roll(on_thread, -1)
+    return int((on_thread & ~np.roll(on_thread, 1)).sum())
 
 
 def left_over(
@@ -188,9 +190,11 @@ def left_over(
     for which, (eye, s) in enumerate(zip(eyes, sheets, strict=True)):
         _, pixels = trace(arc, s.corner, which)
         draw(pixels, GROWTH, CLOSE + 0.5, 1, s.drawn, s.piece)
-        rest = s.free & ~((s.piece >= 0) & (s.drawn <= CLOSE))
+        unexplained = s.free & ~((s.piece >= 0) & (s.drawn <= CLOSE))
         s.piece[:] = -1
-        whole = np.zeros((rig.height, rig.width), dtype=bool)
-        whole[eye.row : eye.row + rest.shape[0], eye.column : eye.column + rest.shape[1]] = rest
-        rests.append(whole)
+        full_mask = np.zeros((rig.height, rig.width), dtype=bool)
+        full_mask[eye.row : eye.row + unexplained.shape[0], eye.column : eye.column + unexplained.shape[1]] = (
+            unexplained
+        )
+        rests.append(full_mask)
     return rests[0], rests[1]

@@ -72,8 +72,8 @@ def fuse(frames: list[tuple[NeedleEstimate, np.ndarray]]) -> NeedleEstimate:
     groups = []
     for pose, covariance, _ in usable:
         agreeing = []
-        for index, (other, other_covariance, _) in enumerate(usable):
-            step, exchanged = either_way(pose, other)
+        for index, (other_pose, other_covariance, _) in enumerate(usable):
+            step, exchanged = either_way(pose, other_pose)
             if step @ np.linalg.solve(covariance + other_covariance, step) < AGREES:
                 agreeing.append((index, exchanged))
         # sure frames count for more than unsure ones, which agree with anything
@@ -99,8 +99,8 @@ def _average(
         information[:] = 0.0
         pull, odds = np.zeros(6), 0.0
         for index, exchanged in agreeing:
-            other, covariance, estimate = usable[index]
-            step = difference(pose, other.swapped() if exchanged else other)
+            other_pose, covariance, estimate = usable[index]
+            step = difference(pose, other_pose.swapped() if exchanged else other_pose)
             distance = float(step @ np.linalg.solve(covariance, step))
             weight = np.linalg.inv(covariance) / (1.0 + distance / 12.0)
             information += weight

@@ -101,14 +101,14 @@ def fitted_radius(observation: NeedleObservation, seed: int = 0) -> Radius | Non
     if min(int(mask.sum()) for mask in (observation.left_mask, observation.right_mask)) == 0:
         return None
     sheets, eyes = _sheets(observation), windows(observation)
-    found: list[_Fit] = []
+    fits: list[_Fit] = []
     for metres in map(float, TRIED):
         rig = as_if_usual(observation.rig, metres)
         begun = starts(rig, eyes, np.empty((0, 3)), STARTS, SAMPLED, np.random.default_rng(seed))
-        here = [_Fit(fit_outline(rig, sheets, pose, np.zeros(2), COARSE_LEVELS), metres) for pose in begun]
-        found += _different(sorted(here, key=_misfit), SAME)[:AT_A_RADIUS]
-    found.sort(key=_misfit)
-    refined = [_refined(observation.rig, eyes, sheets, fit) for fit in _different(found, SAME)[:REFINED]]
+        fits_of_radius = [_Fit(fit_outline(rig, sheets, pose, np.zeros(2), COARSE_LEVELS), metres) for pose in begun]
+        fits += _different(sorted(fits_of_radius, key=_misfit), SAME)[:AT_A_RADIUS]
+    fits.sort(key=_misfit)
+    refined = [_refined(observation.rig, eyes, sheets, fit) for fit in _different(fits, SAME)[:REFINED]]
     return _spread(_different(sorted((fit for fit in refined if fit), key=lambda fit: -fit.log_weight), ALIKE))
 
 
@@ -134,12 +134,12 @@ def _misfit(fit: _Fit) -> float:
 
 def _different(fits: list[_Fit], limits: tuple[float, float]) -> list[_Fit]:
     """Return the fits, of those within limits [m], [rad] of each other the first."""
-    kept: list[_Fit] = []
+    distinct: list[_Fit] = []
     for fit in fits:
-        steps = (either_way(fit.pose, other.pose)[0] for other in kept)
+        steps = (either_way(fit.pose, earlier.pose)[0] for earlier in distinct)
         if not any(np.linalg.norm(step[:3]) < limits[0] and np.linalg.norm(step[3:]) < limits[1] for step in steps):
-            kept.append(fit)
-    return kept
+            distinct.append(fit)
+    return distinct
 
 
 def _spread(rivals: list[_Fit]) -> Radius | None:
@@ -161,8 +161,8 @@ def together(radii: Sequence[Radius]) -> Radius:
     order = np.argsort(metres)
     upto = np.cumsum(weights[order])
     middle = metres[order][np.searchsorted(upto, 0.5 * upto[-1])]
-    kept = np.abs(metres - middle) <= OUTLYING * deviations
-    metres, deviations, weights = metres[kept], deviations[kept], weights[kept]
+    inlying = np.abs(metres - middle) <= OUTLYING * deviations
+    metres, deviations, weights = metres[inlying], deviations[inlying], weights[inlying]
     alone = float(np.mean(deviations**2))
     mean = float(weights @ metres / weights.sum())
     return Radius(mean, float(np.sqrt(SHARED * alone + (1.0 - SHARED) / weights.sum())))
@@ -201,12 +201,12 @@ def _parabola(at: Callable[[float, float], Outline], growth: float, width: float
     """Return first (2,) and second differences (2, 2) of the misfit with the growth's prior, in units of `width` of the
     radius and of GROWTH_STEP."""
     middle = at(1.0, growth).misfit
-    less, more = at(1.0 - width, growth).misfit, at(1.0 + width, growth).misfit
+    narrower, wider = at(1.0 - width, growth).misfit, at(1.0 + width, growth).misfit
     thin, thick = at(1.0, growth - GROWTH_STEP).misfit, at(1.0, growth + GROWTH_STEP).misfit
     prior = 2.0 * VARIANCE * (GROWTH_STEP / GROWTH_SIGMA) ** 2
-    slope = np.array([0.5 * (more - less), 0.5 * (thick - thin) + prior * (growth - GROWTH) / GROWTH_STEP])
-    across = at(1.0 + width, growth + GROWTH_STEP).misfit - more - thick + middle
-    bend = np.array([[more - 2.0 * middle + less, across], [across, thick - 2.0 * middle + thin + prior]])
+    slope = np.array([0.5 * (wider - narrower), 0.5 * (thick - thin) + prior * (growth - GROWTH) / GROWTH_STEP])
+    across = at(1.0 + width, growth + GROWTH_STEP).misfit - wider - thick + middle
+    bend = np.array([[wider - 2.0 * middle + narrower, across], [across, thick - 2.0 * middle + thin + prior]])
     if np.linalg.det(bend) <= 0.0:
         # far from the least the misfit is no bowl: the growth stays as it is
         return np.array([slope[0], 0.0]), np.diag([bend[0, 0], prior])

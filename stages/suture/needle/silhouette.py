@@ -274,10 +274,10 @@ def _fitted(
         cost = _misfit(arc, sheets, tau, 0.0, matrix, gradient)
         for _ in range(steps):
             trial = _stepped(arc, matrix, gradient, damping)
-            there, slope = np.empty((8, 8)), np.empty(8)
-            gain = cost - _misfit(trial, sheets, tau, 0.0, there, slope)
+            trial_matrix, trial_gradient = np.empty((8, 8)), np.empty(8)
+            gain = cost - _misfit(trial, sheets, tau, 0.0, trial_matrix, trial_gradient)
             if gain > 0.0:
-                arc, cost, matrix, gradient = trial, cost - gain, there, slope
+                arc, cost, matrix, gradient = trial, cost - gain, trial_matrix, trial_gradient
                 damping = max(damping / 5.0, 1e-4)
                 if gain < LEAST_GAIN:
                     break

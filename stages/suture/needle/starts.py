@@ -51,13 +51,13 @@ def starts(
         scores.append(scored)
         poses.append(posed)
     ordered = np.concatenate(poses)[np.argsort(-np.concatenate(scores), kind="stable")]
-    kept: list[np.ndarray] = []
+    distinct: list[np.ndarray] = []
     for pose in ordered:
-        if all(_differ(pose, other) for other in kept):
-            kept.append(pose)
-        if len(kept) == count:
+        if all(_differ(pose, earlier) for earlier in distinct):
+            distinct.append(pose)
+        if len(distinct) == count:
             break
-    return [NeedlePose(pose) for pose in kept]
+    return [NeedlePose(pose) for pose in distinct]
 
 
 def _differ(pose: np.ndarray, other: np.ndarray) -> bool:
@@ -217,7 +217,7 @@ def _score(centre: np.ndarray, normal: np.ndarray, masks: _BothMasks, pose: np.n
             best, at = window, station
     explained = 0.0
     for eye in range(2):
-        near = 0
+        near_pixels = 0
         reach = (width + CLOSE) ** 2
         for index in range(len(pixels[eye])):
             for k in range(half):
@@ -225,9 +225,9 @@ def _score(centre: np.ndarray, normal: np.ndarray, masks: _BothMasks, pose: np.n
                 du = columns[eye, station] - pixels[eye][index, 0]
                 dv = rows[eye, station] - pixels[eye][index, 1]
                 if du * du + dv * dv < reach:
-                    near += 1
+                    near_pixels += 1
                     break
-        explained += near / max(len(pixels[eye]), 1)
+        explained += near_pixels / max(len(pixels[eye]), 1)
     turn = 2 * np.pi * at / count
     for i in range(3):
         pose[i, 0] = np.cos(turn) * u[i] + np.sin(turn) * v[i]

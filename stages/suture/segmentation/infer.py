@@ -81,6 +81,6 @@ def normalised(pictures: torch.Tensor) -> torch.Tensor:
 def without_specks(mask: np.ndarray, smallest: int) -> np.ndarray:
     """Return the mask (H, W) bool without its 8-connected pieces of fewer than `smallest` pixels."""
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    kept = statistics[:, cv2.CC_STAT_AREA] >= smallest
-    kept[0] = False
-    return kept[labels]
+    is_large = statistics[:, cv2.CC_STAT_AREA] >= smallest
+    is_large[0] = False
+    return is_large[labels]

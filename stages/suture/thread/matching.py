@@ -48,9 +48,9 @@ def places_of(stretches: Sequence[Stretch]) -> Places:
         if len(stretch.points) >= 3:
             points.append(stretch.points)
             directions.append(directions_of(stretch.points))
-    every, ways = np.concatenate(points), np.concatenate(directions)
+    every, tangents = np.concatenate(points), np.concatenate(directions)
     order = np.argsort(every[:, 1], kind="stable")
-    return Places(every[order], ways[order])
+    return Places(every[order], tangents[order])
 
 
 def directions_of(points: np.ndarray, reach: int = 3) -> np.ndarray:
@@ -117,12 +117,14 @@ def _candidates(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return disparities (K,), costs (K,) and numbers (K,) of the places where the row of `point` meets the thread."""
     rows = point[1] - places.points[first:end, 1]
-    ways = places.directions[first:end]
-    lean = ways[:, 0] * np.sign(ways[:, 1]) / np.maximum(np.abs(ways[:, 1]), 1e-3)
+    tangents = places.directions[first:end]
+    lean = tangents[:, 0] * np.sign(tangents[:, 1]) / np.maximum(np.abs(tangents[:, 1]), 1e-3)
     shift = np.where(np.abs(lean) < LARGEST_LEAN, rows * lean, 0.0)
     disparity = point[0] - (places.points[first:end, 0] + shift)
     cost = (rows / ROW_SIGMA) ** 2
-    kept = np.flatnonzero((disparity >= least) & (disparity <= most))
-    if len(kept) > MOST_PLACES:
-        kept = kept[np.argsort(cost[kept], kind="stable")[:: max(len(kept) // (2 * MOST_PLACES), 1)][:MOST_PLACES]]
-    return disparity[kept], cost[kept], kept + first
+    possible = np.flatnonzero((disparity >= least) & (disparity <= most))
+    if len(possible) > MOST_PLACES:
+        possible = possible[
+            np.argsort(cost[possible], kind="stable")[:: max(len(possible) // (2 * MOST_PLACES), 1)][:MOST_PLACES]
+        ]
+    return disparity[possible], cost[possible], possible + first

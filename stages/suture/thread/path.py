@@ -60,28 +60,28 @@ def followed(strands: Sequence[Strand], start: np.ndarray | None) -> Path | None
         back, gaps_before, doubtful_before = _continued(chain[0].reversed(), free)
         chain = [strand.reversed() for strand in reversed(back)] + chain[1:]
         return _path(chain, free, gaps_before[::-1] + gaps, doubtful + doubtful_before, 0.0)
-    ways = []
+    candidates = []
     for first, others, gap in _beginnings(free, np.asarray(start, dtype=float)):
         chain, gaps, doubtful = _continued(first, others)
-        ways.append((sum(strand.length for strand in chain), _path(chain, others, gaps, doubtful, gap)))
-    if not ways:
+        candidates.append((sum(strand.length for strand in chain), _path(chain, others, gaps, doubtful, gap)))
+    if not candidates:
         return None
-    ways.sort(key=lambda way: -way[0])
-    best = ways[0][1]
-    return replace(best, doubtful_start=len(ways) > 1 and ways[1][0] > RIVAL * ways[0][0])
+    candidates.sort(key=lambda way: -way[0])
+    best = candidates[0][1]
+    return replace(best, doubtful_start=len(candidates) > 1 and candidates[1][0] > RIVAL * candidates[0][0])
 
 
 def _path(chain: list[Strand], others: list[Strand], gaps: list[float], doubtful: int, start_gap: float) -> Path:
     """Return the path over the chain's strands with its gaps filled; `others` are the strands that it leaves."""
-    points, seen = [chain[0].points], [np.ones(len(chain[0].points), dtype=bool)]
+    points, visible = [chain[0].points], [np.ones(len(chain[0].points), dtype=bool)]
     for strand in chain[1:]:
         bridge = _bridge(points[-1], strand.points)
         points += [bridge, strand.points]
-        seen += [np.zeros(len(bridge), dtype=bool), np.ones(len(strand.points), dtype=bool)]
+        visible += [np.zeros(len(bridge), dtype=bool), np.ones(len(strand.points), dtype=bool)]
     crossings = sum(len(strand.doubts) for strand in chain)
     left_over = sum(strand.length for strand in others)
-    whole = np.concatenate(points), np.concatenate(seen)
-    return Path(*whole, tuple(gaps), doubtful, crossings, start_gap, False, left_over)
+    points_and_visible = np.concatenate(points), np.concatenate(visible)
+    return Path(*points_and_visible, tuple(gaps), doubtful, crossings, start_gap, False, left_over)
 
 
 def _beginnings(free: list[Strand], start: np.ndarray) -> list[tuple[Strand, list[Strand], float]]:
@@ -96,20 +96,20 @@ def _beginnings(free: list[Strand], start: np.ndarray) -> list[tuple[Strand, lis
         last = len(distances) - 1
         places += [(float(distances[0]), index, 0, 1), (float(distances[last]), index, last, -1)]
         if MARGIN < middle < last - MARGIN:
-            places += [(float(distances[middle]) + CUT, index, middle, way) for way in (1, -1)]
-    nearest = min(place[0] for place in places)
+            places += [(float(distances[middle]) + CUT, index, middle, step) for step in (1, -1)]
+    nearest = min(beginning[0] for beginning in places)
     beginnings = []
-    for distance, index, place, way in sorted(places):
+    for distance, index, cut_index, step in sorted(places):
         if distance > min(nearest + MARGIN, FIRST_GAP):
             break
         strand = free[index]
-        if way > 0:
-            doubts = tuple(doubt - place for doubt in strand.doubts if doubt >= place)
-            first = Strand(strand.points[place:], doubts)
+        if step > 0:
+            doubts = tuple(doubt - cut_index for doubt in strand.doubts if doubt >= cut_index)
+            first = Strand(strand.points[cut_index:], doubts)
         else:
-            first = Strand(strand.points[: place + 1], tuple(d for d in strand.doubts if d <= place)).reversed()
+            first = Strand(strand.points[: cut_index + 1], tuple(d for d in strand.doubts if d <= cut_index)).reversed()
         if first.length >= SHORTEST:
-            beginnings.append((first, [other for k, other in enumerate(free) if k != index], distance))
+            beginnings.append((first, [other_strand for k, other_strand in enumerate(free) if k != index], distance))
     return beginnings
 
 

@@ -106,16 +106,16 @@ def _shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int])
                 if node >= 0:
                     ends.setdefault(crossing[node], []).append((index, end))
     shared: dict[int, tuple[int, int]] = {}
-    taken: set[int] = set()
+    joined_ends: set[int] = set()
     for index, stretch in enumerate(stretches):
         if index in inner or stretch.first < 0 or stretch.last < 0 or stretch.length > LONGEST_SHARED:
             continue
         first, last = crossing[stretch.first], crossing[stretch.last]
-        if first == last or first in taken or last in taken:
+        if first == last or first in joined_ends or last in joined_ends:
             continue
         if all(_is_fork(stretches, ends[name], index) for name in (first, last)):
             shared[index] = (first, last)
-            taken |= {first, last}
+            joined_ends |= {first, last}
     for first, last in shared.values():
         for node, name in crossing.items():
             if name == last:
@@ -158,7 +158,12 @@ def _paired(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, En
         return
     costs = sorted(_matchings(tuple(range(len(ends))), turns, alone), key=lambda matching: matching[0])
     best = costs[0][1]
-    doubtful = {pair for pair in best for cost, other in costs[1:] if cost - costs[0][0] < CLOSE and pair not in other}
+    doubtful = {
+        pair
+        for pair in best
+        for cost, other_pairs in costs[1:]
+        if cost - costs[0][0] < CLOSE and pair not in other_pairs
+    }
     for i, j in best:
         yield ends[i], ends[j], (i, j) in doubtful
 
@@ -170,13 +175,13 @@ def _matchings(
     if not free:
         yield 0.0, ()
         return
-    first, rest = free[0], free[1:]
-    for cost, pairs in _matchings(rest, turns, alone):
+    first, remaining = free[0], free[1:]
+    for cost, pairs in _matchings(remaining, turns, alone):
         yield cost + float(alone[first]), pairs
-    for other in rest:
-        if turns[first, other] < LARGEST_TURN:
-            for cost, pairs in _matchings(tuple(k for k in rest if k != other), turns, alone):
-                yield cost + float(turns[first, other]), ((first, other), *pairs)
+    for partner in remaining:
+        if turns[first, partner] < LARGEST_TURN:
+            for cost, pairs in _matchings(tuple(k for k in remaining if k != partner), turns, alone):
+                yield cost + float(turns[first, partner]), ((first, partner), *pairs)
 
 
 def _toward(via: np.ndarray, stretches: list[Stretch], end: End) -> np.ndarray:
@@ -184,8 +189,8 @@ def _toward(via: np.ndarray, stretches: list[Stretch], end: End) -> np.ndarray:
     if len(via) == 0:
         return via
     points = stretches[end[0]].points
-    place = points[0] if end[1] == 0 else points[-1]
-    return via if np.linalg.norm(via[0] - place) <= np.linalg.norm(via[-1] - place) else via[::-1]
+    end_point = points[0] if end[1] == 0 else points[-1]
+    return via if np.linalg.norm(via[0] - end_point) <= np.linalg.norm(via[-1] - end_point) else via[::-1]
 
 
 def _walks(
@@ -197,20 +202,20 @@ def _walks(
     for index, end in begins + [(index, 0) for index in outer]:
         if index in used:
             continue
-        parts, doubts, count = [], [], 0
-        here: End | None = (index, end)
-        while here is not None and here[0] not in used:
-            used.add(here[0])
-            points = stretches[here[0]].points
-            points = points if here[1] == 0 else points[::-1]
-            parts.append(points)
+        pieces, doubts, count = [], [], 0
+        entered: End | None = (index, end)
+        while entered is not None and entered[0] not in used:
+            used.add(entered[0])
+            points = stretches[entered[0]].points
+            points = points if entered[1] == 0 else points[::-1]
+            pieces.append(points)
             count += len(points)
-            leaving = (here[0], 1 - here[1])
-            here = None
+            leaving = (entered[0], 1 - entered[1])
+            entered = None
             if leaving in onward:
-                here, doubtful, via = onward[leaving]
+                entered, doubtful, via = onward[leaving]
                 if doubtful:
                     doubts.append(count - 1)
-                parts.append(via)
+                pieces.append(via)
                 count += len(via)
-        yield Strand(np.concatenate(parts), tuple(doubts))
+        yield Strand(np.concatenate(pieces), tuple(doubts))

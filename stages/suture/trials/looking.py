@@ -16,9 +16,9 @@ TOO_MANY_LOOKS = 60
 def until_known(look: Callable[[], Seen | None], most: int = LOOKS) -> Seen | None:
     """Look again while the needle can't be known, at most `most` times; None then."""
     for _ in range(most):
-        seen = look()
-        if seen is not None:
-            return seen
+        accepted = look()
+        if accepted is not None:
+            return accepted
     return None
 
 
@@ -31,9 +31,9 @@ def corner_looks(bench: Bench, trust: Trust, count: int) -> list[Seen]:
     """Return `count` estimates in the corner, looking on where some are abstained from; Failed (I) for too few."""
     looks: list[Seen] = []
     for _ in range(TOO_MANY_LOOKS):
-        seen = trust.look(bench, "corner_right", bench.jaws("right"))
-        if seen is not None:
-            looks.append(seen)
+        accepted = trust.look(bench, "corner_right", bench.jaws("right"))
+        if accepted is not None:
+            looks.append(accepted)
         if len(looks) == count:
             return looks
     raise Failed("I", "the needle could not be known in the corner")

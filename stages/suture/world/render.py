@@ -94,12 +94,15 @@ def _eye(
     light = scene.light
     column, row, rig = (0, 0, scene.rig) if pictures else _around_needle(scene.rig, pose)
     world_from_camera = inverse(camera_from_world)
-    rotation, place = np.ascontiguousarray(world_from_camera[:3, :3]), np.ascontiguousarray(world_from_camera[:3, 3])
+    rotation, eye_position = (
+        np.ascontiguousarray(world_from_camera[:3, :3]),
+        np.ascontiguousarray(world_from_camera[:3, 3]),
+    )
     depth = np.zeros((rig.height * SUBPIXELS, rig.width * SUBPIXELS), dtype=np.float32)
     cone = np.full(depth.shape, -1, dtype=np.int16)
     starts, ends = np.ascontiguousarray(tubes.starts), np.ascontiguousarray(tubes.ends)
     cones = Cones(starts, ends, tubes.start_radii, tubes.end_radii, tubes.bodies)
-    view = View(rig.focal, rig.centre[0], rig.centre[1], rotation, place, scene.ridge)
+    view = View(rig.focal, rig.centre[0], rig.centre[1], rotation, eye_position, scene.ridge)
     box = draw(cones, view, depth, cone)
     hide_below_pad(depth, cone, box, view)
     bodies = np.zeros((rig.height, rig.width), dtype=np.uint8)
@@ -135,9 +138,9 @@ def _around_needle(rig: StereoRig, pose: NeedlePose) -> tuple[int, int, StereoRi
 
 def _set_in(part: np.ndarray, rig: StereoRig, column: int, row: int) -> np.ndarray:
     """Return the whole image (H, W) that holds `part` at (column, row) and zeros elsewhere."""
-    whole = np.zeros((rig.height, rig.width), dtype=part.dtype)
-    whole[row : row + part.shape[0], column : column + part.shape[1]] = part
-    return whole
+    full_picture = np.zeros((rig.height, rig.width), dtype=part.dtype)
+    full_picture[row : row + part.shape[0], column : column + part.shape[1]] = part
+    return full_picture
 
 
 def _seen_arc(rig: StereoRig, pose: NeedlePose, cone: np.ndarray, bodies: np.ndarray) -> np.ndarray:
