@@ -85,9 +85,13 @@ class PhysicsSimulator:
     recorded_chances: str = "contact"
 
     def __init__(self, parameters: SimulateParameters) -> None:
-        given = {"trip": parameters.trip_seconds, "stack": parameters.stack_seconds, "pull": parameters.pull_seconds}
+        given_seconds = {
+            "trip": parameters.trip_seconds,
+            "stack": parameters.stack_seconds,
+            "pull": parameters.pull_seconds,
+        }
         arm = arm_times(parameters.delay)
-        self.times = replace(arm, **{name: value for name, value in given.items() if value is not None})
+        self.times = replace(arm, **{name: value for name, value in given_seconds.items() if value is not None})
         self.chances = replace(chances_of(parameters.chances), spills=True)
         self.again: Again | None = physics_part("physics_trial").alone
         self._recording = physics_part("recording").Recording()

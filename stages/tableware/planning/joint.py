@@ -93,11 +93,11 @@ def _portion(table: Table) -> Table:
     if len(table.items) <= MOST_ITEMS:
         return table
     start = table.stacks[0][0].position
-    near = sorted(
+    nearest_piles = sorted(
         table.stacks, key=lambda pile: (pile[0].position[0] - start[0]) ** 2 + (pile[0].position[1] - start[1]) ** 2
     )
     chosen: set[str] = set()
-    for pile in near:
+    for pile in nearest_piles:
         if len(chosen) + len(pile) <= PORTION:
             chosen.update(item.name for item in pile)
     return Table(tuple(item for item in table.items if item.name in chosen), table.obstacles)
@@ -140,9 +140,9 @@ class JointPolicy:
 
     def _next_trip(self, table: Table) -> Trip:
         for earlier in (self._plan, self._first):
-            left = None if earlier is None else earlier.optimum.left_of(table)
-            if earlier is not None and left is not None:
-                return earlier.optimum.trips(earlier.solution, left)[0]
+            remaining = None if earlier is None else earlier.optimum.left_of(table)
+            if earlier is not None and remaining is not None:
+                return earlier.optimum.trips(earlier.solution, remaining)[0]
         self._plan = self._make(table)
         self._first = self._first or self._plan
         return self._plan.trips[0]

@@ -33,13 +33,13 @@ def impossible_pairs(table: Table, rules: Rules) -> tuple[ImpossiblePair, ...]:
     stacking are named for the pile that would move first; a multi-object grasp once."""
     reasons = []
     for row, pile in enumerate(table.stacks):
-        for column, other in enumerate(table.stacks):
-            if pile is other:
+        for column, second_pile in enumerate(table.stacks):
+            if pile is second_pile:
                 continue
             if row < column:
-                reasons.append(_multi_grasp(table, pile, other, rules))
-            reasons.append(_pull(table, pile, other, rules))
-            reasons.append(_stack(pile, other, rules))
+                reasons.append(_multi_grasp(table, pile, second_pile, rules))
+            reasons.append(_pull(table, pile, second_pile, rules))
+            reasons.append(_stack(pile, second_pile, rules))
     return tuple(reason for reason in reasons if reason is not None)
 
 
@@ -62,9 +62,9 @@ def _two_piles(pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) ->
 
 
 def _blocked(covers: tuple[Footprint, ...], table: Table, names: set[str]) -> tuple[str, str, tuple[str, ...]] | None:
-    things = tuple(item.name for item in in_the_way(covers, table, names))
-    if things:
-        return "in_the_way", f"{', '.join(things)} in the way", things
+    blockers = tuple(item.name for item in in_the_way(covers, table, names))
+    if blockers:
+        return "in_the_way", f"{', '.join(blockers)} in the way", blockers
     if obstructed(covers, table):
         return "in_the_way", "something that is not understood is in the way", ()
     return None

@@ -123,20 +123,20 @@ class Arm:
         """Return joint values (6,) for a tool pose, None where it is not reached. With nothing held the one turned by
         half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken, of those
         that leave the last joint room for half a turn either way."""
-        near = self.target
+        present_joints = self.target
         solutions = []
         for half_turn in (False,) if held else (False, True):
-            wanted = pose.copy()
+            wrist_pose = pose.copy()
             if half_turn:
-                wanted[:3, :2] *= -1.0
-            wanted[:3, 3] -= BASE
-            radius = hypot(wanted[0, 3], wanted[1, 3])
+                wrist_pose[:3, :2] *= -1.0
+            wrist_pose[:3, 3] -= BASE
+            radius = hypot(wrist_pose[0, 3], wrist_pose[1, 3])
             if radius < WRIST_OFFSET:
                 continue
-            first = atan2(wanted[1, 3], wanted[0, 3]) - pi - asin(WRIST_OFFSET / radius)
+            first = atan2(wrist_pose[1, 3], wrist_pose[0, 3]) - pi - asin(WRIST_OFFSET / radius)
             first = first + 2 * pi * round((self.description.carry[0] - first) / (2 * pi))
-            starts = [np.array([first, -1.4, 1.6, -1.77, -pi / 2, last]) for last in (near[5], 0.0, 2.0, 4.0)]
-            solution = inverse_kinematics(self.chain, wanted, np.array(starts))
+            starts = [np.array([first, -1.4, 1.6, -1.77, -pi / 2, last]) for last in (present_joints[5], 0.0, 2.0, 4.0)]
+            solution = inverse_kinematics(self.chain, wrist_pose, np.array(starts))
             if solution.found and solution.arm[2] > 0.0:
                 for turns in (-2 * pi, 0.0, 2 * pi):
                     arm = solution.arm.copy()
@@ -146,7 +146,8 @@ class Arm:
         if not solutions:
             return None
         return min(
-            solutions, key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - near).max()))
+            solutions,
+            key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - present_joints).max())),
         )
 
     # --- motion -----------------------------------------------------------------------------------------------

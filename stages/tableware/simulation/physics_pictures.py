@@ -83,7 +83,7 @@ def key_frames(labels: Sequence[str], most: int) -> list[int]:
     rows = [*rows, len(labels) - 1] if len(labels) else []
     if len(rows) <= most:
         return rows
-    return [rows[round(place)] for place in np.linspace(0, len(rows) - 1, most)]
+    return [rows[round(row_number)] for row_number in np.linspace(0, len(rows) - 1, most)]
 
 
 def draw_physics_strip(

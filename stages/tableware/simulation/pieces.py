@@ -89,8 +89,8 @@ def utensil_boxes(strip: Measures, fork: bool) -> list[np.ndarray]:
     cuts = np.array([-0.5, -0.2, 0.08, 0.20, 0.30, 0.42, 0.5]) * strip.length
     pieces = []
     for low, high in zip(cuts[:-1], cuts[1:], strict=True):
-        near = (points[:, 0] > low - 0.02 * strip.length) & (points[:, 0] < high + 0.02 * strip.length)
-        half = float(np.abs(points[near, 1]).mean() + np.abs(points[near, 1]).max()) / 2
+        in_section = (points[:, 0] > low - 0.02 * strip.length) & (points[:, 0] < high + 0.02 * strip.length)
+        half = float(np.abs(points[in_section, 1]).mean() + np.abs(points[in_section, 1]).max()) / 2
         pieces.append(np.array([[x, y, z] for x in (low, high) for y in (-half, half) for z in (0.0, strip.height)]))
     return pieces
 

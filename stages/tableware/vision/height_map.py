@@ -156,12 +156,12 @@ def _table_plane(
         np.abs(v - center[1]) < 0.49 * sides[1] * focal[1] / above
     )
     u, v, z = u[inside & (z > 0)], v[inside & (z > 0)], z[inside & (z > 0)]
-    near = z[np.abs(z - above) < PLANE_OFF]
-    if len(near) < 0.05 * max(len(z), 200):
+    near_table = z[np.abs(z - above) < PLANE_OFF]
+    if len(near_table) < 0.05 * max(len(z), 200):
         raise BadInput(
             f"no table is seen {above:.3g} m below the camera", hint="check the depth's scale and the height"
         )
-    plane = np.array([0.0, 0.0, float(np.median(near))])
+    plane = np.array([0.0, 0.0, float(np.median(near_table))])
     columns = np.column_stack([u, v, np.ones(len(u))]).astype(np.float64)
     for turn, width in enumerate((PLANE_BAND, 0.008, 0.004, PLANE_WIDTH, PLANE_WIDTH, PLANE_WIDTH)):
         residual = z - columns @ plane

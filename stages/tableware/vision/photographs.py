@@ -103,11 +103,11 @@ def _kind(great: float, picture_width: float | None, sizes: DishSizes) -> tuple[
 
 
 def _apart(outlines: list[Outline]) -> list[Outline]:
-    kept: list[Outline] = []
+    distinct: list[Outline] = []
     for outline in sorted(outlines, key=lambda outline: (-round(outline.confidence, 2), -_area(outline.box))):
-        if all(_overlap(outline.box, other.box) < SAME for other in kept):
-            kept.append(outline)
-    return kept
+        if all(_overlap(outline.box, earlier.box) < SAME for earlier in distinct):
+            distinct.append(outline)
+    return distinct
 
 
 def _area(box: tuple[float, float, float, float]) -> float:

@@ -79,11 +79,11 @@ def table_plane(
         )
     random = np.random.default_rng([seed, 73])
     points = points[random.permutation(len(points))[:POINTS]]
-    total, left, planes = len(points), points, []
+    total, remaining, planes = len(points), points, []
     direction = up
     for _ in range(3):
         fit = ransac_plane(
-            left,
+            remaining,
             distance_threshold=THICKNESS,
             iterations=400,
             random=random,
@@ -95,8 +95,8 @@ def table_plane(
         sign = 1.0 if fit.offset > 0.0 else -1.0  # the camera, at the origin, is above
         planes.append((len(fit.inliers), sign * fit.normal, sign * fit.offset))
         direction = planes[0][1]
-        left = np.delete(left, fit.inliers, axis=0)
-        if len(left) < 500:
+        remaining = np.delete(remaining, fit.inliers, axis=0)
+        if len(remaining) < 500:
             break
     if not planes:
         raise BadInput(
@@ -118,12 +118,12 @@ def _refined(points: np.ndarray, normal: np.ndarray, offset: float) -> tuple[np.
     """Return the plane of points (N, 3) near one, by Welsch's weights: what stands on the table lifts a plain fit."""
     for width in (0.006, 0.004, WIDTH, WIDTH, WIDTH, WIDTH):
         distance = points @ normal + offset
-        near = points[np.abs(distance) < 3.0 * width]
+        near_plane = points[np.abs(distance) < 3.0 * width]
         weight = np.exp(-0.5 * (distance[np.abs(distance) < 3.0 * width] / width) ** 2)
         if weight.sum() < 50.0:
             break
-        center = weight @ near / weight.sum()
-        centred = near - center
+        center = weight @ near_plane / weight.sum()
+        centred = near_plane - center
         turned = np.linalg.eigh((centred * weight[:, None]).T @ centred)[1][:, 0]
         normal = turned if turned @ normal > 0.0 else -turned
         offset = -float(normal @ center)
@@ -174,10 +174,10 @@ def rectify(
             view.camera.width,
         ),
     )
-    seen = top > 0.0
-    ground = seen & (np.abs(float(view.world_from_camera[2, 3]) - top) < THICKNESS)
-    tone = np.median(picture[ground], axis=0) if ground.any() else np.median(picture[seen], axis=0)
-    picture[~seen] = np.rint(tone).astype(np.uint8)
+    has_height = top > 0.0
+    ground = has_height & (np.abs(float(view.world_from_camera[2, 3]) - top) < THICKNESS)
+    tone = np.median(picture[ground], axis=0) if ground.any() else np.median(picture[has_height], axis=0)
+    picture[~has_height] = np.rint(tone).astype(np.uint8)
     return Rectified(picture, top.astype(np.float32), view, frame, sides, tuple(notes))
 
 
@@ -195,13 +195,13 @@ def _table_frame(plane: tuple[np.ndarray, float]) -> np.ndarray:
 def _workspace_frame(frame: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, tuple[float, float], bool]:
     """Return (world_from_camera (4, 4), sides [m], whether the table was cut to what the view shows) of points (N, 3)
     in the table's frame. Raises BadInput where the largest piece of table is too small."""
-    near = points[(points[:, 2] > -THICKNESS) & (points[:, 2] < 0.35)]
-    cells = np.floor(near[:, :2] / CELL).astype(int)
+    near_table = points[(points[:, 2] > -THICKNESS) & (points[:, 2] < 0.35)]
+    cells = np.floor(near_table[:, :2] / CELL).astype(int)
     low = cells.min(axis=0)
     shape = cells.max(axis=0) - low + 3
     if shape.max() > 1000:
-        near = near[np.abs(near[:, :2] - np.median(near[:, :2], axis=0)).max(axis=1) < 2.0]
-        cells = np.floor(near[:, :2] / CELL).astype(int)
+        near_table = near_table[np.abs(near_table[:, :2] - np.median(near_table[:, :2], axis=0)).max(axis=1) < 2.0]
+        cells = np.floor(near_table[:, :2] / CELL).astype(int)
         low = cells.min(axis=0)
         shape = cells.max(axis=0) - low + 3
     grid = np.zeros(shape, dtype=np.uint8)

@@ -126,12 +126,17 @@ def see(
         normal, offset = table_plane(depth, intrinsics, seed, up)
         if pose is not None:
             _check_pose(pose, normal, offset)
-        made = rectify(color, depth, intrinsics, (normal, offset), pose, None if pose is None else sides)
-        color, depth, view, sides = made.color, made.depth, made.view, made.sides
-        world, rectified = made.world_from_camera, True
+        rectified_view = rectify(color, depth, intrinsics, (normal, offset), pose, None if pose is None else sides)
+        color, depth, view, sides = (
+            rectified_view.color,
+            rectified_view.depth,
+            rectified_view.view,
+            rectified_view.sides,
+        )
+        world, rectified = rectified_view.world_from_camera, True
         notes += [
             "the view was rectified to the table's plane: what others hide from the camera is not seen",
-            *made.notes,
+            *rectified_view.notes,
         ]
         if min(intrinsics.fx, intrinsics.fy) / max(middle, 0.1) < COARSE:
             notes.append(f"{intrinsics.fx / max(middle, 0.1):.0f} pixels per metre are too few to see utensils")
@@ -211,16 +216,18 @@ def seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ..
     What belongs to a stack gets none: lower rims are hidden, so that a tall mug is two cups, a can in a bowl a cup.
     """
     carrying = {detection.on for detection in detections if detection.kind in DISHES}
-    seen = []
+    trusted = []
     for index, detection in enumerate(detections):
         if detection.kind is None:
-            seen.append(detection)
+            trusted.append(detection)
             continue
         stacked = index in carrying or (detection.kind in DISHES and detection.on is not None)
         reasons = (OBLIQUE_VIEW, "a stack seen from the side") if stacked else (OBLIQUE_VIEW,)
         trust = 0.0 if stacked else OBLIQUE_TRUST
-        seen.append(replace(detection, confidence=trust * detection.confidence, unsure=(*detection.unsure, *reasons)))
-    return tuple(seen)
+        trusted.append(
+            replace(detection, confidence=trust * detection.confidence, unsure=(*detection.unsure, *reasons))
+        )
+    return tuple(trusted)
 
 
 def _unhandled(heights: HeightMap) -> list[str]:

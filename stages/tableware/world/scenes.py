@@ -71,7 +71,7 @@ def make_table(tier: str, seed: int, sizes: DishSizes = STANDARD) -> Table:
 def _draw(tier: Tier, random: np.random.Generator, sizes: DishSizes) -> Table | None:
     """Return a table, or None where the last items found no place."""
     table = Table(())
-    left = tier.intersections
+    touches_left = tier.intersections
     for kind in ORDER:
         for number in range(tier.counts.get(kind, 0)):
             for _ in range(TRIES):
@@ -82,12 +82,17 @@ def _draw(tier: Tier, random: np.random.Generator, sizes: DishSizes) -> Table | 
                 if not touched:
                     break
                 top = touched[0][-1]
-                if left and len(touched) == 1 and len(touched[0]) < tier.highest and radius(item) <= radius(top):
+                if (
+                    touches_left
+                    and len(touched) == 1
+                    and len(touched[0]) < tier.highest
+                    and radius(item) <= radius(top)
+                ):
                     z = stand_height(table, item, top.name)
                     item = replace(item, position=(top.position[0], top.position[1], z), on=top.name)
                     others = [stack for stack in table.stacks if stack is not touched[0]]
                     if all(_least_gap(footprint(item), stack) >= 0.0 for stack in others):
-                        left -= 1
+                        touches_left -= 1
                         break
             else:
                 return None
