@@ -176,9 +176,9 @@ class FixedArm:
         if key not in self._numeric:
             # The planar answer, pushed into the limits and out of its plane, is near: neighbouring poses then get
             # neighbouring answers.
-            near = np.clip(self._planar(radius, z) + LEAN_OUT, self.chain.lower, self.chain.upper)
+            planar_start = np.clip(self._planar(radius, z) + LEAN_OUT, self.chain.lower, self.chain.upper)
             others = random_starts(self.chain, SEARCHES, np.random.default_rng(7))
-            starts = np.concatenate([near[None], HOME[None], others])
+            starts = np.concatenate([planar_start[None], HOME[None], others])
             target = ToolPose(radius, 0.0, z, 0.0).matrix()
             answer = inverse_kinematics(self.chain, target, starts)
             self._numeric[key] = answer.arm if answer.found else None

@@ -68,13 +68,13 @@ def end_collision(pose: ToolPose, held: Named | None, others: tuple[Named, ...])
     `goal_in_collision`: objects what is hit and what hits it (`hand` or the held box), numbers depth [m].
     """
     worst: tuple[float, str, str] | None = None
-    parts = [(held.name, held.block)] if held is not None else []
-    parts += [("hand", block) for block in hand_blocks(pose)]
-    for part, block in parts:
-        for other in others:
-            depth = overlap(block, other.block)
+    carried_blocks = [(held.name, held.block)] if held is not None else []
+    carried_blocks += [("hand", block) for block in hand_blocks(pose)]
+    for part, block in carried_blocks:
+        for obstacle in others:
+            depth = overlap(block, obstacle.block)
             if depth > 1e-9 and (worst is None or depth > worst[0]):
-                worst = (depth, part, other.name)
+                worst = (depth, part, obstacle.name)
     if worst is None:
         return None
     depth, part, other_name = worst

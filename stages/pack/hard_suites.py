@@ -142,11 +142,11 @@ def _draw(
     cells = cells[blocked:]
     sides = np.array([cell[2:] - cell[:2] for cell in cells]) - CLEARANCE
     free = sum(float((cell[2] - cell[0]) * (cell[3] - cell[1])) for cell in cells)
-    wanted = random.uniform(*recipe.fill) * free
+    target_area = random.uniform(*recipe.fill) * free
     full = float(np.prod(sides, axis=1).sum())
-    if full < wanted:
+    if full < target_area:
         return None
-    sides = sides * np.sqrt(wanted / full)
+    sides = sides * np.sqrt(target_area / full)
     if sides.min() < SHORTEST or sides.max() > LONGEST:
         return None
     starts = random.permutation(len(STARTS))[:count]

@@ -52,8 +52,8 @@ class LanguageProposer:
     def propose(self, observation: Observation, trace: Sequence[Attempt]) -> tuple[Action, ...]:
         """Return the plan of one call of the model."""
         self.calls += 1
-        shown = trace[max(0, len(trace) - self._trace_length) :]
-        messages = prompt(observation, shown, self._variant, reasons=self._reasons)
+        latest = trace[max(0, len(trace) - self._trace_length) :]
+        messages = prompt(observation, latest, self._variant, reasons=self._reasons)
         try:
             reply = self.chat.ask(messages, plan_schema(packing_language(observation)))
         except LanguageFailed as error:
@@ -93,11 +93,11 @@ class SymbolicProposer:
 
     def propose(self, observation: Observation, trace: Sequence[Attempt]) -> tuple[Action, ...]:
         """Return a full plan; empty when no order asked for has an arrangement or could be read."""
-        shown = trace[max(0, len(trace) - self._trace_length) :]
+        latest = trace[max(0, len(trace) - self._trace_length) :]
         refused: list[str] = []
         for _ in range(ORDER_CALLS):
             self.calls += 1
-            messages = prompt(observation, shown, "symbolic", reasons=self._reasons)
+            messages = prompt(observation, latest, "symbolic", reasons=self._reasons)
             if refused:
                 messages = (*messages, say("user", "\n".join(refused)))
             try:

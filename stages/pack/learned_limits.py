@@ -72,8 +72,8 @@ def _refuse(
 ) -> None:
     """A place is not repeated; a pick waits until what blocks it, or the next box, is gone."""
     if action.name == "place" and action.x is not None and action.y is not None and action.yaw is not None:
-        again = sum(entry[0] == action.box for entry in limits.refused)
-        limits.refused.append((action.box, action.x, action.y, action.yaw, REFUSED_SIDE * (1 + 0.5 * again)))
+        times_refused = sum(entry[0] == action.box for entry in limits.refused)
+        limits.refused.append((action.box, action.x, action.y, action.yaw, REFUSED_SIDE * (1 + 0.5 * times_refused)))
         limits.culprit = next((name for name in blamed if name in placed), None)
         return
     waiting = [name for name in boxes if name != action.box and name not in placed]

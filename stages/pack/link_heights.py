@@ -30,9 +30,9 @@ def _hulls(robot: str) -> tuple[np.ndarray, ...]:
     description = FixedArm("fr3", robot).description
     root = read_urdf(description.urdf)
     keep = [link for link in root.findall("link") if link.get("name") in LINKS]
-    wanted = ElementTree.Element("robot", {"name": "links"})
-    wanted.extend(keep)
-    shapes = link_shapes(without_visuals(with_absolute_meshes(wanted, description.urdf.parent)))
+    kept_robot = ElementTree.Element("robot", {"name": "links"})
+    kept_robot.extend(keep)
+    shapes = link_shapes(without_visuals(with_absolute_meshes(kept_robot, description.urdf.parent)))
     return tuple(np.concatenate([mesh.convex_hull.vertices for mesh in shapes[name]]) for name in LINKS)
 
 

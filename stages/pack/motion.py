@@ -86,7 +86,7 @@ class MotionPlanner:
         failure = end_collision(goal, carried, others)
         if failure is not None:
             raise failure
-        tops = max((other.block.top for other in others), default=0.0)
+        tops = max((obstacle.block.top for obstacle in others), default=0.0)
         height = _height_over(start, end, held, tops)
         if self._surely_free(start, end, height, tops, others):
             return Motion(lambda: _known(self._over(start, end, height, held, tops, others))[0], end, False)
@@ -131,7 +131,7 @@ class MotionPlanner:
             return None
         free = not _near_base(others) and lowest_on_path(self.arm, points[:, 0], points[:, 2]) > tops
         free = free and all(
-            self._drawn_in_free(stance, way, held, others) for stance, way in ((start, rise), (end, fall))
+            self._drawn_in_free(stance, line, held, others) for stance, line in ((start, rise), (end, fall))
         )
         return joints, free
 
@@ -157,7 +157,7 @@ class MotionPlanner:
             blocks = list(hand_blocks(at))
             if held is not None:
                 blocks.append(held_block(at, held.width, held.length, held.height))
-            if any(overlap(block, other.block) > 0 for block in blocks for other in others):
+            if any(overlap(block, obstacle.block) > 0 for block in blocks for obstacle in others):
                 return False
         return True
 
@@ -179,9 +179,9 @@ class MotionPlanner:
         for candidate in (path, np.array([start.arm, end.arm])):
             if candidate is None:
                 continue
-            whole = np.concatenate([start.arm[None], candidate, end.arm[None]])
-            if first_collision(densify(whole, resolution), scene.check) is None:
-                return Motion(partial(np.copy, whole), end, False)
+            full_path = np.concatenate([start.arm[None], candidate, end.arm[None]])
+            if first_collision(densify(full_path, resolution), scene.check) is None:
+                return Motion(partial(np.copy, full_path), end, False)
         space = SearchSpace(self.arm.chain.lower, self.arm.chain.upper, resolution)
         if path is not None:
             space = _narrowed(space, whole_range=np.concatenate([path, start.arm[None]]))
@@ -206,8 +206,8 @@ def _height_over(start: Stance, end: Stance, held: BoxState | None, tops: float)
 def _near_base(others: tuple[Named, ...]) -> bool:
     """Whether something stands where the links below the third could touch it."""
     return any(
-        hypot(other.block.x, other.block.y) - other.block.half_width - other.block.half_length < BASE_RADIUS
-        for other in others
+        hypot(obstacle.block.x, obstacle.block.y) - obstacle.block.half_width - obstacle.block.half_length < BASE_RADIUS
+        for obstacle in others
     )
 
 
