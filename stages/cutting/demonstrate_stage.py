@@ -54,11 +54,11 @@ def run(record: Path | None, *, parameters: DemonstrateParameters, context: Cont
 
 def _scripted(trials: list[Demonstration]) -> list[DemonstrationRecord]:
     of_cell = Counter(trial.cell for trial in trials)
-    seen: Counter[str] = Counter()
+    trials_of_cell: Counter[str] = Counter()
     records = []
     for trial in trials:
-        records.append(record_of(trial, is_for_training(trial.cell, seen[trial.cell], of_cell[trial.cell])))
-        seen[trial.cell] += 1
+        records.append(record_of(trial, is_for_training(trial.cell, trials_of_cell[trial.cell], of_cell[trial.cell])))
+        trials_of_cell[trial.cell] += 1
     return records
 
 

@@ -67,10 +67,10 @@ def panels(pieces: Mapping[int, Body]) -> Panels:
     meshes: list[tuple[int, trimesh.Trimesh]] = [(number + 1, colored(body, number)) for number, body in pieces.items()]
     renderer = SceneRenderer(meshes)
     poses = tuple(look_at(middle + FAR * np.array(eye), middle, up) for eye, up in zip(EYES, UPS, strict=True))
-    seen = [renderer.render(camera, pose) for pose in poses]
+    rendered = [renderer.render(camera, pose) for pose in poses]
     return Panels(
-        np.concatenate([each.color for each in seen], axis=1),
-        np.concatenate([each.instance for each in seen], axis=1) - 1,
+        np.concatenate([each.color for each in rendered], axis=1),
+        np.concatenate([each.instance for each in rendered], axis=1) - 1,
         camera,
         poses,
     )

@@ -73,10 +73,10 @@ class Session:
         """Cut where two clicks (2, 2) [px] say; return what came of it. Raises NoCut, also for what no knife does."""
         piece, plane = self.shown.plane(points)
         try:
-            parts = cut(self.trial.pieces[piece], plane, Knife())
+            bodies = cut(self.trial.pieces[piece], plane, Knife())
         except Refused as refused:
             raise NoCut(refused.failure.message) from None
-        numbers = self.trial.do(piece, plane, parts, GAP)
+        numbers = self.trial.do(piece, plane, bodies, GAP)
         self._changed()
         return f"piece {piece} became {', '.join(map(str, numbers))}"
 
@@ -97,10 +97,10 @@ class Session:
         self.trial.categories = {} if category is None else dict.fromkeys(self.trial.final, category)
         self._changed()
         self._before.append(self._recorded())
-        said = f"kept: {len(self.trial.final)} {category or 'fragments, not finished'}"
+        message = f"kept: {len(self.trial.final)} {category or 'fragments, not finished'}"
         self._seed += 1
         self._begin()
-        return said
+        return message
 
     def _recorded(self) -> RecordedTrial:
         return RecordedTrial(food=self._food, seed=self._seed, trial=record_of(self.trial, training=True))

@@ -38,8 +38,8 @@ def see(views: Sequence[View]) -> list[Body]:
     """
     clouds = []
     for view in views:
-        seen = back_project(view.depth, view.camera)[view.depth > 0].astype(float)
-        points = apply(view.world_from_camera, seen)
+        in_camera = back_project(view.depth, view.camera)[view.depth > 0].astype(float)
+        points = apply(view.world_from_camera, in_camera)
         clouds.append(points[points[:, 2] > ABOVE])
     points = np.concatenate(clouds)
     if len(points) < FEWEST:
@@ -64,11 +64,11 @@ def _carved(segment: np.ndarray, views: Sequence[View]) -> list[Body]:
     for axis in range(3):
         for end in (0, -1):
             np.moveaxis(field, axis, 0)[end] = -step
-    parts, _ = label(field > 0)
-    of_points = grey_dilation(parts, 3)[tuple(np.round((segment - low) / step).astype(int).T)]
+    components, _ = label(field > 0)
+    of_points = grey_dilation(components, 3)[tuple(np.round((segment - low) / step).astype(int).T)]
     bodies = []
     for number in np.flatnonzero(np.bincount(of_points, minlength=1)[1:] >= FEWEST) + 1:
-        alone = np.where((parts != number) & (field > 0), -1e-3 * step, field)
+        alone = np.where((components != number) & (field > 0), -1e-3 * step, field)
         vertices, faces = zero_surface(alone)
         bodies.append(Body.of_mesh(low + step * vertices, faces))
     return bodies

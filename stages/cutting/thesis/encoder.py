@@ -77,6 +77,6 @@ class Features:
 
 @torch.no_grad()
 def _raw(encoder: Encoder, shapes: Sequence[Canonical]) -> np.ndarray:
-    seen = sampled(shapes)
-    code = encoder(torch.from_numpy(seen.surfaces)).numpy().astype(float)
-    return np.column_stack([code, np.log(seen.scales)])
+    samples = sampled(shapes)
+    code = encoder(torch.from_numpy(samples.surfaces)).numpy().astype(float)
+    return np.column_stack([code, np.log(samples.scales)])

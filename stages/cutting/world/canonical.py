@@ -69,8 +69,8 @@ def axis_across(body: Body, normal: np.ndarray) -> int:
 
 
 def _octant(filled: np.ndarray, middle: np.ndarray, signs: np.ndarray) -> int:
-    parts = tuple(slice(m, None) if s > 0 else slice(0, m) for m, s in zip(middle, signs, strict=True))
-    return int(filled[parts].sum())
+    half_spaces = tuple(slice(m, None) if s > 0 else slice(0, m) for m, s in zip(middle, signs, strict=True))
+    return int(filled[half_spaces].sum())
 
 
 def box_edges(covariance: np.ndarray) -> np.ndarray:

@@ -51,17 +51,17 @@ FAMILIES: dict[str, Family] = {
 
 def make_food(family: str, random: np.random.Generator) -> Body:
     """Return a food of a family, its spine along z, centred."""
-    made = FAMILIES[family]
-    length, thickness = random.uniform(*made.length), random.uniform(*made.thickness)
-    wide, bend = thickness * random.uniform(*made.flatness), random.uniform(*made.bend)
+    kind = FAMILIES[family]
+    length, thickness = random.uniform(*kind.length), random.uniform(*kind.thickness)
+    wide, bend = thickness * random.uniform(*kind.flatness), random.uniform(*kind.bend)
     # Rings stand closer where the profile falls off, so that blunt ends are round.
     t = np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, RINGS + 2)[1:-1])
-    share = made.profile(t)
+    share = kind.profile(t)
     angle = 2.0 * np.pi * np.arange(POINTS) / POINTS
-    outline = (np.abs(np.cos(angle)) ** made.squareness + np.abs(np.sin(angle)) ** made.squareness) ** (
-        -1.0 / made.squareness
+    outline = (np.abs(np.cos(angle)) ** kind.squareness + np.abs(np.sin(angle)) ** kind.squareness) ** (
+        -1.0 / kind.squareness
     )
-    radius = share[:, None] * outline * (1.0 + made.roughness * _waves(t, angle, random))
+    radius = share[:, None] * outline * (1.0 + kind.roughness * _waves(t, angle, random))
     x = 0.5 * thickness * radius * np.cos(angle)
     y = 0.5 * wide * radius * np.sin(angle)
     z = np.repeat(0.5 * length * t[:, None], POINTS, axis=1)
@@ -94,14 +94,14 @@ def _bent(vertices: np.ndarray, length: float, angle: float) -> np.ndarray:
 
 
 def _faces() -> np.ndarray:
-    here = np.arange(POINTS)
-    ahead = (here + 1) % POINTS
+    around = np.arange(POINTS)
+    ahead = (around + 1) % POINTS
     faces = []
     for ring in range(RINGS - 1):
         low, high = ring * POINTS, (ring + 1) * POINTS
-        faces += [np.column_stack([low + here, low + ahead, high + ahead])]
-        faces += [np.column_stack([low + here, high + ahead, high + here])]
+        faces += [np.column_stack([low + around, low + ahead, high + ahead])]
+        faces += [np.column_stack([low + around, high + ahead, high + around])]
     south, north, last = RINGS * POINTS, RINGS * POINTS + 1, (RINGS - 1) * POINTS
-    faces += [np.column_stack([np.full(POINTS, south), ahead, here])]
-    faces += [np.column_stack([np.full(POINTS, north), last + here, last + ahead])]
+    faces += [np.column_stack([np.full(POINTS, south), ahead, around])]
+    faces += [np.column_stack([np.full(POINTS, north), last + around, last + ahead])]
     return np.concatenate(faces)

@@ -66,27 +66,27 @@ def _check_size(longest: float, path: Path, unit: str) -> None:
 
 def _closed(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
     mended = []
-    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)  # files like STL repeat vertices: not a fault
-    whole.update_faces(whole.nondegenerate_faces() & whole.unique_faces())
-    if not whole.is_watertight:
-        whole.fill_holes()
-        if not whole.is_watertight:
-            edges = len(trimesh.grouping.group_rows(whole.edges_sorted, require_count=1))
+    merged = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)  # files like STL repeat vertices: not a fault
+    merged.update_faces(merged.nondegenerate_faces() & merged.unique_faces())
+    if not merged.is_watertight:
+        merged.fill_holes()
+        if not merged.is_watertight:
+            edges = len(trimesh.grouping.group_rows(merged.edges_sorted, require_count=1))
             raise BadInput(f"{path}: open: {edges} edges have one face", hint="close it in a mesh editor")
         mended.append("holes filled")
-    if not whole.is_winding_consistent or whole.volume < 0:
-        trimesh.repair.fix_normals(whole)
+    if not merged.is_winding_consistent or merged.volume < 0:
+        trimesh.repair.fix_normals(merged)
         mended.append("faces turned outwards")
-    parts = whole.split(only_watertight=False)
+    components = merged.split(only_watertight=False)
     try:
-        if len(parts) == 1:
-            return Body.of_mesh(whole.vertices, whole.faces), mended
-        united = unite([Body.of_mesh(part.vertices, part.faces) for part in parts])
+        if len(components) == 1:
+            return Body.of_mesh(merged.vertices, merged.faces), mended
+        united = unite([Body.of_mesh(part.vertices, part.faces) for part in components])
     except ValueError as error:
         raise BadInput(f"{path}: no closed body: {error}", hint="repair it in a mesh editor") from None
     if len(united) > 1:
         raise BadInput(f"{path}: {len(united)} bodies that do not hang together", hint="give them one by one")
-    return united[0], [*mended, f"{len(parts)} bodies that pass through each other united"]
+    return united[0], [*mended, f"{len(components)} bodies that pass through each other united"]
 
 
 def read_bodies_of(folder: Path, unit: Literal["m", "mm"]) -> tuple[list[Body], list[str]]:
@@ -95,5 +95,7 @@ def read_bodies_of(folder: Path, unit: Literal["m", "mm"]) -> tuple[list[Body], 
     paths = [folder] if folder.is_file() else sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
     if not paths:
         raise BadInput(f"{folder}: holds no meshes", hint=f"known: {', '.join(SUFFIXES)}")
-    read = [(path, *read_body(path, unit)) for path in paths]
-    return [body for _, body, _ in read], [f"{path.name}: {text}" for path, _, mended in read for text in mended]
+    bodies_read = [(path, *read_body(path, unit)) for path in paths]
+    return [body for _, body, _ in bodies_read], [
+        f"{path.name}: {text}" for path, _, mended in bodies_read for text in mended
+    ]
