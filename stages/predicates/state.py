@@ -73,16 +73,16 @@ class State:
 
     def number(self, name: str, call: str) -> float:
         """Return what a perception call says of an object."""
-        seen = self.objects[name]
+        seen_object = self.objects[name]
         if call == "left":
-            return seen.x - seen.width / 2
+            return seen_object.x - seen_object.width / 2
         if call == "right":
-            return seen.x + seen.width / 2
+            return seen_object.x + seen_object.width / 2
         if call == "bottom":
-            return seen.y
+            return seen_object.y
         if call == "top":
-            return seen.y + seen.height
-        return float(getattr(seen, call))
+            return seen_object.y + seen_object.height
+        return float(getattr(seen_object, call))
 
     def of_scene(self, call: str) -> float:
         """Return what a perception call says of the table or the gripper."""

@@ -105,7 +105,7 @@ def _drawn_layout(
     Raises ValueError when they don't fit."""
     kinds = kitchen_file().objects
     places: dict[str, tuple[float, float]] = {}
-    taken: list[tuple[float, float]] = []
+    occupied: list[tuple[float, float]] = []
     free: list[str] = []
     """What may still be stood on."""
     for name in sorted(names, key=lambda name: (kinds[name].at is None, kinds[name].shape != "plate")):
@@ -120,9 +120,9 @@ def _drawn_layout(
             free.remove(under)
             x, y = places[under][0], places[under][1] + kinds[under].height
         else:
-            x, y = free_place(random, kind.width / 2, taken), 0.0
+            x, y = free_place(random, kind.width / 2, occupied), 0.0
         places[name] = (x, y)
-        taken.append((x - kind.width / 2, x + kind.width / 2))
+        occupied.append((x - kind.width / 2, x + kind.width / 2))
         if kind.shape != "container":
             free.append(name)
     return places
@@ -162,9 +162,9 @@ def _walked_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[
         state = apply_action(state, possible[int(random.integers(len(possible)))])
     if any(atom[0] == "in_gripper" for atom in state):
         return ()
-    said = truth_of(domain).file.goals
-    new = sorted(atom for atom in state - start if atom[0] in said)
-    if not new:
+    goal_names = truth_of(domain).file.goals
+    new_atoms = sorted(atom for atom in state - start if atom[0] in goal_names)
+    if not new_atoms:
         return ()
-    kept = random.permutation(len(new))[: int(random.integers(1, MOST_LITERALS + 1))]
-    return tuple(new[place] for place in sorted(kept.tolist()))
+    drawn = random.permutation(len(new_atoms))[: int(random.integers(1, MOST_LITERALS + 1))]
+    return tuple(new_atoms[index] for index in sorted(drawn.tolist()))

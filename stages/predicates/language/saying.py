@@ -51,21 +51,21 @@ def _said(tree: Tree | str | float) -> str:
         return f"{tree:.4g}"
     if isinstance(tree, str):
         return tree.removeprefix("?")
-    head, parts = str(tree[0]), tree[1:]
+    head, operands = str(tree[0]), tree[1:]
     if head in ("and", "or"):
-        return f" {head} ".join(_said(part) if _simple(part) else f"({_said(part)})" for part in parts)
+        return f" {head} ".join(_said(part) if _simple(part) else f"({_said(part)})" for part in operands)
     if head == "not":
-        return f"it is not so that {_said(parts[0])}"
+        return f"it is not so that {_said(operands[0])}"
     if head in ("some", "every"):
         start = "there is another object" if head == "some" else "for every other object"
-        return f"{start} {_said(parts[0])} {'with' if head == 'some' else 'holds'}: {_said(parts[1])}"
+        return f"{start} {_said(operands[0])} {'with' if head == 'some' else 'holds'}: {_said(operands[1])}"
     if head in _BETWEEN:
-        return f"{_said(parts[0])} {_BETWEEN[head]} {_said(parts[1])}"
+        return f"{_said(operands[0])} {_BETWEEN[head]} {_said(operands[1])}"
     if head == "abs":
-        return f"the size of ({_said(parts[0])})"
+        return f"the size of ({_said(operands[0])})"
     if head in _NAMES:
-        return f"{_NAMES[head]} of {_said(parts[0])}" if parts else _NAMES[head]
-    return f"{head}({', '.join(_said(part) for part in parts)})"
+        return f"{_NAMES[head]} of {_said(operands[0])}" if operands else _NAMES[head]
+    return f"{head}({', '.join(_said(part) for part in operands)})"
 
 
 def _simple(tree: Tree | str | float) -> bool:

@@ -69,12 +69,12 @@ class ThesisLearner(OursLearner):
 
     def _phrase_of(self, sentence: str, state: Perceived) -> tuple[Phrase, tuple[str, ...]]:
         """Return what the Reasoner makes of a sentence; taken literally where it names what is not there."""
-        given = {
+        facts = {
             "sentence": sentence,
             "objects": list(state.names),
             "complaints": [phrase.text for phrase in self.memory.labels],
         }
-        reply = self._spoken("reasoner", REASONER, given, Reasoned)
+        reply = self._spoken("reasoner", REASONER, facts, Reasoned)
         if reply is None or not set(reply.objects) <= set(state.names):
             return phrase_of(sentence, state.names)
         return Phrase(reply.complaint, len(reply.objects)), tuple(reply.objects)
@@ -89,13 +89,13 @@ class ThesisLearner(OursLearner):
             wrong = [each for each in labels if self._synthesiser.truth(means, each.state, each.objects) != each.holds]
             if not wrong:
                 break
-            given = {
+            facts = {
                 "complaint": phrase.text,
                 "expression": text_of(means),
                 **self._words(phrase),
                 "examples": [self._example(label) for label in (*wrong, *labels)[:MOST_EXAMPLES]],
             }
-            better = self._written("corrector", CORRECTOR, phrase, given)
+            better = self._written("corrector", CORRECTOR, phrase, facts)
             if better is None or better == means:
                 break
             means = better
@@ -125,7 +125,7 @@ class ThesisLearner(OursLearner):
     def _words(self, phrase: Phrase) -> dict[str, Any]:
         words = self.setting.words
         return {
-            "variables": [f"?{chr(97 + place)}" for place in range(phrase.arguments)],
+            "variables": [f"?{chr(97 + index)}" for index in range(phrase.arguments)],
             "of_object": list(words.of_object),
             "of_scene": list(words.of_scene),
             "given": {name: text_of(each.means) for name, each in self.setting.given.items()},
@@ -159,14 +159,14 @@ class ThesisLearner(OursLearner):
 
     def explore(self, state: Perceived) -> Atom | None:
         """Return, by chance, an action that nothing is known against."""
-        stated, held = self.memory.preconditions(), self.memory.see(state)
-        found = []
+        stated, atoms = self.memory.preconditions(), self.memory.see(state)
+        applicable = []
         for name in self.actions:
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 binding = dict(zip(("?a", "?b"), objects, strict=False))
-                if {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())} <= held:
-                    found.append((name, *objects))
-        return found[int(self.random.integers(len(found)))] if found else None
+                if {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())} <= atoms:
+                    applicable.append((name, *objects))
+        return applicable[int(self.random.integers(len(applicable)))] if applicable else None
 
     def worth_trying(self, state: Perceived) -> Iterator[tuple[tuple[int, ...], Atom, frozenset[Atom]]]:
         """It seeks out nothing."""
@@ -204,12 +204,12 @@ CORRECTOR = (
 def stand_in(request: Request) -> str:
     """Answer as the word list does: no language model. The cheapest meaning of the grammar for the Coder; for the
     Corrector the next one after that which was wrong."""
-    task, given = request.messages[0].text, objects_in(request.messages[1].text)[0]
+    task, facts = request.messages[0].text, objects_in(request.messages[1].text)[0]
     if "You are the reasoner" in task:
-        phrase, objects = phrase_of(given["sentence"], given["objects"])
+        phrase, objects = phrase_of(facts["sentence"], facts["objects"])
         return json.dumps({"complaint": phrase.text, "objects": list(objects)})
-    phrase = Phrase(given["complaint"], len(given["variables"]))
+    phrase = Phrase(facts["complaint"], len(facts["variables"]))
     meanings = [text_of(tree) for _, tree in candidates(phrase, {})]
-    before = given.get("expression")
-    place = meanings.index(before) + 1 if before in meanings else 0
-    return json.dumps({"expression": meanings[min(place, len(meanings) - 1)]})
+    before = facts.get("expression")
+    next_number = meanings.index(before) + 1 if before in meanings else 0
+    return json.dumps({"expression": meanings[min(next_number, len(meanings) - 1)]})

@@ -33,15 +33,15 @@ class Asked(Model):
 
 def read_dialogue(path: Path) -> list[Asked]:
     """Read a dialogue. Raises BadInput naming the line that is none."""
-    found = []
+    questions = []
     for number, line in enumerate(file_content(path, LARGEST_DIALOGUE, hint=HINT).split(b"\n"), start=1):
         if not line.strip():
             continue
         try:
-            found.append(Asked.model_validate_json(line))
+            questions.append(Asked.model_validate_json(line))
         except ValidationError:
             raise BadInput(f"{path}, line {number}: no question and answer", hint=HINT) from None
-    return found
+    return questions
 
 
 class TerminalTeacher:
@@ -74,8 +74,8 @@ class TerminalTeacher:
 
     def answer(self, state: Perceived, phrase: str, objects: tuple[str, ...]) -> bool:
         """Ask whether a phrase is right of objects."""
-        for place, name in enumerate(objects, start=1):
-            phrase = phrase.replace(f"<{place}>", name)
+        for number, name in enumerate(objects, start=1):
+            phrase = phrase.replace(f"<{number}>", name)
         return self._yes(f"Is it so that {phrase}?")
 
     def _wanted(self, goal: tuple[Atom, ...]) -> str:
@@ -91,14 +91,14 @@ class TerminalTeacher:
 
     def _asked(self, question: str) -> str:
         if self._at < len(self._earlier):
-            asked = self._earlier[self._at]
-            if asked.question != question:
+            earlier = self._earlier[self._at]
+            if earlier.question != question:
                 raise BadInput(
-                    f"dialogue, question {self._at + 1}: {asked.question[:60]!r} was asked then, "
+                    f"dialogue, question {self._at + 1}: {earlier.question[:60]!r} was asked then, "
                     f"{question[:60]!r} is now",
                     hint="replay it with the seed, tasks and scene of then",
                 )
-            answer = asked.answer
+            answer = earlier.answer
         elif self._ask is None:
             raise BadInput(
                 f"dialogue: it ends before question {self._at + 1}, {question[:80]!r}", hint="continue it in a terminal"

@@ -51,7 +51,9 @@ def pick_up(kitchen: Kitchen, a: Thing) -> str:
         return f"{a.name} does not fit between the fingers"
     tips = top - kitchen.grip_depth(a)
     outer = (left - FINGER - MARGIN, tips, right + FINGER + MARGIN, 100.0)
-    blocking = next((other for other in kitchen.things.values() if other is not a and _touches(other, outer)), None)
+    blocking = next(
+        (neighbour for neighbour in kitchen.things.values() if neighbour is not a and _touches(neighbour, outer)), None
+    )
     if blocking is not None:
         return f"{blocking.name} is in the way of the fingers"
     kitchen.open_to(right - left + 2 * MARGIN)
@@ -66,9 +68,11 @@ def place_on_table(kitchen: Kitchen, a: Thing) -> str:
     """Put `a` down on a free place of the table."""
     if kitchen.held is not a:
         return f"{a.name} is not in the hand"
-    taken = [(box[0], box[2]) for box in (other.box() for other in kitchen.things.values() if other is not a)]
+    occupied = [
+        (box[0], box[2]) for box in (neighbour.box() for neighbour in kitchen.things.values() if neighbour is not a)
+    ]
     try:
-        x = free_place(kitchen.random, a.kind.width / 2, taken)
+        x = free_place(kitchen.random, a.kind.width / 2, occupied)
     except ValueError as error:
         return str(error)
     return _let_go(kitchen, a, x, 0.0)
@@ -84,7 +88,7 @@ def place_first_on_second(kitchen: Kitchen, a: Thing, b: Thing) -> str:
         slack = min(0.2, abs(right - left - a.kind.width) / 4 + 0.02)
         x = (left + right) / 2 + float(kitchen.random.uniform(-slack, slack))
         region = (x - half, top + 0.01, x + half, 100.0)
-        if not any(_touches(other, region) for other in kitchen.things.values() if other not in (a, b)):
+        if not any(_touches(neighbour, region) for neighbour in kitchen.things.values() if neighbour not in (a, b)):
             return _let_go(kitchen, a, x, top)
     return f"no free place on {b.name} in {TRIES} tries"
 
@@ -98,7 +102,7 @@ def place_first_in_second(kitchen: Kitchen, a: Thing, b: Thing) -> str:
     low, high = left + wall + half + EPSILON, right - wall - half - EPSILON
     if low > high:
         return f"{a.name} does not fit into {b.name}"
-    inside = [other.box() for other in kitchen.things.values() if other not in (a, b)]
+    inside = [neighbour.box() for neighbour in kitchen.things.values() if neighbour not in (a, b)]
     best, x = -1.0, (low + high) / 2
     for _ in range(TRIES):
         tried = float(kitchen.random.uniform(low, high))
@@ -154,7 +158,9 @@ def push_plate_on_object(kitchen: Kitchen, a: Thing, b: Thing) -> str:
     start = left - FINGER - EPSILON if side > 0 else right + FINGER + EPSILON
     height = bottom + b.kind.height + EPSILON
     region = (start - FINGER, height, start + FINGER, 100.0)
-    blocking = next((other for other in kitchen.things.values() if other is not a and _touches(other, region)), None)
+    blocking = next(
+        (neighbour for neighbour in kitchen.things.values() if neighbour is not a and _touches(neighbour, region)), None
+    )
     if blocking is not None:
         return f"{blocking.name} is in the way of the fingers"
     kitchen.open_to(0.0)
