@@ -54,9 +54,9 @@ def read_asked(path: Path) -> Asked:
     is asked."""
     values = file_toml(path, LARGEST_SETTINGS, hint=HINT)
     try:
-        asked = Asked.model_validate_json(json.dumps(values, default=str))
+        questions = Asked.model_validate_json(json.dumps(values, default=str))
     except ValidationError as error:
         raise BadInput(f"{path}: {first_problem(error)}", hint=HINT) from None
-    if not asked.there and not asked.absent:
+    if not questions.there and not questions.absent:
         raise BadInput(f"{path}: nothing is asked", hint=HINT)
-    return asked
+    return questions

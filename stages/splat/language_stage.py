@@ -67,18 +67,18 @@ def run(
                 raise BadInput(
                     f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence"
                 )
-            found = reader.read(frame, ("color", "depth"))
-            if found.color is None:
+            frame_read = reader.read(frame, ("color", "depth"))
+            if frame_read.color is None:
                 continue
-            camera, pose = reader.cameras[found.camera_name], inverse(poses[frame])
-            lessons.append(lesson_of(pyramid(found.color, encoder), gaussians, rasterizer, camera, pose))
-            depth = found.depth
+            camera, pose = reader.cameras[frame_read.camera_name], inverse(poses[frame])
+            lessons.append(lesson_of(pyramid(frame_read.color, encoder), gaussians, rasterizer, camera, pose))
+            depth = frame_read.depth
             if depth is None:
-                shown = rasterizer.draw(gaussians, View(camera, pose)).picture
-                depth = np.where(shown.alpha > COVERED, shown.depth / np.maximum(shown.alpha, 1e-6), 0).astype(
+                drawn = rasterizer.draw(gaussians, View(camera, pose)).picture
+                depth = np.where(drawn.alpha > COVERED, drawn.depth / np.maximum(drawn.alpha, 1e-6), 0).astype(
                     np.float32
                 )
-            sights.append(Sight(found.color, depth, camera, pose))
+            sights.append(Sight(frame_read.color, depth, camera, pose))
     field, losses = _field(gaussians.means, encoder.width, context.seed), deque[float](maxlen=LAST)
     if any(len(lesson.places) for lesson in lessons):
         taught = learn(field, lessons, parameters.steps, context.random(1))
@@ -86,15 +86,15 @@ def run(
     with context.progress.step("pieces"):
         numbered = _numbered(pieces(gaussians))
         order, starts = members_of(numbered, int(numbered.max(initial=-1)) + 1)
-        parts = np.split(order, starts[1:-1]) if len(order) else []
-        members = [gaussians.means[part].astype(float) for part in parts]
+        members_of_region = np.split(order, starts[1:-1]) if len(order) else []
+        members = [gaussians.means[part].astype(float) for part in members_of_region]
         vectors, counts = looks(members, sights, encoder)
     regions = [
         LanguageRegion(box=minimum_box(points[no_strays(points)]), looks=int(count))
         for points, count in zip(members, counts, strict=True)
     ]
     if panoptic_map is not None:
-        regions = _named(regions, parts, gaussians.means, panoptic_map)
+        regions = _named(regions, members_of_region, gaussians.means, panoptic_map)
     at_sizes = [field.vectors(gaussians.means, size) for size in SIZES]
     opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
     every = np.stack(at_sizes, axis=1) if len(gaussians) else np.zeros((0, len(SIZES), encoder.width), np.float32)
@@ -128,18 +128,18 @@ def _named(
     entities = [entity for entity in panoptic_map.info.entities if entity.vertices]
     surfaces = [np.asarray(load_entity_mesh(panoptic_map.path(entity.mesh)).vertices) for entity in entities]
     owners, classes, boxes = nearest_entities(means, surfaces), load_vocabulary(), dict[int, Box]()
-    named = []
+    named_regions = []
     for region, part in zip(regions, parts, strict=True):
         number = entity_of(owners[part])
         if number == NONE:
-            named.append(region)
+            named_regions.append(region)
             continue
         entity = entities[number]
-        told: dict[str, object] = {"instance": entity.instance, "class_name": entity.class_name}
+        fields: dict[str, object] = {"instance": entity.instance, "class_name": entity.class_name}
         if not classes.by_name(entity.class_name).is_layout:
-            told["box"] = boxes.setdefault(number, minimum_box(surfaces[number]))
-        named.append(region.model_copy(update=told))
-    return named
+            fields["box"] = boxes.setdefault(number, minimum_box(surfaces[number]))
+        named_regions.append(region.model_copy(update=fields))
+    return named_regions
 
 
 def _field(means: np.ndarray, width: int, seed: int) -> LanguageField:

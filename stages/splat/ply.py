@@ -28,7 +28,7 @@ def write_gaussians(path: Path, gaussians: Gaussians) -> None:
     count = len(gaussians)
     higher = np.zeros((count, 3, HIGHER), np.float32)
     higher[:, :, : gaussians.harmonics.shape[1] - 1] = gaussians.harmonics[:, 1:].transpose(0, 2, 1)
-    parts = (
+    columns = (
         gaussians.means,
         np.zeros((count, 3)),
         gaussians.harmonics[:, 0],
@@ -37,7 +37,7 @@ def write_gaussians(path: Path, gaussians: Gaussians) -> None:
         gaussians.log_scales,
         gaussians.quaternions / np.linalg.norm(gaussians.quaternions, axis=1, keepdims=True),
     )
-    table = np.concatenate(parts, axis=1).astype("<f4")
+    table = np.concatenate(columns, axis=1).astype("<f4")
     Path(path).write_bytes(_header(count) + table.tobytes())
 
 

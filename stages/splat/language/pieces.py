@@ -38,16 +38,19 @@ def pieces(gaussians: Gaussians) -> np.ndarray:
     colors = np.clip(gaussians.harmonics[solid, 0] * FIRST_HARMONIC + 0.5, 0, 1)
     tree = cKDTree(means)
     count = min(SMOOTH, len(solid) - 1)
-    distances, near = tree.query(means, count + 1)
-    around = means[near] - means[near].mean(axis=1, keepdims=True)
+    distances, neighbours = tree.query(means, count + 1)
+    around = means[neighbours] - means[neighbours].mean(axis=1, keepdims=True)
     normals = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))[1][:, :, 0]
-    colors = np.median(colors[near[:, :6]], axis=1)
-    few = min(NEIGHBOURS, count)
-    first = np.repeat(np.arange(len(solid)), few)
-    second, apart = near[:, 1 : few + 1].reshape(-1), distances[:, 1 : few + 1].reshape(-1)
-    usual = np.maximum(np.median(distances[:, 1 : few + 1], axis=1), 1e-4)
-    kept = apart < REACH * np.minimum(usual[first], usual[second])
-    first, second = first[kept], second[kept]
+    colors = np.median(colors[neighbours[:, :6]], axis=1)
+    neighbour_count = min(NEIGHBOURS, count)
+    first = np.repeat(np.arange(len(solid)), neighbour_count)
+    second, apart = (
+        neighbours[:, 1 : neighbour_count + 1].reshape(-1),
+        distances[:, 1 : neighbour_count + 1].reshape(-1),
+    )
+    usual = np.maximum(np.median(distances[:, 1 : neighbour_count + 1], axis=1), 1e-4)
+    is_close = apart < REACH * np.minimum(usual[first], usual[second])
+    first, second = first[is_close], second[is_close]
     bend = 1.0 - np.abs(np.einsum("ni,ni->n", normals[first], normals[second]))
     weights = COLOR * np.linalg.norm(colors[first] - colors[second], axis=1) + BEND * bend
     order = np.argsort(weights, kind="stable")
