@@ -18,14 +18,14 @@ NEAR = 0.5
 def explore(body: Body, scene: SceneMap, until: Callable[[], object] = lambda: None) -> int:
     """Drive through everything that can be reached, or until something is found; return the number of stops."""
     scene.sweep(body)
-    left = [(body.base.x, body.base.y)]
+    visited = [(body.base.x, body.base.y)]
     for stop in range(MOST_STOPS):
         if until():
             return stop
-        goal = _nearest_frontier(body.base, scene, np.array(left))
+        goal = _nearest_frontier(body.base, scene, np.array(visited))
         if goal is None:
             return stop
-        left.append(goal)
+        visited.append(goal)
         x, y = goal
         yaw = float(np.arctan2(y - body.base.y, x - body.base.x))
         arrived = body.drive(Base(x, y, yaw), "").ok
@@ -38,8 +38,8 @@ def _nearest_frontier(base: Base, scene: SceneMap, left: np.ndarray) -> tuple[fl
     points = scene.obstacles.frontiers()
     if not len(points):
         return None
-    known = np.hypot(*(points[:, None] - left[None]).transpose(2, 0, 1)).min(axis=1) > NEAR
-    points = points[known]
+    is_far = np.hypot(*(points[:, None] - left[None]).transpose(2, 0, 1)).min(axis=1) > NEAR
+    points = points[is_far]
     field, origin = scene.obstacles.distances_from(base.x, base.y), np.array(scene.obstacles.origin)
     if not len(points):
         return None

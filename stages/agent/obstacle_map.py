@@ -95,8 +95,8 @@ class ObstacleMap:
     def drivable(self) -> np.ndarray:
         """(H, W) bool: cells of the window where the base fits."""
         if self._drivable is None:
-            near = _around(self.window == OCCUPIED, self.clearance) | _around(self._taken_now(), BESIDE_MOVABLE)
-            self._drivable = (self.window == FREE) & ~near
+            too_close = _around(self.window == OCCUPIED, self.clearance) | _around(self._taken_now(), BESIDE_MOVABLE)
+            self._drivable = (self.window == FREE) & ~too_close
         return self._drivable
 
     def _near_obstacles(self, cells: float) -> np.ndarray:
@@ -105,11 +105,11 @@ class ObstacleMap:
 
     def _taken_now(self) -> np.ndarray:
         """Return (H, W) bool: cells of the window that something movable stands over."""
-        taken = np.zeros(self.window.shape, bool)
+        occupied = np.zeros(self.window.shape, bool)
         rows = self._aside - self._zero - self._low
-        rows = rows[np.all((rows >= 0) & (rows < taken.shape), axis=1)]
-        taken[rows[:, 0], rows[:, 1]] = True
-        return taken
+        rows = rows[np.all((rows >= 0) & (rows < occupied.shape), axis=1)]
+        occupied[rows[:, 0], rows[:, 1]] = True
+        return occupied
 
     def put_aside(self, points: np.ndarray) -> None:
         """Say over which points (N, 2) [m] something movable stands now, in place of those said before."""

@@ -46,8 +46,8 @@ def _is_mobile(goal: Goal) -> bool:
 def _program(goal: Goal, number: int, mobile: bool) -> list[str]:
     match goal:
         case Shut(what=what, opened=opened):
-            place = f"rooms.find({what.labels[0]!r})[0]"
-            return [f"navigate({place})", f"{'open' if opened else 'close'}({place})"]
+            furniture_code = f"rooms.find({what.labels[0]!r})[0]"
+            return [f"navigate({furniture_code})", f"{'open' if opened else 'close'}({furniture_code})"]
         case Among(what=what, around=around):
             return _each(what, [f"place_among(objects.find({around.labels[0]!r})[0])"], f"moved_{number}")
         case Gather(what=what, onto=onto):
@@ -64,14 +64,14 @@ def _move(goal: Move, number: int, mobile: bool) -> list[str]:
     if not mobile:
         return _each(goal.what, [f"place(objects.find({onto!r})[0])"], flag)
     start = goal.start or "table"
-    target = there = f"rooms.find({onto!r})[0]"
+    target = home = f"rooms.find({onto!r})[0]"
     lines = []
     if onto not in FURNITURE:
-        target, there = f"carrier_{number}", f"home_{number}"
-        seen = [f"{target} = objects.find({onto!r})[0]", f"{there} = spot"]
+        target, home = f"carrier_{number}", f"home_{number}"
+        remembering_lines = [f"{target} = objects.find({onto!r})[0]", f"{home} = spot"]
         lines = ["for spot in rooms.find('table'):", "    navigate(spot)", "    objects = explore_local()"]
-        lines += [f"    if objects.find({onto!r}):", *_indented(seen, 2)]
-    put = [f"navigate({there})", f"place({target})", *(["navigate(spot)"] if goal.every else [])]
+        lines += [f"    if objects.find({onto!r}):", *_indented(remembering_lines, 2)]
+    put = [f"navigate({home})", f"place({target})", *(["navigate(spot)"] if goal.every else [])]
     inner = ["navigate(spot)", *(["open(spot)"] if start in WITH_DOORS else []), "objects = explore_local()"]
     loop = [f"for spot in rooms.find({start!r}):", *_indented([*inner, *_each(goal.what, put)], 1)]
     if flag:

@@ -98,8 +98,8 @@ class FastWorld:
     def sweep(self) -> Sweep:
         """Cast rays over the floor from the base, to the first occupied cell."""
         self._seconds += SECONDS["sweep"]
-        free, struck, seen = self._floor.swept(self._base)
-        sweep = Sweep(free, struck, tuple(self._seen(self.apartment.furniture[k]) for k in seen))
+        free, struck, furniture_seen = self._floor.swept(self._base)
+        sweep = Sweep(free, struck, tuple(self._seen(self.apartment.furniture[k]) for k in furniture_seen))
         self.obstacles.add(sweep)
         return sweep
 
@@ -126,26 +126,28 @@ class FastWorld:
         self._seconds += SECONDS["close" if close else "look"]
         sector = _sector(self._base, at)
         piece = self._under(at)
-        found = []
+        detections = []
         for body in self._visible(piece):
             if close and hypot(body.at[0] - at[0], body.at[1] - at[1]) > FOUND_WITHIN:
                 continue
             detection = self._detected(body, _sector(self._base, (*body.at, 0.0)), close)
             if detection is not None:
-                found.append(detection)
-        return Look(tuple(found), sector, close)
+                detections.append(detection)
+        return Look(tuple(detections), sector, close)
 
     def look_at_hand(self, view: int) -> Detection | None:
         """See what the hand holds; a view of one state may be misjudged for good."""
         self._seconds += SECONDS["hand"]
-        held = self.bodies[self.held] if self.held else None
+        body_in_hand = self.bodies[self.held] if self.held else None
         if self._luck.happens(self._rates.feedback, "feedback", self._grasps, view):
             self._log.mistaken("feedback", f"hand {self._grasps}")
-            return self._named(self._other(), self._hand_position(), "", 0.04) if held is None else None
-        if held is None:
+            return self._named(self._other(), self._hand_position(), "", 0.04) if body_in_hand is None else None
+        if body_in_hand is None:
             return None
-        label = self._label(held, "hand", False)
-        return self._named(label, self._hand_position(), held.thing.color, held.thing.radius, held.thing.used)
+        label = self._label(body_in_hand, "hand", False)
+        return self._named(
+            label, self._hand_position(), body_in_hand.thing.color, body_in_hand.thing.radius, body_in_hand.thing.used
+        )
 
     def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
         """Whether the arm gets there: by distance and height, and as far as a bad base pose can be foreseen; nothing
@@ -296,9 +298,9 @@ class FastWorld:
     def _at(self, at: Position) -> Body | None:
         piece = self._under(at)
         loose = [b for b in self._visible(piece) if not b.thing.carries]
-        near = [(hypot(b.at[0] - at[0], b.at[1] - at[1]), b.thing.name) for b in loose]
-        near = [(d, name) for d, name in near if d <= FOUND_WITHIN]
-        return self.bodies[min(near)[1]] if near else None
+        by_distance = [(hypot(b.at[0] - at[0], b.at[1] - at[1]), b.thing.name) for b in loose]
+        by_distance = [(d, name) for d, name in by_distance if d <= FOUND_WITHIN]
+        return self.bodies[min(by_distance)[1]] if by_distance else None
 
     def _under(self, at: Position) -> Furniture | None:
         """Return the furniture at a position, with a hand's breadth around it."""

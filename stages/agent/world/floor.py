@@ -79,11 +79,11 @@ class Floor:
         passed = np.cumsum(hit, axis=1)
         free, struck = self._once(rows[passed == 0]), self._once(rows[hit & (passed == 1)])
         owners, counts = np.unique(self._owner[struck[:, 0], struck[:, 1]], return_counts=True)
-        seen = tuple(int(k) for k, n in zip(owners, counts, strict=True) if k >= 0 and n >= SEEN_CELLS)
-        return free + self._corner, struck + self._corner, seen
+        furniture_seen = tuple(int(k) for k, n in zip(owners, counts, strict=True) if k >= 0 and n >= SEEN_CELLS)
+        return free + self._corner, struck + self._corner, furniture_seen
 
     def _once(self, rows: np.ndarray) -> np.ndarray:
         """Return the rows (N, 2) once each, in order."""
-        there = np.zeros(self.occupied.shape, bool)
-        there[rows[:, 0], rows[:, 1]] = True
-        return np.argwhere(there)
+        hit = np.zeros(self.occupied.shape, bool)
+        hit[rows[:, 0], rows[:, 1]] = True
+        return np.argwhere(hit)

@@ -97,13 +97,13 @@ class Draft:
             if placed is None:
                 continue
             centre, size = placed
-            made = Furniture(
+            candidate = Furniture(
                 name=name, label=label, centre=centre, size=size, height=piece.height, door=piece.door, opened=opened
             )
-            if all(_gap(made, other) >= self.recipe.passage for other in self.furniture) and all(
-                _distance(made, door.centre) >= self.recipe.door_clearance for door in self.doors
+            if all(_gap(candidate, earlier) >= self.recipe.passage for earlier in self.furniture) and all(
+                _distance(candidate, door.centre) >= self.recipe.door_clearance for door in self.doors
             ):
-                self.furniture.append(made)
+                self.furniture.append(candidate)
                 return name
         raise NoRoom
 

@@ -63,9 +63,9 @@ def front_of(apartment: Apartment, piece: Furniture) -> tuple[np.ndarray, float]
         (0, -1): room.high[1] - y - piece.size[1] / 2,
     }
     normal = min(gaps, key=lambda side: gaps[side])
-    left = (-normal[1], normal[0])
+    left_direction = (-normal[1], normal[0])
     # the gap to a wall is filed under the direction away from it
-    hinge = 1.0 if gaps[(-left[0], -left[1])] <= gaps[left] else -1.0
+    hinge = 1.0 if gaps[(-left_direction[0], -left_direction[1])] <= gaps[left_direction] else -1.0
     return np.array(normal, float), hinge
 
 

@@ -175,10 +175,10 @@ def _one_grasp(
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     checker, opening = beliefs.checker, beliefs.description.opening
-    way = _way_in(planner, base, arm, target, map_from_tool, tally)
-    if way is None:
+    approach_and_lift = _way_in(planner, base, arm, target, map_from_tool, tally)
+    if approach_and_lift is None:
         return None
-    approach, lift = way
+    approach, lift = approach_and_lift
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
     low, high = whole_box(target)
@@ -240,11 +240,11 @@ def _by_another_elbow(
     planner: ArmPlanner, base: np.ndarray, map_from_tool: np.ndarray, tally: Tally
 ) -> np.ndarray | None:
     """Return free arm values (7,) for a tool pose that the arm gets to with its elbow in the way of something."""
-    chain, wanted = planner.model.chain, in_arm_frame(base, map_from_tool, planner.model.description)
+    chain, tool_in_arm_frame = planner.model.chain, in_arm_frame(base, map_from_tool, planner.model.description)
     for start in random_starts(chain, ELBOWS, planner.random):
-        found = inverse_kinematics(chain, wanted, start[None])
-        if found.found and planner.free(base, found.arm, tally):
-            return found.arm
+        solution = inverse_kinematics(chain, tool_in_arm_frame, start[None])
+        if solution.found and planner.free(base, solution.arm, tally):
+            return solution.arm
     return None
 
 

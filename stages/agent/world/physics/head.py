@@ -112,9 +112,9 @@ def enter(pieces: list[SeenPiece], label: str, points: np.ndarray) -> None:
         pieces.append(SeenPiece(label))
     first, *others = overlapped or pieces[-1:]
     first.add(points)
-    for other in others:
-        first.merge(other)
-    pieces[:] = [piece for piece in pieces if all(piece is not other for other in others)]
+    for merged in others:
+        first.merge(merged)
+    pieces[:] = [piece for piece in pieces if all(piece is not merged for merged in others)]
 
 
 def _overlap(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> bool:

@@ -100,8 +100,10 @@ def _turned(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
         return pointing(heading + turn, np.pi / 2)
     approach = hold.rotation[:, 2]
     level = float(np.hypot(approach[0], approach[1]))
-    own = np.arctan2(approach[1], approach[0]) if level > 0.2 else np.arctan2(hold.rotation[1, 0], hold.rotation[0, 0])
-    c, s = np.cos(heading + turn - own), np.sin(heading + turn - own)
+    present_heading = (
+        np.arctan2(approach[1], approach[0]) if level > 0.2 else np.arctan2(hold.rotation[1, 0], hold.rotation[0, 0])
+    )
+    c, s = np.cos(heading + turn - present_heading), np.sin(heading + turn - present_heading)
     pose = np.eye(4)
     pose[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ hold.rotation
     return pose

@@ -139,18 +139,18 @@ class Pulling:
         if its handle is there."""
         piece, base = self._seen.pieces[number], self._robot.believed
         low, high = piece.box
-        known = self._seen.fronts.get(f"furniture_{number}")
-        if known is not None and known.value > 0:
-            return known  # half open, the handle does not tell where the front is
-        if known is not None:
-            at = apply(known.map_from_front, np.array([known.joint.handle]))[0]
+        known_front = self._seen.fronts.get(f"furniture_{number}")
+        if known_front is not None and known_front.value > 0:
+            return known_front  # half open, the handle does not tell where the front is
+        if known_front is not None:
+            at = apply(known_front.map_from_front, np.array([known_front.joint.handle]))[0]
         else:
             assert middle is not None
             at = np.array([*middle, HEIGHT_OF_LOOK * high[2]])
         name, surfaces = f"furniture_{number}", self._looking.look_at_front(_position(at))
         if not any(s.label == PARTS[0] for s in surfaces):  # a near look shows no whole panel
-            near = self._looking.look_at_front(_position(at), close=True)
-            surfaces += [s for s in near if s.label == PARTS[0]]
+            surfaces_close = self._looking.look_at_front(_position(at), close=True)
+            surfaces += [s for s in surfaces_close if s.label == PARTS[0]]
         front = front_seen(name, piece.label, (low, high), surfaces, base)
         if front is not None:
             self._seen.fronts[name] = front
@@ -158,13 +158,13 @@ class Pulling:
 
     def _go(self, pose: np.ndarray, label: str) -> bool:
         """Drive to a base pose (3,) before furniture of a class, if the robot does not stand there."""
-        here = self._robot.believed
-        turn = (pose[2] - here[2] + pi) % (2 * pi) - pi
-        if np.hypot(*(pose[:2] - here[:2])) < HERE and abs(turn) < 0.6:
+        present_pose = self._robot.believed
+        turn = (pose[2] - present_pose[2] + pi) % (2 * pi) - pi
+        if np.hypot(*(pose[:2] - present_pose[:2])) < HERE and abs(turn) < 0.6:
             return True
         base = Base(float(pose[0]), float(pose[1]), float(pose[2]))
-        known = np.isfinite(self._seen.obstacles.way(self._robot.base, (base.x, base.y)))
-        return bool(known) and self._driving.drive(base, f"{label}_0").ok
+        is_drivable = np.isfinite(self._seen.obstacles.way(self._robot.base, (base.x, base.y)))
+        return bool(is_drivable) and self._driving.drive(base, f"{label}_0").ok
 
     # ---- open ----
 
@@ -246,12 +246,12 @@ class Pulling:
         MotionFailed.
         """
         robot = self._robot
-        *there, away, home = motion.segments
-        start = next(k for k, segment in enumerate(there) if segment.label in ("pull", "push"))
+        *segments, away, home = motion.segments
+        start = next(k for k, segment in enumerate(segments) if segment.label in ("pull", "push"))
         robot.room.world.wake()
         robot.driver.robot.finger_force = robot.description.firm_finger_force
         try:
-            value, slipped = self._along(front, there, start)
+            value, slipped = self._along(front, segments, start)
         finally:
             robot.driver.robot.finger_force = robot.description.finger_force
         try:
@@ -279,9 +279,9 @@ class Pulling:
         """Return how far a front is open as seen from here; the `value` that was felt, which is finer, where it is not
         seen or the eyes say about the same."""
         handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
-        seen = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
-        found = max(0.0, front.value_seen(max(seen, key=lambda s: len(s.points)).points)) if seen else value
-        return value if abs(found - value) < SEEN_TO else found
+        panels = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
+        value_seen = max(0.0, front.value_seen(max(panels, key=lambda s: len(s.points)).points)) if panels else value
+        return value if abs(value_seen - value) < SEEN_TO else value_seen
 
     def _tool(self, arm: np.ndarray) -> np.ndarray:
         """Return the tool point (3,) of the map for joint values (7,)."""
@@ -296,8 +296,12 @@ class Pulling:
         side = -front.joint.axis[2]
         x = front.size[0] / 2
         for away, aside in LOOKS_IN:
-            here, there = apply(front.map_from_front, np.array([(x + away, side * aside, 0.0), (0.0, 0.0, 0.0)]))
-            pose = np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])])
+            standpoint, handle_point = apply(
+                front.map_from_front, np.array([(x + away, side * aside, 0.0), (0.0, 0.0, 0.0)])
+            )
+            pose = np.array(
+                [standpoint[0], standpoint[1], atan2(handle_point[1] - standpoint[1], handle_point[0] - standpoint[0])]
+            )
             if self._seen.obstacles.fits(pose[0], pose[1]) and self._go(pose, front.label):
                 return
 
