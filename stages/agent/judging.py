@@ -94,7 +94,7 @@ def _holds(goal: Goal, world: World) -> bool:
             return any(_in_the_middle(name, around, world) for name in _things(what, world))
         case Move(what=what, onto=onto, every=every, start=start):
             names = [n for n in _things(what, world) if not start or _label(_root_before(n, world), world) == start]
-            on = [_carried(name, onto, world) for name in names]
+            on = [_is_carried_by(name, onto, world) for name in names]
             return bool(names) and (all(on) if every else any(on))
 
 
@@ -116,7 +116,7 @@ def _root_before(name: str, world: World) -> str:
     return at
 
 
-def _carried(name: str, onto: Description, world: World) -> bool:
+def _is_carried_by(name: str, onto: Description, world: World) -> bool:
     """Whether a thing is on something of a description, or on what that carries."""
     on = world.bodies[name].on
     while on:

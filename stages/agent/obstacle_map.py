@@ -95,15 +95,17 @@ class ObstacleMap:
     def drivable(self) -> np.ndarray:
         """(H, W) bool: cells of the window where the base fits."""
         if self._drivable is None:
-            too_close = _around(self.window == OCCUPIED, self.clearance) | _around(self._taken_now(), BESIDE_MOVABLE)
+            too_close = _around(self.window == OCCUPIED, self.clearance) | _around(
+                self._movable_cells(), BESIDE_MOVABLE
+            )
             self._drivable = (self.window == FREE) & ~too_close
         return self._drivable
 
     def _near_obstacles(self, cells: float) -> np.ndarray:
         """Return (H, W) bool: cells of the window at most so far from what is occupied, for good or now."""
-        return _around((self.window == OCCUPIED) | self._taken_now(), cells)
+        return _around((self.window == OCCUPIED) | self._movable_cells(), cells)
 
-    def _taken_now(self) -> np.ndarray:
+    def _movable_cells(self) -> np.ndarray:
         """Return (H, W) bool: cells of the window that something movable stands over."""
         occupied = np.zeros(self.window.shape, bool)
         rows = self._aside - self._zero - self._low
@@ -146,7 +148,7 @@ class ObstacleMap:
             before = self._driven[self._low[0] : self._high[0], self._low[1] : self._high[1]].copy()
             before[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] = True
             # it stands here already, however near to something
-            free = self.drivable | (before & (self.window == FREE) & ~self._taken_now())
+            free = self.drivable | (before & (self.window == FREE) & ~self._movable_cells())
             cost = np.ones(self.window.shape)
             if self.comfort > 0:
                 self._dear = self._near_obstacles(self.comfort)

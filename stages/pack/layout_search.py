@@ -128,7 +128,7 @@ def _hand_at(hand, part, x, y, turn):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _allowed(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-def]
+def _may_stand(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-def]
     """Whether a box may stand at (x, y) beside those that are `placed` (B, 3)."""
     footprint = _box_at(problem.extents, box, x, y, turn)
     if (
@@ -241,7 +241,7 @@ def _candidates(problem, placed, box, gap, corner, rows):  # type: ignore[no-unt
                 extra = n + 1
             for i in range(extra):
                 x = xs[i]
-                if count < rows.shape[0] and _allowed(problem, placed, box, x, y, turn, gap):
+                if count < rows.shape[0] and _may_stand(problem, placed, box, x, y, turn, gap):
                     # Near the robot first; ties towards the side that the restart prefers.
                     low_edge = x - half_x
                     side = y - half_y if corner % 2 == 0 else -(y + half_y)
@@ -274,7 +274,7 @@ def _search(problem, order, gap, corner, nodes):  # type: ignore[no-untyped-def]
     placed = np.full((problem.extents.shape[0], 3), -1.0)
     for row in range(preset.shape[0]):
         box, turn = int(preset[row, BOX]), int(preset[row, TURN])
-        if not _allowed(problem, placed, box, preset[row, X], preset[row, Y], turn, 0.0):
+        if not _may_stand(problem, placed, box, preset[row, X], preset[row, Y], turn, 0.0):
             return placed, -1
         placed[box, PLACED_X], placed[box, PLACED_Y], placed[box, PLACED_TURN] = preset[row, X], preset[row, Y], turn
     depth_count = len(order)

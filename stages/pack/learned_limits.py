@@ -49,7 +49,7 @@ def learn(observation: Observation, trace: Sequence[Attempt], reasons: bool) -> 
         if failed is not None and failed.failure is not None and failed.action.box in boxes:
             action, kind = failed.action, failed.failure.kind
             if not reasons or kind in ("no_path", "joint_limit"):
-                _refuse(limits, action, _placed(attempt), failed.failure.objects if reasons else (), boxes)
+                _refuse(limits, action, _placed_boxes(attempt), failed.failure.objects if reasons else (), boxes)
             elif kind == "no_inverse_kinematics" and action.name == "place":
                 numbers = failed.failure.numbers
                 limits.reach = min(limits.reach, hypot(numbers["nearest_x"], numbers["nearest_y"]) - REACH_MARGIN)
@@ -63,7 +63,7 @@ def learn(observation: Observation, trace: Sequence[Attempt], reasons: bool) -> 
     return limits
 
 
-def _placed(attempt: Attempt) -> tuple[str, ...]:
+def _placed_boxes(attempt: Attempt) -> tuple[str, ...]:
     return tuple(step.action.box for step in attempt.feedback[:-1] if step.action.name == "place")
 
 

@@ -89,7 +89,7 @@ class MotionPlanner:
         tops = max((obstacle.block.top for obstacle in others), default=0.0)
         height = _height_over(start, end, held, tops)
         if self._surely_free(start, end, height, tops, others):
-            return Motion(lambda: _known(self._over(start, end, height, held, tops, others))[0], end, False)
+            return Motion(lambda: _require_path(self._over(start, end, height, held, tops, others))[0], end, False)
         path = self._over(start, end, height, held, tops, others)
         if path is not None and path[1]:
             return Motion(lambda: path[0], end, False)
@@ -131,7 +131,7 @@ class MotionPlanner:
             return None
         free = not _near_base(others) and lowest_on_path(self.arm, points[:, 0], points[:, 2]) > tops
         free = free and all(
-            self._drawn_in_free(stance, line, held, others) for stance, line in ((start, rise), (end, fall))
+            self._is_free_drawn_in(stance, line, held, others) for stance, line in ((start, rise), (end, fall))
         )
         return joints, free
 
@@ -145,7 +145,7 @@ class MotionPlanner:
         radii = np.minimum(pose.radius, self.arm.reaches(heights) - 1e-6)
         return np.column_stack([radii, np.full(count + 1, azimuth), heights])
 
-    def _drawn_in_free(
+    def _is_free_drawn_in(
         self, stance: Stance, rise: np.ndarray, held: BoxState | None, others: tuple[Named, ...]
     ) -> bool:
         """Whether hand and held box are free on the way up: over a free end, straight up is; drawn in may be not."""
@@ -184,7 +184,7 @@ class MotionPlanner:
                 return Motion(partial(np.copy, full_path), end, False)
         space = SearchSpace(self.arm.chain.lower, self.arm.chain.upper, resolution)
         if path is not None:
-            space = _narrowed(space, whole_range=np.concatenate([path, start.arm[None]]))
+            space = _narrow(space, whole_range=np.concatenate([path, start.arm[None]]))
         planned = rrt_connect(
             start.arm,
             end.arm,
@@ -211,7 +211,7 @@ def _near_base(others: tuple[Named, ...]) -> bool:
     )
 
 
-def _known(path: tuple[np.ndarray, bool] | None) -> tuple[np.ndarray, bool]:
+def _require_path(path: tuple[np.ndarray, bool] | None) -> tuple[np.ndarray, bool]:
     if path is None:
         raise AssertionError("a path that is free everywhere in its range exists")
     return path
@@ -224,7 +224,7 @@ def _arc(first: np.ndarray, last: np.ndarray) -> np.ndarray:
     return first + (last - first) * (np.arange(1, count + 1) / count)[:, None]
 
 
-def _narrowed(space: SearchSpace, whole_range: np.ndarray) -> SearchSpace:
+def _narrow(space: SearchSpace, whole_range: np.ndarray) -> SearchSpace:
     """Keep joints 1 and 7, which could go round more than once, near where the motion needs them."""
     lower, upper = space.lower.copy(), space.upper.copy()
     for joint in (0, 6):

@@ -57,7 +57,7 @@ def inner_monologue(
     failures = 0
     domain = memory.domain("learned") if kind == "preconditions" else None
     while len(result.steps) < MOST_STEPS and failures < MOST_FAILURES:
-        step = _asked_step(task, world, chat, actions, kind, memory, history, domain)
+        step = _ask_step(task, world, chat, actions, kind, memory, history, domain)
         if step is None or step[0] == "done":
             result.unplanned = "" if step else "no action was named that there is"
             break
@@ -69,7 +69,7 @@ def inner_monologue(
     return result
 
 
-def _asked_step(
+def _ask_step(
     task: Task,
     world: World,
     chat: Chat,
@@ -93,7 +93,7 @@ def _asked_step(
         if reply.action == "done":
             return ("done",)
         is_action = actions.get(reply.action) == len(reply.objects) and set(reply.objects) <= set(state.names)
-        if is_action and (domain is None or _allowed(domain, step, state.names, atoms)):
+        if is_action and (domain is None or _is_allowed(domain, step, state.names, atoms)):
             return step
         facts["refused"] = (
             f"{' '.join(step)}: {'its preconditions do not hold' if is_action else 'there is no such action'}"
@@ -101,7 +101,7 @@ def _asked_step(
     return None
 
 
-def _allowed(domain: Domain, step: Atom, names: tuple[str, ...], held: frozenset[Atom]) -> bool:
+def _is_allowed(domain: Domain, step: Atom, names: tuple[str, ...], held: frozenset[Atom]) -> bool:
     problem = Problem("now", dict.fromkeys(names, ""), held, frozenset())
     return any(action_atom(each) == step and each.preconditions <= held for each in ground(domain, problem))
 

@@ -69,7 +69,7 @@ def draw_predicates(predicates: Sequence[Predicate], state: Perceived, vocabular
     sheet = Image.new("RGB", (columns * (size + 8), max(1, rows) * (size + line + 8)), (255, 255, 255))
     draw = ImageDraw.Draw(sheet)
     for number, predicate in enumerate(predicates):
-        holds = _held(predicate, state, vocabulary)
+        holds = _holding_grid(predicate, state, vocabulary)
         colors = np.where(holds[:, :, None], (130, 190, 130), (232, 232, 232)).astype(np.uint8)
         corner = (number % columns * (size + 8), number // columns * (size + line + 8))
         sheet.paste(
@@ -110,7 +110,7 @@ def draw_learning(course: Sequence[tuple[int, int, int]]) -> Image.Image:
     return image
 
 
-def _held(predicate: Predicate, state: Perceived, vocabulary: dict[str, Predicate]) -> np.ndarray:
+def _holding_grid(predicate: Predicate, state: Perceived, vocabulary: dict[str, Predicate]) -> np.ndarray:
     """Return (GRID, GRID) where the predicate holds, rows from above."""
     names = list(state.names)[: max(1, predicate.arguments)]
     holds = np.zeros((GRID, GRID), dtype=bool)
@@ -119,14 +119,14 @@ def _held(predicate: Predicate, state: Perceived, vocabulary: dict[str, Predicat
     places = np.linspace(LEFT, RIGHT, GRID) if kitchen else np.linspace(-ROOM_HALF, ROOM_HALF, GRID)
     for row, height in enumerate(heights.tolist()):
         for column, x in enumerate(places.tolist()):
-            moved_state = _moved(state, names[0], x, height)
+            moved_state = _move_object(state, names[0], x, height)
             holds[row, column] = Evaluator(moved_state, vocabulary).holds(
                 (predicate.name, *names[: predicate.arguments])
             )
     return holds
 
 
-def _moved(state: Perceived, name: str, x: float, height: float) -> Perceived:
+def _move_object(state: Perceived, name: str, x: float, height: float) -> Perceived:
     """Return a state with the middle of an object elsewhere."""
     if isinstance(state, RoomState):
         body = state.bodies[name]

@@ -56,7 +56,7 @@ def tasks_of(domain: str, which: str, count: int, seed: int) -> list[Task]:
     """
     setup = kitchen_file().domains[domain]
     if which == "hundred_goals":
-        return _generated(domain, setup, count, seed)
+        return _generate_tasks(domain, setup, count, seed)
     names = setup.objects if which in ("train", "canonical", "novel_goals") else (*setup.objects, *setup.more)
     stream = ("train", *SETS).index(which)
     tasks = []
@@ -90,15 +90,13 @@ def layout(names: tuple[str, ...], random: np.random.Generator, stacked: float) 
     """Return where objects stand, drawn up to LAYOUTS times until they fit. Raises BadInput when they never do."""
     for _ in range(LAYOUTS):
         try:
-            return _drawn_layout(names, random, stacked)
+            return _draw_layout(names, random, stacked)
         except ValueError as error:
             reason = str(error)
     raise BadInput(f"{', '.join(names)}: {reason}", hint="fewer or smaller objects (data/kitchen/kitchen.toml)")
 
 
-def _drawn_layout(
-    names: tuple[str, ...], random: np.random.Generator, stacked: float
-) -> dict[str, tuple[float, float]]:
+def _draw_layout(names: tuple[str, ...], random: np.random.Generator, stacked: float) -> dict[str, tuple[float, float]]:
     """Return where objects stand: the anchored ones at their place, the plate beside the placemat, others on free
     places of the table or, a share `stacked` of them, on a thing that carries them.
 
@@ -128,7 +126,7 @@ def _drawn_layout(
     return places
 
 
-def _generated(domain: str, setup: DomainSetup, count: int, seed: int) -> list[Task]:
+def _generate_tasks(domain: str, setup: DomainSetup, count: int, seed: int) -> list[Task]:
     """Return tasks with goals that differ from each other: what holds at the end of a random walk with the teacher's
     operators, and did not at its beginning; so a plan exists. Fewer where no more were found."""
     names = (*setup.objects, *setup.more)
@@ -143,14 +141,14 @@ def _generated(domain: str, setup: DomainSetup, count: int, seed: int) -> list[T
         chosen = tuple(name for name in names if kitchen_file().objects[name].at is not None or random.random() < 0.85)
         places, chance = layout(chosen, random, setup.stacked), int(random.integers(2**31))
         task = Task(f"{domain}/hundred_goals/{len(tasks) + 1}", places, (), chance)
-        goal = _walked_goal(domain, task, random)
+        goal = _walk_goal(domain, task, random)
         if goal and frozenset(goal) not in goals:
             goals.add(frozenset(goal))
             tasks.append(Task(task.name, places, goal, chance))
     return tasks
 
 
-def _walked_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[Atom, ...]:
+def _walk_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[Atom, ...]:
     start = true_atoms(open_kitchen(task).state(), domain)
     problem = Problem("walk", dict.fromkeys(task.objects, ""), start, frozenset())
     actions = ground(true_domain(domain), problem)

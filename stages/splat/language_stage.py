@@ -84,7 +84,7 @@ def run(
         taught = learn(field, lessons, parameters.steps, context.random(1))
         losses.extend(context.progress.track(taught, total=parameters.steps, description="steps"))
     with context.progress.step("pieces"):
-        numbered = _numbered(pieces(gaussians))
+        numbered = _number_rows(pieces(gaussians))
         order, starts = members_of(numbered, int(numbered.max(initial=-1)) + 1)
         members_of_region = np.split(order, starts[1:-1]) if len(order) else []
         members = [gaussians.means[part].astype(float) for part in members_of_region]
@@ -94,7 +94,7 @@ def run(
         for points, count in zip(members, counts, strict=True)
     ]
     if panoptic_map is not None:
-        regions = _named(regions, members_of_region, gaussians.means, panoptic_map)
+        regions = _name_regions(regions, members_of_region, gaussians.means, panoptic_map)
     at_sizes = [field.vectors(gaussians.means, size) for size in SIZES]
     opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
     every = np.stack(at_sizes, axis=1) if len(gaussians) else np.zeros((0, len(SIZES), encoder.width), np.float32)
@@ -120,7 +120,7 @@ def run(
     return LanguageMap(context.output, outcome="ok" if members else "empty", summary=summary)
 
 
-def _named(
+def _name_regions(
     regions: list[LanguageRegion], parts: list[np.ndarray], means: np.ndarray, panoptic_map: PanopticMap
 ) -> list[LanguageRegion]:
     """Return regions with the entities that their Gaussians (`parts`) belong to: instance, class and, of a thing, its
@@ -147,7 +147,7 @@ def _field(means: np.ndarray, width: int, seed: int) -> LanguageField:
     return LanguageField(means if len(means) else np.zeros((1, 3)), width)
 
 
-def _numbered(found: np.ndarray) -> np.ndarray:
+def _number_rows(found: np.ndarray) -> np.ndarray:
     """Return pieces (granularities, N) with numbers of their own in every row."""
     result, first = found.copy(), 0
     for row in result:

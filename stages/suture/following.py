@@ -161,13 +161,13 @@ def masks_within(make: MaskMaker, pair: Pair, windows: tuple[Window, Window]) ->
     eye_masks, size = make(cut), pair.left.shape[:2]
 
     def whole(masks: tuple[Any, Any]) -> Any:
-        return tuple(_pasted(mask, window, size) for mask, window in zip(masks, windows, strict=True))
+        return tuple(_paste(mask, window, size) for mask, window in zip(masks, windows, strict=True))
 
     hidden = eye_masks.hidden if eye_masks.hidden[0] is None else whole(eye_masks.hidden)
     return EyeMasks(whole(eye_masks.needle), whole(eye_masks.thread), hidden)
 
 
-def _pasted(mask: np.ndarray, window: Window, size: tuple[int, ...]) -> np.ndarray:
+def _paste(mask: np.ndarray, window: Window, size: tuple[int, ...]) -> np.ndarray:
     picture = np.zeros(size, dtype=bool)
     picture[window] = mask
     return picture
@@ -254,7 +254,7 @@ class Follower:
     def _picture(self, path: Path) -> np.ndarray:
         """Return a picture (H, W, 3); without its pixels (H, W, 0) where masks are not made of it."""
         content = file_content(path, LARGEST_PICTURE, hint="give the pictures of both eyes")
-        picture = _decoded(content) if self._cuts else _size_alone(content)
+        picture = _decode(content) if self._cuts else _size_alone(content)
         size = (self._rig.height, self._rig.width)
         if picture is None or picture.shape[:2] != size:
             shape_text = "no picture" if picture is None else f"{picture.shape[1]} x {picture.shape[0]} pixels"
@@ -264,7 +264,7 @@ class Follower:
         return picture
 
 
-def _decoded(content: bytes) -> np.ndarray | None:
+def _decode(content: bytes) -> np.ndarray | None:
     picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
     return None if picture is None else picture[..., ::-1]
 

@@ -47,7 +47,7 @@ def run(
         size = (pairs.camera.height, pairs.camera.width)
         make, source, masks_from = open_masks(sequence, masks, segmenter, parameters, size)
         motion = _motion(sequence, parameters, len(pairs))
-        fitted = _fitted_radius(pairs, make, context) if parameters.fit_radius else None
+        fitted = _fit_radius(pairs, make, context) if parameters.fit_radius else None
         maps = _disparity_maps(disparity)
         try:
             looked = Looked(fitted or Radius(parameters.needle_radius, 0.0), motion != "none")
@@ -58,7 +58,7 @@ def run(
         record = pairs.record
     if not frames:
         raise BadInput(f"{sequence.root}: no frame has both eyes", hint="ingest both eyes")
-    fused = _filtered(answers, motion, views, parameters.estimator)
+    fused = _filter_frames(answers, motion, views, parameters.estimator)
     statement = _statement(answers, fused)
     if parameters.fit_radius:
         statement += (
@@ -96,7 +96,7 @@ class Looked:
     follows: bool
 
 
-def _fitted_radius(pairs: StereoPairs, make: MaskMaker, context: Context) -> Radius | None:
+def _fit_radius(pairs: StereoPairs, make: MaskMaker, context: Context) -> Radius | None:
     """Return the radius that the first frames say together; None where none of them says any."""
     first = islice(pairs, RADIUS_FRAMES)
     tracked = context.progress.track(first, total=min(RADIUS_FRAMES, len(pairs)), description="radius")
@@ -202,7 +202,7 @@ def _draw(
         raise OSError(f"{path} could not be written")
 
 
-def _filtered(
+def _filter_frames(
     answers: list[NeedleEstimate], motion: str, views: tuple[SutureView, ...], estimator: str
 ) -> NeedleEstimate | None:
     """Return one estimate in the last frame from all frames, None where they are not filtered."""

@@ -51,14 +51,14 @@ def run(
     """Plan from what was detected, from a scene's image, or from its ground truth."""
     model, chances = time_model(parameters), chances_of(parameters.chances)
     with context.progress.step("see"):
-        table_seen = _accepted(detections, scene, parameters, context)
+        table_seen = _understand_table(detections, scene, parameters, context)
     accepted, notes, setting = table_seen.accepted, table_seen.notes, table_seen.setting
     table = accepted.table
     with context.progress.step("plan"):
         done: list[Done] = []
         policy = make_policy(parameters.policy, model, chances, context.seed, setting)
         nominal = run_in(FastWorld(table, model, EXACT, context.seed, setting), policy, hear=done.append)
-        expected = _expected(table, setting, model, chances, parameters, context.seed)
+        expected = _expect(table, setting, model, chances, parameters, context.seed)
     file = TablewarePlanFile(
         policy=parameters.policy,
         source="detections" if detections is not None else parameters.source,
@@ -112,7 +112,7 @@ class Understood:
     sizes: Sizes = "known"
 
 
-def _accepted(
+def _understand_table(
     detections: TablewareDetections | None, scene: TablewareScene | None, parameters: PlanParameters, context: Context
 ) -> Understood:
     """Return what is planned for. Raises BadInput for what cannot be planned from."""
@@ -154,7 +154,7 @@ class Expected:
     risk: float
 
 
-def _expected(
+def _expect(
     table: Table, setting: Setting, model: TimeModel, chances: Chances, parameters: PlanParameters, seed: int
 ) -> Expected:
     """Return what a policy comes to on the table as it was seen."""

@@ -166,7 +166,7 @@ def _font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 def captioned(image: Image.Image, caption: str) -> Image.Image:
     """Return a picture with lines of text below it."""
     size = max(11, round(image.width * 0.042))
-    lines = _wrapped(caption, image.width - 8, size)
+    lines = _wrap_lines(caption, image.width - 8, size)
     sheet = Image.new("RGB", (image.width, image.height + round(1.3 * size) * max(2, len(lines)) + 6), "#ffffff")
     sheet.paste(image, (0, 0))
     draw = ImageDraw.Draw(sheet)
@@ -175,7 +175,7 @@ def captioned(image: Image.Image, caption: str) -> Image.Image:
     return sheet
 
 
-def _wrapped(text: str, width: int, size: int) -> list[str]:
+def _wrap_lines(text: str, width: int, size: int) -> list[str]:
     font = _font(size)
     lines = [""]
     for word in text.split():
@@ -224,11 +224,11 @@ def write_animation(path: Path, steps: Sequence[tuple[Action, Table, Table, str]
         frames, times = [draw_table(Table(()), width, None, "nothing to clear")], [700]
     times[-1] = 1500
     tallest = max(frame.height for frame in frames)
-    even = [_padded(frame, tallest).quantize(96) for frame in frames]
+    even = [_pad_below(frame, tallest).quantize(96) for frame in frames]
     even[0].save(path, save_all=True, append_images=even[1:], duration=times, loop=0, optimize=False)
 
 
-def _padded(image: Image.Image, height: int) -> Image.Image:
+def _pad_below(image: Image.Image, height: int) -> Image.Image:
     sheet = Image.new("RGB", (image.width, height), "#ffffff")
     sheet.paste(image, (0, 0))
     return sheet

@@ -300,7 +300,7 @@ class OwnSkills(CommonSkills):
         """Return the nearest base pose that reaches a position and was not tried, nor failed, for it."""
         poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
         poses += self._before(place)
-        tried_bases = tried + self._remembered(place, at)
+        tried_bases = tried + self._failed_bases(place, at)
         same_within = (
             SAME_BEFORE_OPEN if self.scene.furniture[place].opened and self._body.short_armed else SAME_ON_SIDE
         )
@@ -312,10 +312,10 @@ class OwnSkills(CommonSkills):
     def _there(self, base: Base, place: str) -> bool:
         return base == self._body.base or self.drive(base, place)
 
-    def _failed_from(self, place: str, base: Base, at: Position) -> None:
+    def _remember_failure(self, place: str, base: Base, at: Position) -> None:
         self._bad.setdefault(place, []).append((base, at))
 
-    def _remembered(self, place: str, at: Position) -> list[Base]:
+    def _failed_bases(self, place: str, at: Position) -> list[Base]:
         """Return base poses that failed; with a short arm those that failed for a position near by: what it does not
         get to from one pose says little about the rest."""
         if not self._use.memory:
@@ -369,14 +369,14 @@ class OwnSkills(CommonSkills):
                 continue
             asks = self._use.reachability and self._use.repair and not desperate
             if asks and not self._body.reaches(self._body.base, item.position, take=True):
-                self._failed_from(furniture_key, base, item.position)
+                self._remember_failure(furniture_key, base, item.position)
                 continue
             while executed < TRIES:
                 executed += 1
                 felt = self._body.grasp(item.position, item.label, candidate)
                 if not felt.ok:
                     last = felt.failure
-                    self._failed_from(furniture_key, self._body.base, item.position)
+                    self._remember_failure(furniture_key, self._body.base, item.position)
                     break
                 label_in_hand = self._in_hand() if self._use.recheck else item.label
                 if label_in_hand:
@@ -384,7 +384,7 @@ class OwnSkills(CommonSkills):
                 candidate += 1
                 if not self._use.repair:
                     return Outcome(False, "not_held", f"{item.key} slipped out of the hand")
-                if not self._found_again(item):
+                if not self._find_again(item):
                     self._missing.append(Lost(item, item.position, frozenset(self.scene.items)))
                     return Outcome(False, "lost", f"{item.key} slipped and is not seen any more")
         return self._unreachable(furniture_key, tries, last)
@@ -403,7 +403,7 @@ class OwnSkills(CommonSkills):
             return Outcome(False, "doubtful_in_hand", message, label=held)
         return Outcome(False, "wrong_in_hand", f"what the hand holds looks like a {held}", label=held)
 
-    def _found_again(self, item: Item) -> bool:
+    def _find_again(self, item: Item) -> bool:
         """Look for a thing that was pushed; move its entry there."""
         self.scene.items.pop(item.key, None)
         for close in (True, False):
@@ -431,7 +431,7 @@ class OwnSkills(CommonSkills):
             item, classes = lost.item, lost.classes
             if any(i.label in classes and i.key not in lost.known for i in self._lying_at(place)):
                 continue
-            detection = self._seen_on_floor(lost)
+            detection = self._find_on_floor(lost)
             if detection is not None:
                 patch = self.scene.patch(detection.position)
                 self._patches[patch] = place
@@ -444,7 +444,7 @@ class OwnSkills(CommonSkills):
         """Return the things of a place, with those that fell off it."""
         return [i for i in self.scene.items.values() if place in (i.place, self._patches.get(i.place))]
 
-    def _seen_on_floor(self, lost: Lost) -> Detection | None:
+    def _find_on_floor(self, lost: Lost) -> Detection | None:
         """Return what is seen on the floor around its furniture that looks like a thing, from the views that show most
         of where it may lie."""
         piece, spot = self.scene.furniture[lost.item.place], lost.spot
@@ -500,7 +500,7 @@ class OwnSkills(CommonSkills):
                 if felt.ok:
                     return self._lies(place, label, position)
                 last = felt.failure
-                self._failed_from(place, base, position)
+                self._remember_failure(place, base, position)
         return self._unreachable(place, tries, last)
 
     def _lies(self, place: str, label: str, at: Position) -> Outcome:
@@ -564,5 +564,5 @@ class OwnSkills(CommonSkills):
                 self.scene.set_opened(key, opening, felt.furniture)
                 return Outcome(True)
             last = felt.failure
-            self._failed_from(key, base, at)
+            self._remember_failure(key, base, at)
         return self._unreachable(key, tries, last)

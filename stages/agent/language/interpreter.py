@@ -129,13 +129,13 @@ class Interpreter:
                 deciding = isinstance(op, ast.Or)
                 return next((deciding for part in parts if truth(self._value(part)) == deciding), not deciding)
             case ast.Compare(left=left, ops=ops, comparators=rights):
-                return self._compared(left, ops, rights, node.lineno)
+                return self._compare(left, ops, rights, node.lineno)
             case ast.Subscript(value=inner, slice=index):
                 return self._item(self._value(inner), self._value(index), node.lineno)
             case ast.Attribute(value=inner, attr=name):
                 return self._attribute(self._value(inner), name, node.lineno)
             case ast.Call(func=function, args=arguments):
-                return self._called(function, tuple(self._value(a) for a in arguments), node.lineno)
+                return self._call_function(function, tuple(self._value(a) for a in arguments), node.lineno)
         raise PlanError("not_in_language", "not in the language here", line=getattr(node, "lineno", 0))
 
     def _variable(self, name: str, line: int) -> Value:
@@ -145,7 +145,7 @@ class Interpreter:
             )
         return self.variables[name]
 
-    def _compared(self, left: ast.expr, ops: list[ast.cmpop], rights: list[ast.expr], line: int) -> bool:
+    def _compare(self, left: ast.expr, ops: list[ast.cmpop], rights: list[ast.expr], line: int) -> bool:
         first = self._value(left)
         for op, right in zip(ops, rights, strict=True):
             second = self._value(right)
@@ -181,7 +181,7 @@ class Interpreter:
         attribute: Value = getattr(value, name)
         return attribute
 
-    def _called(self, function: ast.expr, arguments: tuple[Value, ...], line: int) -> Value:
+    def _call_function(self, function: ast.expr, arguments: tuple[Value, ...], line: int) -> Value:
         match function:
             case ast.Attribute(value=ast.Name(id="robot"), attr=name) if "robot" not in self.variables:
                 return self._tool(name, arguments, line)

@@ -93,7 +93,7 @@ class Draft:
         name = f"{label}_{sum(f.label == label for f in self.furniture)}"
         for _ in range(PLACES):
             room = self.rooms[int(self.random.integers(len(self.rooms)))]
-            placed = self._placed(room, piece)
+            placed = self._draw_place(room, piece)
             if placed is None:
                 continue
             centre, size = placed
@@ -107,7 +107,7 @@ class Draft:
                 return name
         raise NoRoom
 
-    def _placed(self, room: Room, piece: Piece) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    def _draw_place(self, room: Room, piece: Piece) -> tuple[tuple[float, float], tuple[float, float]] | None:
         """Draw a place in a room: with its back to a wall, or free with a way all around."""
         side = int(self.random.integers(4))
         along, across = piece.size if side < 2 else piece.size[::-1]

@@ -80,7 +80,7 @@ class Grammar:
         return np.log(self.shares) - np.log(self.deviations).sum(axis=1), self.means, self.deviations
 
     @cached_property
-    def _seen(self) -> dict[int, dict[tuple[int, tuple[int, int]], int]]:
+    def _rule_counts(self) -> dict[int, dict[tuple[int, tuple[int, int]], int]]:
         counts_of_parent: dict[int, dict[tuple[int, tuple[int, int]], int]] = {}
         for rule in self.rules:
             counts_of_parent.setdefault(rule.parent, {})[rule.axis, rule.children] = rule.seen
@@ -89,7 +89,7 @@ class Grammar:
     def rule_bits(self, parent: int, axis: int, children: tuple[int, int]) -> float:
         """Return the code length of a rule [bits]: short for what was often seen of a type."""
         pair = (min(children), max(children))
-        counts = self._seen.get(parent, {})
+        counts = self._rule_counts.get(parent, {})
         possible = AXES * self.types * (self.types + 1) / 2
         return -math.log2((counts.get((axis, pair), 0) + 0.5) / (sum(counts.values()) + 0.5 * possible))
 
@@ -126,7 +126,7 @@ def learn(demonstrations: Sequence[Demonstration], seed: int) -> Grammar:
         raise ValueError("no demonstration cuts anything")
     tried = [_fit(corpus, count, seed) for count in range(1, min(MOST_TYPES, len(corpus.pieces) // 4) + 1)]
     best = min(tried, key=lambda grammar: grammar.bits)
-    return _named(best, demonstrations)
+    return _with_names(best, demonstrations)
 
 
 def _corpus(demonstrations: Sequence[Demonstration]) -> _Corpus:
@@ -174,7 +174,7 @@ def _fit(corpus: _Corpus, count: int, seed: int) -> Grammar:
     return Grammar(means, deviations, shares, rules, empty, np.zeros((len(CATEGORIES), 2, 2)), np.ones(4), bits)
 
 
-def _named(grammar: Grammar, demonstrations: Sequence[Demonstration]) -> Grammar:
+def _with_names(grammar: Grammar, demonstrations: Sequence[Demonstration]) -> Grammar:
     """Return the grammar with what fragments are called, and how far those that were meant to be alike differ."""
     category_counts = np.zeros((grammar.types, len(CATEGORIES)))
     ratios: list[list[np.ndarray]] = [[] for _ in CATEGORIES]

@@ -77,7 +77,7 @@ class Session:
         except Refused as refused:
             raise NoCut(refused.failure.message) from None
         numbers = self.trial.do(piece, plane, bodies, GAP)
-        self._changed()
+        self._save()
         return f"piece {piece} became {', '.join(map(str, numbers))}"
 
     def undo(self) -> str:
@@ -86,7 +86,7 @@ class Session:
             raise NoCut("nothing was cut yet")
         last = self.trial.cuts.pop()
         del self.trial.pieces[-len(last.results) :]
-        self._changed()
+        self._save()
         return f"piece {last.piece} is whole again"
 
     def finish(self, category: CategoryName | None) -> str:
@@ -95,19 +95,19 @@ class Session:
             raise NoCut("nothing was cut yet")
         self.trial.finished = category is not None
         self.trial.categories = {} if category is None else dict.fromkeys(self.trial.final, category)
-        self._changed()
-        self._before.append(self._recorded())
+        self._save()
+        self._before.append(self._recorded_trial())
         message = f"kept: {len(self.trial.final)} {category or 'fragments, not finished'}"
         self._seed += 1
         self._begin()
         return message
 
-    def _recorded(self) -> RecordedTrial:
+    def _recorded_trial(self) -> RecordedTrial:
         return RecordedTrial(food=self._food, seed=self._seed, trial=record_of(self.trial, training=True))
 
-    def _changed(self) -> None:
+    def _save(self) -> None:
         self.__dict__.pop("shown", None)
-        begun = [self._recorded()] if self.trial.cuts else []
+        begun = [self._recorded_trial()] if self.trial.cuts else []
         partial = self._path.with_name(f".{self._path.name}.partial")
         CuttingRecording(trials=(*self._before, *begun)).write(partial)
         os.replace(partial, self._path)

@@ -63,7 +63,7 @@ def learn(corpus: Corpus, features: Features, rule: Rule, seed: int) -> ChoiceMo
     def loss(chosen: np.ndarray) -> torch.Tensor:
         choices = [corpus.choices[k] for k in chosen]
         which = torch.stack([of_choice(network, z, choice) for choice in choices]).mean()
-        plane_inputs = torch.stack([_given(network, z[c.piece], z[list(c.goal)]) for c in choices])
+        plane_inputs = torch.stack([_plane_input(network, z[c.piece], z[list(c.goal)]) for c in choices])
         planes = torch.from_numpy(np.array([choice.plane for choice in choices], np.float32))
         return which + network.planes.loss(plane_inputs, planes)
 
@@ -71,7 +71,7 @@ def learn(corpus: Corpus, features: Features, rule: Rule, seed: int) -> ChoiceMo
     return ChoiceModel(features, network, rule)
 
 
-def _given(network: ChoiceNetwork, z: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
+def _plane_input(network: ChoiceNetwork, z: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
     return torch.cat([z, network.pooled(goal)])
 
 
@@ -120,7 +120,7 @@ class ChoicePolicy:
             chosen = int(self._random.choice(len(numbers), p=chances / chances.sum()))
         else:
             chosen = int(values.argmax())
-        plane_input = _given(self._model.network, z[chosen], self._goal).numpy()
+        plane_input = _plane_input(self._model.network, z[chosen], self._goal).numpy()
         plane = plane_out(board[numbers[chosen]], self._model.network.planes.draw(plane_input, self._random))
         return Action(numbers[chosen], plane, f"value {float(values[chosen]):.2f}")
 

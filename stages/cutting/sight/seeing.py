@@ -46,10 +46,10 @@ def see(views: Sequence[View]) -> list[Body]:
         return []
     which = clusters(points, APART)
     segments = [points[which == k] for k in range(int(which.max()) + 1)]
-    return [body for segment in segments if len(segment) >= FEWEST for body in _carved(segment, views)]
+    return [body for segment in segments if len(segment) >= FEWEST for body in _carve(segment, views)]
 
 
-def _carved(segment: np.ndarray, views: Sequence[View]) -> list[Body]:
+def _carve(segment: np.ndarray, views: Sequence[View]) -> list[Body]:
     """Return the bodies around a segment's points (N, 3): where flying pixels joined fragments, carving parts them."""
     low, high = segment.min(axis=0), segment.max(axis=0)
     low[2] = 0.0

@@ -49,7 +49,7 @@ def induce(features: np.ndarray, corpus: Corpus, seed: int) -> tuple[Grammar, np
     for count in range(2, min(MOST_TYPES, len(features) // 3) + 1):
         centres, types = kmeans2(features, count, minit="++", seed=np.random.default_rng([seed, 2, count]), iter=100)
         types_used, types = np.unique(types, return_inverse=True)
-        grammar, likelihood = _counted(centres[types_used], types, corpus)
+        grammar, likelihood = _count_rules(centres[types_used], types, corpus)
         score = likelihood + GAMMA * len(corpus.choices) * grammar.types
         if best is None or score > best[0]:
             best = score, grammar, types
@@ -62,7 +62,7 @@ def production_of(choice_piece: int, results: tuple[int, ...], types: np.ndarray
     return int(types[choice_piece]), tuple(sorted(int(types[k]) for k in results))
 
 
-def _counted(centres: np.ndarray, types: np.ndarray, corpus: Corpus) -> tuple[Grammar, float]:
+def _count_rules(centres: np.ndarray, types: np.ndarray, corpus: Corpus) -> tuple[Grammar, float]:
     rule_counts: dict[tuple[int, tuple[int, ...]], int] = {}
     of_left: dict[int, int] = {}
     for choice in corpus.choices:

@@ -68,7 +68,7 @@ def make_food(family: str, random: np.random.Generator) -> Body:
     rings = np.stack([x, y, z], axis=-1)
     poles = np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]])
     vertices = np.concatenate([rings.reshape(-1, 3), poles])
-    body = Body.of_mesh(_bent(vertices, length, bend), _faces())
+    body = Body.of_mesh(_bend(vertices, length, bend), _faces())
     return body.shifted(-body.moments[0])
 
 
@@ -83,7 +83,7 @@ def _waves(t: np.ndarray, angle: np.ndarray, random: np.random.Generator) -> np.
     return np.asarray(total / np.sqrt(3.0))
 
 
-def _bent(vertices: np.ndarray, length: float, angle: float) -> np.ndarray:
+def _bend(vertices: np.ndarray, length: float, angle: float) -> np.ndarray:
     """Return vertices (V, 3) with the z axis bent to an arc in the plane y, z."""
     if angle < 1e-3:
         return vertices

@@ -34,7 +34,7 @@ def read_body(path: Path, unit: Literal["m", "mm"]) -> tuple[Body, list[str]]:
     if unit == "mm":
         mesh.apply_scale(1e-3)
     _check_size(float(np.ptp(mesh.vertices, axis=0).max()), path, unit)
-    body, mended = _closed(mesh, path)
+    body, mended = _close(mesh, path)
     inside = _space_inside(body)
     if abs(inside - body.volume) > UNLIKE * max(inside, body.volume):
         raise BadInput(
@@ -64,7 +64,7 @@ def _check_size(longest: float, path: Path, unit: str) -> None:
         raise BadInput(f"{path}: {1e3 * longest:.2f} mm long, at least {1e3 * SHORTEST:.0f} mm are cut", hint=hint)
 
 
-def _closed(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
+def _close(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
     mended = []
     merged = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)  # files like STL repeat vertices: not a fault
     merged.update_faces(merged.nondegenerate_faces() & merged.unique_faces())

@@ -40,7 +40,7 @@ def example_lines(file: LearnedDomainFile, name: str) -> Iterator[str]:
         raise UsageError(f"there is no predicate {name!r}", hint=f"choose of {names}")
     yield from _predicate_lines(file, of_name[0])
     yield f"    {of_name[0].means}"
-    for phrase in _heard(file, of_name[0]):
+    for phrase in _phrases_of(file, of_name[0]):
         for example in phrase.examples:
             of = f" of {', '.join(example.objects)}" if example.objects else ""
             yield f"    {'holds' if example.holds else 'fails'}{of} in state {example.state}: {_reason(file, example)}"
@@ -51,13 +51,13 @@ def _reason(file: LearnedDomainFile, example: LabelledExample) -> str:
     return f"{example.source}, {file.dialogue[example.turn].text!r}" if in_dialogue else example.source
 
 
-def _heard(file: LearnedDomainFile, predicate: LearnedPredicate) -> list[HeardPhrase]:
+def _phrases_of(file: LearnedDomainFile, predicate: LearnedPredicate) -> list[HeardPhrase]:
     return [phrase for phrase in file.phrases if phrase.predicate == predicate.name]
 
 
 def _predicate_lines(file: LearnedDomainFile, predicate: LearnedPredicate) -> Iterator[str]:
     yield f"  {predicate.said}"
-    phrases = _heard(file, predicate)
+    phrases = _phrases_of(file, predicate)
     if not phrases:
         yield "    given"
     for phrase in phrases:

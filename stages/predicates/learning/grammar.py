@@ -25,7 +25,7 @@ def candidates(
 ) -> list[tuple[float, Tree]]:
     """Return meanings (cost, expression), cheapest first; `margins` are thresholds that the labels suggest."""
     cost_of_tree: dict[Tree, float] = {}
-    for tree, uses, extra, side in _proposed(phrase, margins, setting):
+    for tree, uses, extra, side in _propose(phrase, margins, setting):
         cost = size_of(tree) + extra + _mismatch(phrase, uses) + (OTHER_SIDE if side < 0 else 0.0)
         cost_of_tree[tree] = min(cost, cost_of_tree.get(tree, cost))
     return sorted(((cost, tree) for tree, cost in cost_of_tree.items()), key=lambda entry: (entry[0], str(entry[1])))
@@ -48,7 +48,7 @@ Proposed = Iterator[tuple[Tree, set[str], float, int]]
 """Expression, perceptions it uses, costs of its own, and side: -1 when it contradicts the phrase's negation."""
 
 
-def _proposed(phrase: Phrase, margins: Mapping[str, Sequence[float]], setting: Setting) -> Proposed:
+def _propose(phrase: Phrase, margins: Mapping[str, Sequence[float]], setting: Setting) -> Proposed:
     sided = 1 if phrase.denies else -1
     for tree, uses in _relations(phrase.arguments, setting):
         yield tree, uses, 0.0, sided

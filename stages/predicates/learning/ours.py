@@ -64,7 +64,7 @@ class OursLearner:
         self._refusals.append((situation, action, state))
         if not sentence:
             return
-        phrase, objects = self._heard(state, sentence, f"{' '.join(action)}")
+        phrase, objects = self._hear(state, sentence, f"{' '.join(action)}")
         variables = dict(zip(action[1:], ("?a", "?b"), strict=False))
         if all(name in variables for name in objects):
             key = (action[0], phrase, tuple(variables[name] for name in objects))
@@ -94,7 +94,7 @@ class OursLearner:
         """Take in what the teacher misses of a goal."""
         if not sentence:
             return
-        phrase, objects = self._heard(state, sentence, "done")
+        phrase, objects = self._hear(state, sentence, "done")
         fitting = [(part, names) for part, names in parts if set(objects) <= set(names)]
         # The part that speaks of the same things; of several, one that nobody has explained yet.
         fitting.sort(
@@ -121,7 +121,7 @@ class OursLearner:
                 self.memory.labels[phrase].append(Label(number, goal_objects, True, "goal"))
                 self._understand(phrase, state)
 
-    def _heard(self, state: Perceived, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
+    def _hear(self, state: Perceived, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
         self.memory.dialogue.append(Turn("teacher", sentence, about))
         phrase, objects = self._phrase_of(sentence, state)
         turn = len(self.memory.dialogue) - 1
@@ -242,7 +242,7 @@ class OursLearner:
         """Return the action in the situation that was tried least, of those that nothing is known against."""
         stated = self.memory.preconditions()
         atoms = self.memory.see(state)
-        unexplained = self._unexplained(stated)
+        unexplained = self._unexplained_refusals(stated)
         best: list[Atom] = []
         fewest = 10**9
         for name in self.actions:
@@ -268,7 +268,7 @@ class OursLearner:
         about. Left out is what can be tried here and was, MOST_TRIES times, in such a situation."""
         done = {transition.action[0] for transition in self.memory.transitions}
         atoms, changing = self.memory.see(state), self._changing()
-        stated_counts = self._said()
+        stated_counts = self._stated_counts()
         for name in self.actions:
             times_stated = {atom: count for (action, atom), count in stated_counts.items() if action == name}
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
@@ -286,7 +286,7 @@ class OursLearner:
                 elif self.missed >= DOUBT_AFTER and len(doubted) == 1:
                     yield (1 + (name in done), lacking[doubted[0]]), action, remaining
 
-    def _said(self) -> Counter[tuple[str, Atom]]:
+    def _stated_counts(self) -> Counter[tuple[str, Atom]]:
         """Return action and precondition -> how often it was named."""
         names = self.memory.names()
         counts: Counter[tuple[str, Atom]] = Counter()
@@ -300,12 +300,12 @@ class OursLearner:
         Of an action that was never allowed, whose preconditions were never seen to hold together and were said but
         once; and, once DOUBT_AFTER episodes went amiss, of any: first those that speak against nothing but what no
         action changes, then those that were named least, and were tried least in such a situation."""
-        atoms, changing, stated_counts = self.memory.see(state), self._changing(), self._said()
+        atoms, changing, stated_counts = self.memory.see(state), self._changing(), self._stated_counts()
         done = {transition.action[0] for transition in self.memory.transitions}
         weighted: list[tuple[tuple[int, ...], Atom]] = []
         for name in self.actions:
             preconditions = [(atom, count) for (action, atom), count in stated_counts.items() if action == name]
-            never = name not in done and not self._seen_together(name, [atom for atom, _ in preconditions])
+            never = name not in done and not self._held_together(name, [atom for atom, _ in preconditions])
             if not preconditions or not (never or self.missed >= DOUBT_AFTER):
                 continue
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
@@ -334,7 +334,7 @@ class OursLearner:
     def _ends(self) -> set[int]:
         return {number for each in self.memory.transitions for number in (each.before, each.after)}
 
-    def _seen_together(self, name: str, wanted: list[Atom]) -> bool:
+    def _held_together(self, name: str, wanted: list[Atom]) -> bool:
         """Whether all of what was named for an action held at once, for some objects, in a state that was seen."""
         for state in self.memory.states:
             atoms_held = self.memory.see(state)
@@ -349,9 +349,9 @@ class OursLearner:
         if action is None:
             return False
         situation = self._situation(state, action)
-        return self._tried[situation] <= self._unexplained(self.memory.preconditions())[situation]
+        return self._tried[situation] <= self._unexplained_refusals(self.memory.preconditions())[situation]
 
-    def _unexplained(self, stated: Mapping[str, frozenset[Atom]]) -> Counter[tuple[str, ...]]:
+    def _unexplained_refusals(self, stated: Mapping[str, frozenset[Atom]]) -> Counter[tuple[str, ...]]:
         """Return how often an action was refused in a situation though all that was named for it held: nothing was
         said, or what is no longer believed. Such an action is tried again, until it was tried MOST_TRIES times."""
         tries: Counter[tuple[str, ...]] = Counter()

@@ -74,7 +74,7 @@ class ThesisLearner(OursLearner):
             "objects": list(state.names),
             "complaints": [phrase.text for phrase in self.memory.labels],
         }
-        reply = self._spoken("reasoner", REASONER, facts, Reasoned)
+        reply = self._ask_model("reasoner", REASONER, facts, Reasoned)
         if reply is None or not set(reply.objects) <= set(state.names):
             return phrase_of(sentence, state.names)
         return Phrase(reply.complaint, len(reply.objects)), tuple(reply.objects)
@@ -84,7 +84,10 @@ class ThesisLearner(OursLearner):
         labels = self.memory.labels[phrase]
         means = self.memory.meanings.get(phrase)
         if means is None:
-            means = self._written("coder", CODER, phrase, {"complaint": phrase.text, **self._words(phrase)}) or NEVER
+            means = (
+                self._write_expression("coder", CODER, phrase, {"complaint": phrase.text, **self._words(phrase)})
+                or NEVER
+            )
         for _ in range(ROUNDS):
             wrong = [each for each in labels if self._synthesiser.truth(means, each.state, each.objects) != each.holds]
             if not wrong:
@@ -95,7 +98,7 @@ class ThesisLearner(OursLearner):
                 **self._words(phrase),
                 "examples": [self._example(label) for label in (*wrong, *labels)[:MOST_EXAMPLES]],
             }
-            better = self._written("corrector", CORRECTOR, phrase, facts)
+            better = self._write_expression("corrector", CORRECTOR, phrase, facts)
             if better is None or better == means:
                 break
             means = better
@@ -104,10 +107,10 @@ class ThesisLearner(OursLearner):
     def reconsider(self) -> None:
         """The thesis's learner asks nothing again."""
 
-    def _written(self, who: str, task: str, phrase: Phrase, given: dict[str, Any]) -> Tree | None:
+    def _write_expression(self, who: str, task: str, phrase: Phrase, given: dict[str, Any]) -> Tree | None:
         """Return an expression that passes every check, None when none came in ROUNDS tries."""
         for _ in range(ROUNDS):
-            reply = self._spoken(who, task, given, Coded)
+            reply = self._ask_model(who, task, given, Coded)
             if reply is None:
                 return None
             try:
@@ -146,7 +149,7 @@ class ThesisLearner(OursLearner):
             "scene": {call: round(state.of_scene(call), 3) for call in words.of_scene},
         }
 
-    def _spoken(self, who: str, task: str, given: dict[str, Any], model: type[Any]) -> Any:
+    def _ask_model(self, who: str, task: str, given: dict[str, Any], model: type[Any]) -> Any:
         """Return a reply, None where the language model gave none that can be read."""
         try:
             return self.chat.ask(

@@ -41,7 +41,7 @@ def search_operators(
         effect_of_preconditions: dict[frozenset[Atom], Effect] = {}
         stated_atoms = stated.get(action, frozenset())
         for before in dict.fromkeys(case[0] for case in cases[action]):
-            dropped = _dropped(before, stated_atoms, cases[action])
+            dropped = _drop_irrelevant(before, stated_atoms, cases[action])
             effect = usual_effect(dropped, cases[action])
             effect_of_preconditions = {
                 each: earlier_effect
@@ -104,7 +104,7 @@ def likelihood(preconditions: frozenset[Atom], cases: Sequence[Case]) -> float:
     return sum(count * math.log(count / total) for count in counted.values())
 
 
-def _dropped(before: frozenset[Atom], named: frozenset[Atom], cases: Sequence[Case]) -> frozenset[Atom]:
+def _drop_irrelevant(before: frozenset[Atom], named: frozenset[Atom], cases: Sequence[Case]) -> frozenset[Atom]:
     """Return a state's atoms without those that make no difference to what follows."""
     remaining = before
     mine = next(case for case in cases if case[0] == before)

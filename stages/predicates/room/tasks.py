@@ -73,7 +73,7 @@ def room_tasks(rooms: list[RoomState], count: int, seed: int) -> list[RoomTask]:
 def _task(room: RoomState, number: int, random: np.random.Generator) -> RoomTask:
     for _ in range(TRIES):
         state = _some(room, random)
-        goal = _walked(state, random)
+        goal = _walk_goal(state, random)
         if goal:
             objects = {name: body.middle[:2] for name, body in state.bodies.items()}
             return RoomTask(f"{ROOM}/{number + 1}", objects, goal, int(random.integers(2**31)), state)
@@ -99,7 +99,7 @@ def _some(room: RoomState, random: np.random.Generator) -> RoomState:
     )
 
 
-def _walked(state: RoomState, random: np.random.Generator) -> tuple[Atom, ...]:
+def _walk_goal(state: RoomState, random: np.random.Generator) -> tuple[Atom, ...]:
     """Return what a walk with the teacher's operators made true, up to LITERALS of it."""
     truth = truth_of(ROOM)
     start = truth.atoms(state)

@@ -107,12 +107,12 @@ class RoomWorld:
         return ""
 
     def _open(self, name: str) -> str:
-        return self._turned(name, OPEN)
+        return self._turn_door(name, OPEN)
 
     def _close(self, name: str) -> str:
-        return self._turned(name, SHUT)
+        return self._turn_door(name, SHUT)
 
-    def _turned(self, name: str, openness: float) -> str:
+    def _turn_door(self, name: str, openness: float) -> str:
         body = self._state.bodies[name]
         if self._state.held:
             return "the hand is full"

@@ -62,15 +62,15 @@ class TerminalTeacher:
 
     def correct(self, state: Perceived, action: Atom) -> str:
         """Ask what keeps an action from being done."""
-        return self._asked(f"Why can't I {_action(action)}? (a sentence; say `object NAME` for objects)")
+        return self._next_answer(f"Why can't I {_action(action)}? (a sentence; say `object NAME` for objects)")
 
     def satisfied(self, state: Perceived, goal: tuple[Atom, ...]) -> bool:
         """Ask whether all is as wanted."""
-        return self._yes(f"Is it done: {self._wanted(goal)}?")
+        return self._yes(f"Is it done: {self._goal_text(goal)}?")
 
     def unmet(self, state: Perceived, goal: tuple[Atom, ...]) -> str:
         """Ask what is not as wanted."""
-        return self._asked(f"What is missing of it: {self._wanted(goal)}? (a sentence)")
+        return self._next_answer(f"What is missing of it: {self._goal_text(goal)}? (a sentence)")
 
     def answer(self, state: Perceived, phrase: str, objects: tuple[str, ...]) -> bool:
         """Ask whether a phrase is right of objects."""
@@ -78,18 +78,18 @@ class TerminalTeacher:
             phrase = phrase.replace(f"<{number}>", name)
         return self._yes(f"Is it so that {phrase}?")
 
-    def _wanted(self, goal: tuple[Atom, ...]) -> str:
+    def _goal_text(self, goal: tuple[Atom, ...]) -> str:
         return " and ".join(map(truth_of(self.domain).goal_phrase, goal))
 
     def _yes(self, question: str) -> bool:
         text = question
         while True:
-            answer = self._asked(text).lower().strip(" .!")
+            answer = self._next_answer(text).lower().strip(" .!")
             if answer in YES or answer in NO:
                 return answer in YES
             text = f"{question} (yes or no)"
 
-    def _asked(self, question: str) -> str:
+    def _next_answer(self, question: str) -> str:
         if self._at < len(self._earlier):
             earlier = self._earlier[self._at]
             if earlier.question != question:

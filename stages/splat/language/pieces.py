@@ -56,7 +56,7 @@ def pieces(gaussians: Gaussians) -> np.ndarray:
     order = np.argsort(weights, kind="stable")
     first, second, weights = first[order], second[order], weights[order]
     for row, granularity in enumerate(GRANULARITIES):
-        roots = _joined(first, second, weights, len(solid), granularity, SMALLEST)
+        roots = _join_pieces(first, second, weights, len(solid), granularity, SMALLEST)
         result[row, solid] = np.unique(roots, return_inverse=True)[1]
     return result
 
@@ -70,7 +70,7 @@ def _root(parents: np.ndarray, k: int) -> int:
 
 
 @njit(cache=True)
-def _joined(
+def _join_pieces(
     first: np.ndarray, second: np.ndarray, weights: np.ndarray, count: int, granularity: float, smallest: int
 ) -> np.ndarray:
     """Return the root of every one of `count` nodes; edges ascend in weight."""

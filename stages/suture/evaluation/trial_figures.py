@@ -52,7 +52,7 @@ def metrics(runs: Sequence[SutureRun], pairs: Pairs = PAIRS) -> dict[str, float]
         def ratio(rows: np.ndarray) -> np.ndarray:
             return np.asarray(values[rows].sum(axis=-1) / np.maximum(below[rows].sum(axis=-1), 1e-9))
 
-        figures.update(_bounded(f"{arm}/trials/{name}", interval_of(ratio, len(values))))
+        figures.update(_interval_entries(f"{arm}/trials/{name}", interval_of(ratio, len(values))))
 
     for arm, group in groups.items():
         rows = list(group.values())
@@ -98,11 +98,11 @@ def ratios(arm: str, ours: dict[int, SutureRun], rival: dict[int, SutureRun]) ->
         def ratio(rows: np.ndarray, above: np.ndarray = above, below: np.ndarray = below) -> np.ndarray:
             return _over(above[:, rows].sum(axis=-1), below[:, rows].sum(axis=-1))
 
-        figures.update(_bounded(f"{arm}/trials/{name}", interval_of(ratio, len(seeds))))
+        figures.update(_interval_entries(f"{arm}/trials/{name}", interval_of(ratio, len(seeds))))
     return figures
 
 
-def _bounded(at: str, interval: Interval) -> dict[str, float]:
+def _interval_entries(at: str, interval: Interval) -> dict[str, float]:
     return {at: interval.value, f"{at}_low": interval.low, f"{at}_high": interval.high}
 
 

@@ -145,9 +145,9 @@ def _hypotheses(
     coarse = [fit_outline(rig, sheets, pose, still, COARSE_LEVELS) for pose in begun]
     coarse.sort(key=lambda outline: outline.misfit)
     for outline in coarse[:MIRRORED]:
-        coarse.append(fit_outline(rig, sheets, _mirrored(outline.pose), still, COARSE_LEVELS))
-    ordered = [rival.outline for rival in _weighed(rig, eyes, sheets, coarse)]
-    return _weighed(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered, NEAR_FINALISTS if near else FINALISTS)))
+        coarse.append(fit_outline(rig, sheets, _mirror_in_depth(outline.pose), still, COARSE_LEVELS))
+    ordered = [rival.outline for rival in _weigh(rig, eyes, sheets, coarse)]
+    return _weigh(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered, NEAR_FINALISTS if near else FINALISTS)))
 
 
 def _finalists(coarse: list[Outline], most: int) -> list[Outline]:
@@ -175,7 +175,7 @@ def _fine(rig: StereoRig, sheets: tuple[Sheet, Sheet], finalists: list[Outline])
     return outlines
 
 
-def _weighed(
+def _weigh(
     rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outlines: list[Outline]
 ) -> list[Hypothesis]:
     """Return the outlines with their probabilities among each other, most probable first."""
@@ -201,7 +201,7 @@ def _tolerable(steps: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return (np.linalg.norm(steps[:, :3], axis=1) < TOLERANCE[0]) & (tilts < TOLERANCE[1])
 
 
-def _mirrored(pose: NeedlePose) -> NeedlePose:
+def _mirror_in_depth(pose: NeedlePose) -> NeedlePose:
     """Return the pose mirrored in depth about its centre: one eye cannot tell them apart, and two near eyes hardly."""
     sight = pose.centre / np.linalg.norm(pose.centre)
     x, y = (axis - 2.0 * (axis @ sight) * sight for axis in pose.camera_from_needle[:3, :2].T)

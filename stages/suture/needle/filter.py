@@ -37,7 +37,7 @@ def moved(pose: NeedlePose, step: np.ndarray) -> NeedlePose:
     return NeedlePose(matrix)
 
 
-def _carried(estimate: NeedleEstimate, motion: np.ndarray, steps: int) -> tuple[NeedlePose, np.ndarray]:
+def _carry_to_last(estimate: NeedleEstimate, motion: np.ndarray, steps: int) -> tuple[NeedlePose, np.ndarray]:
     """Return an estimate's pose and covariance in the last frame, `steps` frames later."""
     assert estimate.pose is not None
     rotation = np.kron(np.eye(2), motion[:3, :3])
@@ -66,7 +66,7 @@ def fuse(frames: list[tuple[NeedleEstimate, np.ndarray]]) -> NeedleEstimate:
     usable = []
     for age, (estimate, motion) in enumerate(reversed(frames)):
         if estimate.pose is not None and np.isfinite(estimate.covariance).all():
-            usable.append((*_carried(estimate, motion, age), estimate))
+            usable.append((*_carry_to_last(estimate, motion, age), estimate))
     if not usable:
         return NeedleEstimate.none("No frame shows the needle.")
     groups = []

@@ -40,7 +40,7 @@ def presence_features(rig: StereoRig, sheets: tuple[Sheet, Sheet], outline: Outl
         within = covered & (sheet.drawn <= 0.0) & ~sheet.silent
         sheet.piece[:] = -1
         inside[eye], filled[eye] = within.sum(), (within & sheet.free).sum()
-        explained[eye], patches[eye] = _explained(sheet.free, covered)
+        explained[eye], patches[eye] = _explained_pixels(sheet.free, covered)
     return np.array(
         [
             (filled / np.maximum(inside, 1.0)).min(),
@@ -50,7 +50,7 @@ def presence_features(rig: StereoRig, sheets: tuple[Sheet, Sheet], outline: Outl
     )
 
 
-def _explained(mask: np.ndarray, near: np.ndarray) -> tuple[float, float]:
+def _explained_pixels(mask: np.ndarray, near: np.ndarray) -> tuple[float, float]:
     """Return the pixels of the patches of `mask` that the outline touches, near it and altogether."""
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     covered_count = np.bincount(labels[mask & near], minlength=count)

@@ -108,8 +108,10 @@ def fitted_radius(observation: NeedleObservation, seed: int = 0) -> Radius | Non
         fits_of_radius = [_Fit(fit_outline(rig, sheets, pose, np.zeros(2), COARSE_LEVELS), metres) for pose in begun]
         fits += _different(sorted(fits_of_radius, key=_misfit), SAME)[:AT_A_RADIUS]
     fits.sort(key=_misfit)
-    refined = [_refined(observation.rig, eyes, sheets, fit) for fit in _different(fits, SAME)[:REFINED]]
-    return _spread(_different(sorted((fit for fit in refined if fit), key=lambda fit: -fit.log_weight), ALIKE))
+    refined = [_refine(observation.rig, eyes, sheets, fit) for fit in _different(fits, SAME)[:REFINED]]
+    return _radius_with_spread(
+        _different(sorted((fit for fit in refined if fit), key=lambda fit: -fit.log_weight), ALIKE)
+    )
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ def _different(fits: list[_Fit], limits: tuple[float, float]) -> list[_Fit]:
     return distinct
 
 
-def _spread(rivals: list[_Fit]) -> Radius | None:
+def _radius_with_spread(rivals: list[_Fit]) -> Radius | None:
     """Return the likeliest one's radius; its variance is that of all about it, each with its probability."""
     if not rivals:
         return None
@@ -168,7 +170,7 @@ def together(radii: Sequence[Radius]) -> Radius:
     return Radius(mean, float(np.sqrt(SHARED * alone + (1.0 - SHARED) / weights.sum())))
 
 
-def _refined(rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], fit: _Fit) -> _Fit | None:
+def _refine(rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], fit: _Fit) -> _Fit | None:
     """Return the fit with the least misfit about a radius; None where the misfit has no least there.
 
     Radius and growth of the masks are fitted together, by the misfit's second differences and the prior of the growth

@@ -91,7 +91,7 @@ def sheet_of(eye: EyeMask) -> Sheet:
     outside, inside = (cv2.distanceTransform(part, cv2.DIST_L2, 3) for part in (1 - mask, mask))
     signed = np.where(eye.mask, 0.5 - inside, outside - 0.5).astype(np.float32)
     weight = np.where(eye.mask, 1.0, LOST_WEIGHT + (1.0 - LOST_WEIGHT) / (1.0 + (signed / LOST_DISTANCE) ** 2))
-    silent = eye.hidden | _grown(eye.thread, 3)
+    silent = eye.hidden | _dilate(eye.thread, 3)
     weight[silent & ~eye.mask] = 0.0
     weight[eye.hidden & eye.mask] = HIDDEN_WEIGHT
     free = eye.mask & ~eye.hidden
@@ -100,7 +100,7 @@ def sheet_of(eye: EyeMask) -> Sheet:
     return Sheet(signed, weight.astype(np.float32), free, silent, eye.corner, total, drawn, piece)
 
 
-def _grown(mask: np.ndarray, side: int) -> np.ndarray:
+def _dilate(mask: np.ndarray, side: int) -> np.ndarray:
     """Return the mask grown by a square of `side` [px]."""
     return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)) > 0)
 
@@ -245,7 +245,7 @@ def _misfit(
 
 
 @numba.njit(cache=True)
-def _stepped(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float) -> Arc:
+def _take_step(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float) -> Arc:
     """Return the needle after a damped Gauss-Newton step of pose and shift."""
     step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)) + UNDETERMINED, gradient)
     angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
@@ -263,7 +263,7 @@ def _stepped(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float)
 
 
 @numba.njit(cache=True)
-def _fitted(
+def _fit_to_masks(
     arc: Arc, sheets: tuple[Sheet, Sheet], levels: tuple[tuple[float, int], ...], polish: int
 ) -> tuple[Arc, float, np.ndarray]:
     """Return the needle moved onto the masks, its misfit and the information (8, 8)."""
@@ -273,7 +273,7 @@ def _fitted(
         damping = 1e-3
         cost = _misfit(arc, sheets, tau, 0.0, matrix, gradient)
         for _ in range(steps):
-            trial = _stepped(arc, matrix, gradient, damping)
+            trial = _take_step(arc, matrix, gradient, damping)
             trial_matrix, trial_gradient = np.empty((8, 8)), np.empty(8)
             gain = cost - _misfit(trial, sheets, tau, 0.0, trial_matrix, trial_gradient)
             if gain > 0.0:
@@ -287,7 +287,7 @@ def _fitted(
                     break
     for _ in range(polish):
         _misfit(arc, sheets, tau, OFF_BY, matrix, gradient)
-        arc = _stepped(arc, matrix, gradient, 0.0)
+        arc = _take_step(arc, matrix, gradient, 0.0)
     if polish:
         cost = _misfit(arc, sheets, tau, 0.0, np.empty((8, 8)), np.empty(8))
     return arc, cost, matrix
@@ -318,5 +318,5 @@ def fit_outline(
     `levels` are widths of the logistic function [px] and the most steps with each; `polish` steps at the last of them
     count less what is off by much. The information is the polished one's, the misfit the plain one's.
     """
-    arc, cost, information = _fitted(arc_at(rig, pose.camera_from_needle, shift, growth), sheets, levels, polish)
+    arc, cost, information = _fit_to_masks(arc_at(rig, pose.camera_from_needle, shift, growth), sheets, levels, polish)
     return Outline(NeedlePose(arc.pose), arc.shift, cost, information)

@@ -47,7 +47,7 @@ def starts(
         (_row_circles(rig, eyes, random), SCORED_ROWS),
         (_circles_through(points, np.ones(len(points)), TRIPLES, random), SCORED_DISPARITY),
     ):
-        scored, posed = _scored(rig, eyes, distances, pixels, centres[:most], normals[:most])
+        scored, posed = _score_halves(rig, eyes, distances, pixels, centres[:most], normals[:most])
         scores.append(scored)
         poses.append(posed)
     ordered = np.concatenate(poses)[np.argsort(-np.concatenate(scores), kind="stable")]
@@ -242,7 +242,7 @@ def _scores(centres: np.ndarray, normals: np.ndarray, masks: _BothMasks, poses: 
         scores[index] = _score(centres[index], normals[index], masks, poses[index])
 
 
-def _scored(
+def _score_halves(
     rig: StereoRig,
     eyes: tuple[EyeMask, EyeMask],
     distances: tuple[np.ndarray, np.ndarray],

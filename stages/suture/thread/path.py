@@ -56,13 +56,13 @@ def followed(strands: Sequence[Strand], start: np.ndarray | None) -> Path | None
     if start is None:
         longest = max(range(len(free)), key=lambda index: free[index].length)
         first = free.pop(longest)
-        chain, gaps, doubtful = _continued(first, free)
-        back, gaps_before, doubtful_before = _continued(chain[0].reversed(), free)
+        chain, gaps, doubtful = _continue_strand(first, free)
+        back, gaps_before, doubtful_before = _continue_strand(chain[0].reversed(), free)
         chain = [strand.reversed() for strand in reversed(back)] + chain[1:]
         return _path(chain, free, gaps_before[::-1] + gaps, doubtful + doubtful_before, 0.0)
     candidates = []
     for first, others, gap in _beginnings(free, np.asarray(start, dtype=float)):
-        chain, gaps, doubtful = _continued(first, others)
+        chain, gaps, doubtful = _continue_strand(first, others)
         candidates.append((sum(strand.length for strand in chain), _path(chain, others, gaps, doubtful, gap)))
     if not candidates:
         return None
@@ -113,13 +113,13 @@ def _beginnings(free: list[Strand], start: np.ndarray) -> list[tuple[Strand, lis
     return beginnings
 
 
-def _continued(first: Strand, free: list[Strand]) -> tuple[list[Strand], list[float], int]:
+def _continue_strand(first: Strand, free: list[Strand]) -> tuple[list[Strand], list[float], int]:
     """Return the strand and those that continue it, the gaps between them [px], and how many gaps are in doubt; what is
     used is taken out of `free`."""
     chain, gaps, doubtful = [first], list[float](), 0
     while True:
         ranked = sorted(
-            (_cost(chain[-1].points, turned.points), index, side)
+            (_joining_cost(chain[-1].points, turned.points), index, side)
             for index, strand in enumerate(free)
             for side, turned in enumerate((strand, strand.reversed()))
         )
@@ -141,7 +141,7 @@ def _heading(points: np.ndarray) -> np.ndarray:
     return np.asarray(direction / max(float(np.linalg.norm(direction)), 1e-9))
 
 
-def _cost(before: np.ndarray, after: np.ndarray) -> float:
+def _joining_cost(before: np.ndarray, after: np.ndarray) -> float:
     """Return what it costs to go on from one line's end to another's beginning."""
     gap = after[0] - before[-1]
     distance = float(np.linalg.norm(gap))

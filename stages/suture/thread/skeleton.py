@@ -89,13 +89,13 @@ def stretches(mask: np.ndarray) -> list[Stretch]:
         ]
         if not any(spurs):
             break
-        chains = _joined([chain for chain, spur in zip(chains, spurs, strict=True) if not spur])
+        chains = _join_chains([chain for chain, spur in zip(chains, spurs, strict=True) if not spur])
     result = []
     for chain in chains:
         ends = [chain[end] if degrees[chain[end]] > 1 and chain[0] != chain[-1] else -1 for end in (0, -1)]
         if chain[0] == chain[-1] and degrees[chain[0]] > 2:
             ends = [chain[0], chain[0]]
-        points = _smoothed(_centred(mask, _smoothed(pixels[chain][:, ::-1].astype(float)), pixels[chain]))
+        points = _smooth(_centre_on_mask(mask, _smooth(pixels[chain][:, ::-1].astype(float)), pixels[chain]))
         result.append(Stretch(points, *ends))
     return result
 
@@ -131,7 +131,7 @@ def _chains(links: list[list[int]]) -> list[list[int]]:
     return chains
 
 
-def _joined(chains: list[list[int]]) -> list[list[int]]:
+def _join_chains(chains: list[list[int]]) -> list[list[int]]:
     """Return the chains with those joined that alone meet at a pixel since a spur was taken out there."""
     chains = [list(chain) for chain in chains]
     while True:
@@ -156,7 +156,7 @@ def _joined(chains: list[list[int]]) -> list[list[int]]:
         chains = [chain for index, chain in enumerate(chains) if index not in pair] + [before + after[1:]]
 
 
-def _centred(mask: np.ndarray, line: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+def _centre_on_mask(mask: np.ndarray, line: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Return the points (N, 2) of a line moved across it to the middle of the mask around their pixels (N, 2; row,
     column): thinning takes one side of an even width."""
     if len(line) < 5:
@@ -177,7 +177,7 @@ def _centred(mask: np.ndarray, line: np.ndarray, pixels: np.ndarray) -> np.ndarr
     return np.asarray(line + np.where(np.abs(move) < FARTHEST_MOVE, move, 0.0)[:, None] * across)
 
 
-def _smoothed(points: np.ndarray) -> np.ndarray:
+def _smooth(points: np.ndarray) -> np.ndarray:
     """Return points (N, 2) smoothed along the line; the ends stay."""
     if len(points) < 5:
         return points

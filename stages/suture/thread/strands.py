@@ -61,7 +61,7 @@ def outward(points: np.ndarray, end: int) -> np.ndarray:
 def strands(stretches: list[Stretch]) -> list[Strand]:
     """Return the strands that the stretches make, the longest first."""
     crossing, inner = _crossings(stretches)
-    shared = _shared(stretches, crossing, inner)
+    shared = _find_shared(stretches, crossing, inner)
     branches: dict[int, list[End]] = {}
     for index, stretch in enumerate(stretches):
         if index in inner or index in shared:
@@ -72,7 +72,7 @@ def strands(stretches: list[Stretch]) -> list[Strand]:
     onward: dict[End, tuple[End, bool, np.ndarray]] = {}
     for name, ends in branches.items():
         via = next((stretches[k].points for k, names in shared.items() if name in names), np.empty((0, 2)))
-        for incoming, outgoing, doubtful in _paired(stretches, ends):
+        for incoming, outgoing, doubtful in _pair_branches(stretches, ends):
             onward[incoming] = (outgoing, doubtful, _toward(via, stretches, incoming))
             onward[outgoing] = (incoming, doubtful, _toward(via, stretches, outgoing))
     outer = [index for index in range(len(stretches)) if index not in inner and index not in shared]
@@ -96,7 +96,7 @@ def _crossings(stretches: list[Stretch]) -> tuple[dict[int, int], set[int]]:
     return {node: root(node) for node in name}, inner
 
 
-def _shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int]) -> dict[int, tuple[int, int]]:
+def _find_shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int]) -> dict[int, tuple[int, int]]:
     """Return the stretches on which two threads lie, with the name of their joined crossing; `crossing` is changed:
     the forks at both ends of such a stretch become one crossing."""
     ends: dict[int, list[End]] = {}
@@ -139,7 +139,7 @@ def _turn(incoming: np.ndarray, outgoing: np.ndarray) -> float:
     return float(np.arccos(np.clip(-(incoming @ outgoing), -1.0, 1.0)))
 
 
-def _paired(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, End, bool]]:
+def _pair_branches(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, End, bool]]:
     """Yield pairs of branches that are one thread, and whether that is in doubt."""
     directions = [outward(stretches[index].points, end) for index, end in ends]
     turns = np.array([[_turn(incoming, outgoing) for outgoing in directions] for incoming in directions])

@@ -102,7 +102,7 @@ class LookingEyes:
 
     def look(self, needle: np.ndarray, place: str) -> Seen | None:
         """Return one estimate of a needle at its true pose (4, 4), in the world; None when it is abstained from."""
-        view = self._viewed(needle)
+        view = self._render_view(needle)
         self.looks += 1
         seed = LOOKS_OF_A_TRIAL * (self.seed + 1) + self.looks
         spoiled, random = spoiled_masks(view.left, view.right, seed)
@@ -123,7 +123,7 @@ class LookingEyes:
         pose = NeedlePose(world_from_camera @ answer.pose.camera_from_needle)
         return Seen(pose.normal, pose.tip, pose.swage, fate == "right")
 
-    def _viewed(self, needle: np.ndarray) -> StereoView:
+    def _render_view(self, needle: np.ndarray) -> StereoView:
         assert self._bench is not None
         state = b"".join(part.tobytes() for part in (needle, *self._bench.tools.values(), self._bench.rope))
         if self._view is None or state != self._state:

@@ -54,7 +54,7 @@ class Lighting(NamedTuple):
 
 
 @numba.njit(cache=True, fastmath=True)
-def _hit(
+def _hit_depth(
     ray_x: float, ray_y: float, start: np.ndarray, axis: np.ndarray, start_radius: float, end_radius: float
 ) -> tuple[float, float]:
     """Return the depth z of the hit of the ray (ray_x, ray_y, 1) and the place 0..1 on the axis; depth 0 if none."""
@@ -114,7 +114,7 @@ def draw(cones: Cones, view: View, depth: np.ndarray, cone: np.ndarray) -> tuple
             ray_y = ((row - half) / SUBPIXELS - centre_y) / focal
             for column in range(first_column, end_column):
                 ray_x = ((column - half) / SUBPIXELS - centre_x) / focal
-                nearest, _ = _hit(ray_x, ray_y, start, axis, start_radii[index], end_radii[index])
+                nearest, _ = _hit_depth(ray_x, ray_y, start, axis, start_radii[index], end_radii[index])
                 if nearest > 0.0 and (cone[row, column] < 0 or nearest < depth[row, column]):
                     depth[row, column] = nearest
                     cone[row, column] = index

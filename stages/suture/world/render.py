@@ -116,10 +116,10 @@ def _eye(
         )
         shade(depth, cone, cones, view, lighting, linear, depth_map)
         image = _sensor(linear, scene, random)
-    sees = _seen_arc(rig, pose, cone, tubes.bodies)
+    sees = _visible_arc(rig, pose, cone, tubes.bodies)
     if not pictures:
-        bodies = _set_in(bodies, scene.rig, column, row)
-        depth_map = _set_in(depth_map, scene.rig, column, row)
+        bodies = _paste(bodies, scene.rig, column, row)
+        depth_map = _paste(depth_map, scene.rig, column, row)
     return Eye(image, bodies, depth_map, sees)
 
 
@@ -136,14 +136,14 @@ def _around_needle(rig: StereoRig, pose: NeedlePose) -> tuple[int, int, StereoRi
     )
 
 
-def _set_in(part: np.ndarray, rig: StereoRig, column: int, row: int) -> np.ndarray:
+def _paste(part: np.ndarray, rig: StereoRig, column: int, row: int) -> np.ndarray:
     """Return the whole image (H, W) that holds `part` at (column, row) and zeros elsewhere."""
     full_picture = np.zeros((rig.height, rig.width), dtype=part.dtype)
     full_picture[row : row + part.shape[0], column : column + part.shape[1]] = part
     return full_picture
 
 
-def _seen_arc(rig: StereoRig, pose: NeedlePose, cone: np.ndarray, bodies: np.ndarray) -> np.ndarray:
+def _visible_arc(rig: StereoRig, pose: NeedlePose, cone: np.ndarray, bodies: np.ndarray) -> np.ndarray:
     """Return which of ARC_ANGLES (121,) this eye sees: the sub-pixel where the centre line falls shows the needle."""
     pixels = rig.left(pose.points(ARC_ANGLES))
     columns = np.round(pixels[:, 0] * SUBPIXELS + (SUBPIXELS - 1) / 2).astype(int)

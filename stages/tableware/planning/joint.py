@@ -75,15 +75,15 @@ def plan(
     optimum = Optimum(_portion(table), rules_in(rules, chances), model, chances, worth)
     charges = [off * step * model.whole_trip for step in (STEPS if off else (0.0,))]
     plans = [Plan(optimum, optimum.solve(charge)) for charge in charges]
-    least = {charge: _cost(best, charge, worth) for charge, best in zip(charges, plans, strict=True)}
+    least = {charge: _plan_cost(best, charge, worth) for charge, best in zip(charges, plans, strict=True)}
 
     def regret(one: Plan) -> float:
-        return max(_cost(one, charge, worth) / max(least[charge], 1e-9) for charge in (charges[0], charges[-1]))
+        return max(_plan_cost(one, charge, worth) / max(least[charge], 1e-9) for charge in (charges[0], charges[-1]))
 
-    return min(plans, key=lambda one: (round(regret(one), 9), _cost(one, 0.0, worth)))
+    return min(plans, key=lambda one: (round(regret(one), 9), _plan_cost(one, 0.0, worth)))
 
 
-def _cost(plan: Plan, charge: float, worth: float) -> float:
+def _plan_cost(plan: Plan, charge: float, worth: float) -> float:
     """Return what a plan costs [s] when each trip takes `charge` more than the model says."""
     return plan.seconds + charge * plan.expected_trips + worth * plan.lost
 

@@ -187,7 +187,7 @@ def _share_out(
     """Return how many of each kind of part, in the order of `pile_order`, go onto `high`, the others onto `low`."""
     if not kinds:
         return () if can_hold_two(low, high, rules) else None
-    lows, highs = (_grown(pile, kinds[0], counts[0], rules) for pile in (low, high))
+    lows, highs = (_growing_piles(pile, kinds[0], counts[0], rules) for pile in (low, high))
     for number in range(counts[0] + 1):
         if counts[0] - number < len(lows) and number < len(highs):
             shares_of_rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)
@@ -196,7 +196,7 @@ def _share_out(
     return None
 
 
-def _grown(pile: str, part: str, count: int, rules: Rules) -> list[str]:
+def _growing_piles(pile: str, part: str, count: int, rules: Rules) -> list[str]:
     """Return the pile with 0, 1, ... `count` parts on it, as far as that goes."""
     piles = [pile]
     while len(piles) <= count and can_stack(part, piles[-1], rules):

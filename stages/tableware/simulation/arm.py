@@ -168,7 +168,7 @@ class Arm:
         if times[-1] <= 0.0:  # so short a way that the joints' values do not change
             return
         times = times * max(1.0, length / speed / float(times[-1]))
-        self._run(times, points)
+        self._follow(times, points)
 
     def _path(self, ends: list[np.ndarray], step: float) -> tuple[np.ndarray, float]:
         """Return joint values (K, 6) along straight lines through poses, a pose each `step` [m], and their length [m].
@@ -191,7 +191,7 @@ class Arm:
     def move_joints(self, end: np.ndarray, share: float) -> None:
         """Move all joints to `end` (6,) at a share of the arm's speed and acceleration, with physics."""
         times, points = time_path(np.array([self.target, end]), *self._limits(share))
-        self._run(times, points)
+        self._follow(times, points)
 
     def jump(self, end: np.ndarray) -> None:
         """Move the empty hand above everything to `end` (6,): nothing is met, so that only the time is counted."""
@@ -268,7 +268,7 @@ class Arm:
     def _limits(self, share: float) -> tuple[np.ndarray, np.ndarray]:
         return (np.full(6, self.description.arm_speed * share), np.full(6, self.description.arm_acceleration * share))
 
-    def _run(self, times: np.ndarray, points: np.ndarray) -> None:
+    def _follow(self, times: np.ndarray, points: np.ndarray) -> None:
         if len(times) < 2:
             return
         step = self.world.time_step

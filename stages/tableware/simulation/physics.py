@@ -127,10 +127,10 @@ class PhysicsTable:
         except MotionFailed as failure:
             self.troubles.append(str(failure))
             self._retreat()
-        self._read()
+        self._read_table()
         self._key("done")
 
-    def _read(self) -> None:
+    def _read_table(self) -> None:
         self.arm.seconds += self.top.rest(0.6)
         self.table = self.top.read()
         lying = len(self.top.bodies) - len(self.table.items)
@@ -167,7 +167,7 @@ class PhysicsTable:
 
     def _above(self, pose: np.ndarray, opening: float) -> None:
         """Bring the empty hand over a pose, with the fingers at an opening."""
-        high = _raised(pose, TRAVEL + (0.05 if pose[2, 3] > 0.08 else 0.0))
+        high = _at_height(pose, TRAVEL + (0.05 if pose[2, 3] > 0.08 else 0.0))
         arm = self.arm.solve(high)
         if arm is None:
             raise MotionFailed("no_inverse_kinematics", "the arm does not reach above the grasp")
@@ -191,7 +191,7 @@ class PhysicsTable:
         self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.016))
         pose = self.arm.pose_of(self.arm.target)
         try:
-            self.arm.move_line(_raised(pose, TRAVEL), self.speeds.descend)
+            self.arm.move_line(_at_height(pose, TRAVEL), self.speeds.descend)
         except MotionFailed:
             self.arm.put(self.arm.description.carry)
 
@@ -203,8 +203,8 @@ class PhysicsTable:
         lowest = min(seen.by_name[name].position[2] for name in held_names)
         highest = max([item.lip for item in seen.items if item.name not in held_names], default=0.0)
         clear = highest + LIFT - lowest
-        up = _raised(pose, pose[2, 3] + max(clear, 0.06))
-        self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
+        up = _at_height(pose, pose[2, 3] + max(clear, 0.06))
+        self.arm.move_line(_at_height(pose, pose[2, 3] + 0.01), 0.05)
         two = len(names) == 2
         loose = any(cargo(seen, name) for name in names if seen.by_name[name].is_dish)
         self.arm.move_line(up, self.speeds.lift_loose if loose else self.speeds.lift)
@@ -285,7 +285,7 @@ class PhysicsTable:
             self.arm.move_line(away, 0.1)
         finally:
             self.arm.touch_with(PAD_FRICTION)
-        self.arm.move_line(_raised(away, TRAVEL + 0.03), self.speeds.descend)
+        self.arm.move_line(_at_height(away, TRAVEL + 0.03), self.speeds.descend)
 
     def _pull_bar(self, action: Pull, seen: Table) -> None:
         """Take a utensil where it lies, carry it just above the table, let go. A hand that presses with 20 N does not
@@ -301,12 +301,12 @@ class PhysicsTable:
         goal = np.array([*action.p_E[:2], 0.0]) + np.array([*(rotation @ offset), 0.0]) + tip
         final_pose = tool_pose(goal, action.theta_S + turn)
         pose = self.arm.pose_of(self.arm.target)
-        self.arm.move_line(_raised(pose, pose[2, 3] + HOVER), self.speeds.pull)
-        self.arm.move_line(_raised(final_pose, final_pose[2, 3] + HOVER), self.speeds.pull)
+        self.arm.move_line(_at_height(pose, pose[2, 3] + HOVER), self.speeds.pull)
+        self.arm.move_line(_at_height(final_pose, final_pose[2, 3] + HOVER), self.speeds.pull)
         self.arm.move_line(final_pose, self.speeds.pull)
         self._key("pulled")
         self.arm.open_to(0.022)
-        self.arm.move_line(_raised(final_pose, TRAVEL), self.speeds.descend)
+        self.arm.move_line(_at_height(final_pose, TRAVEL), self.speeds.descend)
 
     # --- stacks -----------------------------------------------------------------------------------------------
 
@@ -325,9 +325,9 @@ class PhysicsTable:
         held_names = {name, *(load.name for load in seen.load(name))}
         self.top.wake_near([np.array(item.position[:2])], 0.03)
         highest = max([neighbour.lip for neighbour in seen.items if neighbour.name not in held_names], default=0.0)
-        up = _raised(pose, pose[2, 3] + max(highest + 0.04 - item.position[2], 0.04))
+        up = _at_height(pose, pose[2, 3] + max(highest + 0.04 - item.position[2], 0.04))
         loose = item.is_dish and bool(cargo(seen, name))
-        self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
+        self.arm.move_line(_at_height(pose, pose[2, 3] + 0.01), 0.05)
         self.arm.move_line(up, self.speeds.lift_loose if loose else self.speeds.lift)
         self.top.sleep()
         self._key("lifted")
@@ -340,12 +340,12 @@ class PhysicsTable:
         self.top.wake_near([np.array(onto.position[:2])], 0.03)
         down = over.copy()
         down[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2] + drop
-        above_base = _raised(down, down[2, 3] + 0.02)
+        above_base = _at_height(down, down[2, 3] + 0.02)
         self.arm.move_through([above_base], self.speeds.lift)
         self.arm.move_line(down, 0.06)
         self._key("placed")
         self.arm.open_to(min(0.085, self.arm.finger_gap() + 2 * 0.006))
-        self.arm.move_line(_raised(down, down[2, 3] + 0.05), self.speeds.descend)
+        self.arm.move_line(_at_height(down, down[2, 3] + 0.05), self.speeds.descend)
         self._key("let go")
 
     def _pile(self, seen: Table, item: Item) -> tuple[Item, ...]:
@@ -376,7 +376,7 @@ class PhysicsTable:
             placing_pose[:2, 3] = base_middle + rotation[:2, :2] @ offset
             placing_pose[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2]
             clearance = jaw_clearance(placing_pose, 0.03, others, [])
-            placing_pose = _raised(placing_pose, height)
+            placing_pose = _at_height(placing_pose, height)
             if self.arm.solve(placing_pose, held=True) is None:
                 continue
             if best is None or clearance > best[0]:
@@ -398,7 +398,7 @@ def finger_force(seen: Table, names: list[str], speeds: Speeds) -> float:
     return speeds.heavy if len(names) == 2 and len(gripped) >= HEAVY else speeds.force
 
 
-def _raised(pose: np.ndarray, height: float) -> np.ndarray:
+def _at_height(pose: np.ndarray, height: float) -> np.ndarray:
     high = pose.copy()
     high[2, 3] = max(height, pose[2, 3])
     return high

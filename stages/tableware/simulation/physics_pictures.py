@@ -47,7 +47,7 @@ class PhysicsPictures:
         self._urdf = parse_urdf(self._robot.urdf)
         self._links = link_shapes(self._robot.urdf.read_text(encoding="utf-8"), "visual")
         self._items = [
-            _painted(item_mesh(Item(str(name), kind, (0.0, 0.0, 0.0), measures=Measures(*measures))), COLORS[kind])
+            _paint(item_mesh(Item(str(name), kind, (0.0, 0.0, 0.0), measures=Measures(*measures))), COLORS[kind])
             for name, kind, measures in zip(
                 frames["names"], frames["kinds"].tolist(), frames["measures"].tolist(), strict=True
             )
@@ -73,7 +73,7 @@ class PhysicsPictures:
             world[:3, 3] += BASE
             for shape in self._links.get(link, ()):
                 mesh = shape.copy().apply_transform(world)
-                meshes.append(_painted(mesh, HAND_COLOR if link in HAND_LINKS else ARM_COLOR))
+                meshes.append(_paint(mesh, HAND_COLOR if link in HAND_LINKS else ARM_COLOR))
         return meshes
 
 
@@ -122,7 +122,7 @@ def _caption(frames: Mapping[str, np.ndarray], words: Sequence[str], row: int) -
     return f"{float(frames['seconds'][row]):.0f} s: {words[row]}, {frames['labels'][row]}"
 
 
-def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
+def _paint(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
     paint(mesh, np.array([*color, 255], dtype=np.uint8))
     return mesh
 
@@ -130,7 +130,7 @@ def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trim
 def _box(
     size: tuple[float, float, float], center: tuple[float, float, float], color: tuple[int, int, int]
 ) -> trimesh.Trimesh:
-    return _painted(trimesh.creation.box(size, trimesh.transformations.translation_matrix(center)), color)
+    return _paint(trimesh.creation.box(size, trimesh.transformations.translation_matrix(center)), color)
 
 
 def _table_and_bin() -> list[trimesh.Trimesh]:

@@ -130,7 +130,7 @@ def height_map(
     plane = _table_plane(part, (camera.cx - left, camera.cy - top), (camera.fx, camera.fy), above, sides)
     raw, valid, tall = _heights(part, float(plane[0]), float(plane[1]), float(plane[2]))
     weight = cv2.boxFilter(valid.astype(np.float32), -1, (7, 7))
-    filled = _filled(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
+    filled = _fill_gaps(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
     return HeightMap(
         raw=raw,
         valid=valid,
@@ -196,7 +196,7 @@ def _heights(part: np.ndarray, a: float, b: float, c: float) -> tuple[np.ndarray
 
 
 @njit(cache=True)
-def _filled(raw: np.ndarray, valid: np.ndarray, sums: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _fill_gaps(raw: np.ndarray, valid: np.ndarray, sums: np.ndarray, weight: np.ndarray) -> np.ndarray:
     filled = raw.copy()
     for v in range(raw.shape[0]):
         for u in range(raw.shape[1]):

@@ -33,7 +33,7 @@ def draw_sight(color: np.ndarray, sight: Sight) -> np.ndarray:
     camera_from_world = np.linalg.inv(sight.world_from_camera)
     labels: list[tuple[tuple[int, int], str, tuple[int, int, int]]] = []
     for number, detection in enumerate(sight.detections):
-        points = _projected(_outline(detection, sight.sizes), camera_from_world, sight)
+        points = _project(_outline(detection, sight.sizes), camera_from_world, sight)
         if points is None:
             continue
         tone = COLORS[detection.kind]
@@ -78,7 +78,7 @@ def _outline(detection: Detection, sizes: DishSizes) -> np.ndarray:
     return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.full(73, detection.lip)])
 
 
-def _projected(points: np.ndarray, camera_from_world: np.ndarray, sight: Sight) -> np.ndarray | None:
+def _project(points: np.ndarray, camera_from_world: np.ndarray, sight: Sight) -> np.ndarray | None:
     """Return (N, 2) pixels, or None when a point is not in front of the camera."""
     in_camera = points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
     if (in_camera[:, 2] < 0.05).any():

@@ -105,7 +105,7 @@ def table_plane(
         )
     rivals = [plane for plane in planes if plane[0] >= RIVAL * planes[0][0]]
     _, normal, offset = min(rivals, key=lambda plane: plane[2])
-    normal, offset = _refined(points, normal, offset)
+    normal, offset = _refine_plane(points, normal, offset)
     if abs(normal[2]) < np.cos(STEEPEST):
         raise BadInput(
             f"the table is seen at {np.rad2deg(np.arccos(abs(normal[2]))):.0f} degrees off its normal",
@@ -114,7 +114,7 @@ def table_plane(
     return normal, offset
 
 
-def _refined(points: np.ndarray, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float]:
+def _refine_plane(points: np.ndarray, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float]:
     """Return the plane of points (N, 3) near one, by Welsch's weights: what stands on the table lifts a plain fit."""
     for width in (0.006, 0.004, WIDTH, WIDTH, WIDTH, WIDTH):
         distance = points @ normal + offset
@@ -161,7 +161,7 @@ def rectify(
     assert sides is not None
     view = overhead_camera()
     world = points @ frame[:3, :3].T + frame[:3, 3]
-    top, picture = _splatted(
+    top, picture = _splat_downwards(
         world.astype(np.float64),
         depth.astype(np.float64),
         color,
@@ -242,7 +242,7 @@ class _LooksDown(NamedTuple):
 
 
 @njit(cache=True)
-def _splatted(
+def _splat_downwards(
     world: np.ndarray, depth: np.ndarray, color: np.ndarray, camera: _LooksDown
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (z-depth (rows, columns) [m], colour) from a camera that looks straight down: patches between four

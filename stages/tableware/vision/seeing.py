@@ -150,7 +150,7 @@ def see(
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
     if rectified and -normal[2] < np.cos(OBLIQUE):
         detections = seen_from_the_side(detections)
-    notes += _unhandled(heights)
+    notes += _unseen_notes(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
     return Sight(
         detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights, dishes, sizes == "estimated"
@@ -230,7 +230,7 @@ def seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ..
     return tuple(trusted)
 
 
-def _unhandled(heights: HeightMap) -> list[str]:
+def _unseen_notes(heights: HeightMap) -> list[str]:
     """Return what of the workspace could not be looked at."""
     inside = heights.workspace()[::2, ::2]
     area = 4.0 / float(heights.scale(0.0)) ** 2

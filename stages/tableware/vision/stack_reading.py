@@ -52,11 +52,11 @@ def read_stacks(rims: list[Rim], sizes: DishSizes) -> list[Stack]:
                 member = min(members_of_stack, key=lambda rim: np.hypot(rim.x - base.x, rim.y - base.y))
                 members.append(member)
                 unread.remove(member)
-        stacks.append(_read(members, sizes))
+        stacks.append(_read_stack(members, sizes))
     return stacks
 
 
-def _read(members: list[Rim], sizes: DishSizes) -> Stack:
+def _read_stack(members: list[Rim], sizes: DishSizes) -> Stack:
     """Return the possible stack whose lips are nearest to those of the rims (root mean square)."""
     members = sorted(members, key=lambda rim: -sizes[rim.kind].rim_radius)
     seen_lips = {rim.kind: rim.lip for rim in members}

@@ -64,7 +64,9 @@ class SeenUtensil:
     depth_share: float
 
 
-def _seen(bar: Bar, heights: HeightMap, z: float, place: str, hidden: np.ndarray, sizes: DishSizes) -> SeenUtensil:
+def _read_utensil(
+    bar: Bar, heights: HeightMap, z: float, place: str, hidden: np.ndarray, sizes: DishSizes
+) -> SeenUtensil:
     chance = fork_chance(kind_features(bar, heights, z, hidden, sizes), place)
     bar = told_apart(bar, chance)
     return SeenUtensil(bar, max(chance, 1.0 - chance), *_relief(heights, bar, z, hidden, sizes))
@@ -102,9 +104,9 @@ def utensils_on_dish(
     map_[(distance > hollow - 0.007) & (distance < top.rim_radius + 0.004)] = 0
     map_[(owner != label) & (owner > 0)] = 0
     map_[part > z + BAND] = 0
-    bars = [_shifted(bar, left, up) for bar in search_bars(map_, scale, 2, sizes)]
+    bars = [_shift(bar, left, up) for bar in search_bars(map_, scale, 2, sizes)]
     nothing = np.zeros(heights.smooth.shape, dtype=bool)
-    utensils = [_seen(bar, heights, stack.top, "dish", nothing, sizes) for bar in bars]
+    utensils = [_read_utensil(bar, heights, stack.top, "dish", nothing, sizes) for bar in bars]
     return sorted(utensils, key=lambda utensil: _middle_height(heights, utensil.bar, z, sizes))
 
 
@@ -113,7 +115,7 @@ def _square(center: float, half: float, scale: float) -> slice:
     return slice(max(0, int(center - half * scale)), max(0, int(center + half * scale) + 1))
 
 
-def _shifted(bar: Bar, du: float, dv: float) -> Bar:
+def _shift(bar: Bar, du: float, dv: float) -> Bar:
     poses = {
         kind: (score, u + du, v + dv, angle, visible_share)
         for kind, (score, u, v, angle, visible_share) in bar.poses.items()
@@ -186,7 +188,7 @@ def utensils_on_table(
         bars = _lone_bar(map_, of_component, scale, area, utensil_area, sizes)
         if not bars:
             bars = search_bars(map_, scale, min(5, int(area / utensil_area + 1.5)), sizes)
-        bars = [_shifted(bar, window[1].start, window[0].start) for bar in bars]
+        bars = [_shift(bar, window[1].start, window[0].start) for bar in bars]
         if (
             not bars
             and area > UNKNOWN_AREA * scale**2
@@ -208,7 +210,7 @@ def _that_rise(
 ) -> list[SeenUtensil]:
     """Return the bars that rise over the table, which the rim of a shadow as slender as a utensil does not, and set
     `rest` (h, w) to unknown where they lie, in place."""
-    utensils = [_seen(bar, heights, 0.0, "table", hidden, sizes) for bar in bars]
+    utensils = [_read_utensil(bar, heights, 0.0, "table", hidden, sizes) for bar in bars]
     risen = [utensil for utensil in utensils if not utensil.relief < max(LEAST_RELIEF, ROUGH * heights.roughness)]
     for utensil in risen:
         erase_bar(rest, utensil.bar, scale, sizes)

@@ -97,7 +97,7 @@ def _draw(tier: Tier, random: np.random.Generator, sizes: DishSizes) -> Table | 
             else:
                 return None
             if item.on is None and random.random() < tier.touching:
-                item = _pushed(item, table)
+                item = _push_to_touch(item, table)
             table = Table((*table.items, item))
     return table
 
@@ -112,7 +112,7 @@ def _least_gap(print_: Footprint, stack: tuple[Item, ...]) -> float:
     return min(gap(print_, footprint(item)) for item in stack)
 
 
-def _pushed(item: Item, table: Table) -> Item:
+def _push_to_touch(item: Item, table: Table) -> Item:
     """Return the item moved straight towards the nearest thing until something is touched."""
     if not table.items:
         return item

@@ -75,19 +75,19 @@ class Driving:
             return None
         reached = start
         opening = self._robot.driver.robot.configuration().opening
-        before = self._touched()  # what it leans on already does not keep it from going away
+        before = self._touching_depths()  # what it leans on already does not keep it from going away
         for row in rows:
             count = max(1, int(np.ceil(np.abs(row - reached)[:2].max() / STEP)))
             for k in range(1, count + 1):
                 at = reached + (row - reached) * k / count
                 self._robot.driver.robot.set_body(np.concatenate([at, arm]))
-                now = self._touched()
+                now = self._touching_depths()
                 struck = next((name for name, depth in now.items() if depth > before.get(name, TOUCHES)), None)
                 before = now
                 if struck is not None:
                     touched = self._remember(struck)
                     back = reached + (row - reached) * (k - 1) / count
-                    self._robot.driver.put(Configuration(self._backed_off(back, arm, touched), arm, opening))
+                    self._robot.driver.put(Configuration(self._back_off(back, arm, touched), arm, opening))
                     class_name = self._robot.room.world.bodies[struck].record.class_name
                     return MotionFailed("path_blocked", f"the base touched {class_name}", (class_name,))
                 self._seen.obstacles.driven(*(at + self._robot.error)[:2])
@@ -108,22 +108,22 @@ class Driving:
         self._seen.obstacles.add(Sweep(np.zeros((0, 2), int), np.array(sorted(cells), int).reshape(-1, 2), ()))
         return np.mean([c.point[:2] for c in of_it], axis=0)
 
-    def _backed_off(self, base: np.ndarray, arm: np.ndarray, touched: np.ndarray) -> np.ndarray:
+    def _back_off(self, base: np.ndarray, arm: np.ndarray, touched: np.ndarray) -> np.ndarray:
         """Return the base pose (3,) farther from where it touched something (2,), as far as nothing is touched more for
         it: leaning on it, no way would lead on."""
         away = base[:2] - touched
         step = np.array([*(away / max(np.linalg.norm(away), 1e-6) * STEP), 0.0])
         self._robot.driver.robot.set_body(np.concatenate([base, arm]))
-        before = self._touched()
+        before = self._touching_depths()
         for _ in range(BACK_STEPS):
             self._robot.driver.robot.set_body(np.concatenate([base + step, arm]))
-            now = self._touched()
+            now = self._touching_depths()
             if any(depth > before.get(name, TOUCHES) for name, depth in now.items()):
                 break
             base, before = base + step, now
         return base
 
-    def _touched(self) -> dict[str, float]:
+    def _touching_depths(self) -> dict[str, float]:
         """Return what the robot stands in, the floor aside, and how deep [m]."""
         world = self._robot.room.world
         engine.performCollisionDetection(physicsClientId=world.client)

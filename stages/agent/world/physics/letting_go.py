@@ -66,7 +66,7 @@ def plan_release(
     heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
     try:
         for turn, tilt in TURNS:
-            pose = _tilted(_turned(hold, heading, turn), heading, tilt)
+            pose = _tilt(_tool_rotation(hold, heading, turn), heading, tilt)
             pose[:3, 3] = (at[0], at[1], at[2] + height + foot)
             goal = planner.reachable(base, pose, tally, starts=3)
             if goal is None or not planner.free(base, goal, tally):
@@ -94,7 +94,7 @@ def plan_release(
     raise AssertionError("unreachable")
 
 
-def _turned(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
+def _tool_rotation(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
     """Return the tool's rotation (4, 4): as it grasped but for the yaw, the hand away from the base."""
     if hold is None:
         return pointing(heading + turn, np.pi / 2)
@@ -109,7 +109,7 @@ def _turned(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
     return pose
 
 
-def _tilted(pose: np.ndarray, heading: float, tilt: float) -> np.ndarray:
+def _tilt(pose: np.ndarray, heading: float, tilt: float) -> np.ndarray:
     """Return a tool's rotation (4, 4) leaned so that the hand is behind its tip, as seen along a heading [rad]."""
     axis = np.array([np.sin(heading), -np.cos(heading), 0.0])
     turn = np.eye(4)

@@ -104,8 +104,8 @@ class Looking:
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
-            picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, aim, close), self._robot.random)
-            camera = self._aimed(seen_pose, aim, close)
+            picture = take(renderer, NEAR_BY if close else WRIST, self._aim(pose, aim, close), self._robot.random)
+            camera = self._aim(seen_pose, aim, close)
             if not close:  # a thing fills a picture from near by
                 self._seen.keep_top(picture, camera, piece)
             front = self._seen.front_of(piece)
@@ -190,7 +190,7 @@ class Looking:
                 return [arm]
         return []
 
-    def _aimed(self, pose: np.ndarray, at: Position, close: bool) -> np.ndarray:
+    def _aim(self, pose: np.ndarray, at: Position, close: bool) -> np.ndarray:
         """Return a camera pose, with the crop of a near look turned to the position that it is of."""
         if not close:
             return pose

@@ -189,19 +189,19 @@ class Pulling:
         for _ in range(PUSHES):
             front = self._seen.moved(name, value)
             end = open_value(front.joint)
-            pushed = self._pushed_toward(front, (end,), Tally()) if value < end - NOTICED else None
+            pushed = self._push_toward(front, (end,), Tally()) if value < end - NOTICED else None
             if pushed is None or pushed < value + NOTICED:
                 return value if pushed is None else pushed
             value = pushed
         return value
 
-    def _pushed(self, front: Front, motion: Manipulation) -> float:
+    def _carry_out_push(self, front: Front, motion: Manipulation) -> float:
         """Carry out a push; something behind a leaf may stop it."""
         try:
             return self._carry_out(front, motion)
         except MotionFailed:
             self._robot.draw_in()
-            return self._seen_open(front, front.value)
+            return self._see_opening(front, front.value)
 
     def _bases(self, front: Front, *, shutting: bool = False) -> Iterator[np.ndarray]:
         """Yield base poses (3,) for a front that the robot can get to: where it stands first, if that is before it."""
@@ -260,7 +260,7 @@ class Pulling:
             robot.draw_in()  # it let go already
         robot.driver.wait(0.5)
         if not front.slides or slipped:
-            value = self._seen_open(front, value)
+            value = self._see_opening(front, value)
         return value
 
     def _along(self, front: Front, there: list[Segment], start: int) -> tuple[float, bool]:
@@ -275,7 +275,7 @@ class Pulling:
             return front.value, True
         return max(0.0, front.felt(self._tool(robot.measured_arm()), shut)), False
 
-    def _seen_open(self, front: Front, value: float) -> float:
+    def _see_opening(self, front: Front, value: float) -> float:
         """Return how far a front is open as seen from here; the `value` that was felt, which is finer, where it is not
         seen or the eyes say about the same."""
         handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
@@ -316,8 +316,8 @@ class Pulling:
         for number in range(PUSHES):
             front = self._seen.fronts[name]
             if not front.slides and not number:  # the arm may have come against it since
-                front = self._seen.moved(name, self._seen_open(front, front.value))
-            value = self._pushed_toward(front, (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value), tally)
+                front = self._seen.moved(name, self._see_opening(front, front.value))
+            value = self._push_toward(front, (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value), tally)
             if value is None and not self._look_from_elsewhere(name, number):
                 tally.raise_for(f"close({name})", (name,))
             if value is not None and is_closed(front.joint, self._seen.moved(name, value).value):
@@ -329,11 +329,11 @@ class Pulling:
         front = self._seen.fronts[name]
         for base in [] if front.slides else list(self._bases(front, shutting=True))[number + 1 :]:
             if self._go(base, front.label):
-                self._seen.moved(name, self._seen_open(front, front.value))
+                self._seen.moved(name, self._see_opening(front, front.value))
                 return True
         return False
 
-    def _pushed_toward(self, front: Front, ends: tuple[float, ...], tally: Tally) -> float | None:
+    def _push_toward(self, front: Front, ends: tuple[float, ...], tally: Tally) -> float | None:
         """Push a front to the first of some values that the arm can push it to; return where it is then, None where it
         can to none of them."""
         for end in ends:
@@ -341,7 +341,7 @@ class Pulling:
                 if self._push(front, base, end, tally) is not None and self._go(base, front.label):
                     motion = self._push(front, self._robot.believed, end, tally)
                     if motion is not None:
-                        return self._pushed(front, motion)
+                        return self._carry_out_push(front, motion)
         return None
 
     def _push(self, front: Front, base: np.ndarray, end: float, tally: Tally) -> Manipulation | None:

@@ -154,12 +154,12 @@ class Room:
         height = on.height if on is not None else 0.77
         at = np.array([*thing.at, self.doored[thing.on].floor if thing.on in self.doored else height])
         if thing.on in self.doored:  # in a drawer that stands open it is where the drawer is
-            at = apply(self._moved(thing.on), at[None])[0]
+            at = apply(self._displacement(thing.on), at[None])[0]
         record = record_of(thing.name, thing.label, (float(at[0]), float(at[1]), float(at[2]) + 0.002), shape.mass)
         self.world.add_body(record, urdf_of(thing.name, shape.parts(), shape.mass))
         self._meshes[thing.name] = stained(thing, mesh_of(shape.parts(), COLORS.get(thing.color, shape.color)))
 
-    def _moved(self, name: str) -> np.ndarray:
+    def _displacement(self, name: str) -> np.ndarray:
         """Return the displacement (4, 4), world frame, of a drawer from where it is shut; of a leaf none, for nothing
         stands in it."""
         doored_piece = self.doored[name]
@@ -224,7 +224,7 @@ class Room:
     def _inside(self, name: str, at: np.ndarray) -> bool:
         """Whether a point (3,) is in furniture with a door, or in its drawer where that is now."""
         doored_piece, piece = self.doored[name], self.furniture[name]
-        in_furniture_frame = apply(inverse(self._moved(name) @ doored_piece.pose), at[None])[0]
+        in_furniture_frame = apply(inverse(self._displacement(name) @ doored_piece.pose), at[None])[0]
         size = np.array(piece.size if abs(doored_piece.pose[0, 0]) > 0.5 else piece.size[::-1])
         drawer = doored_piece.joint.type == "prismatic"
         lowest = doored_piece.floor - RESTS if drawer else 0.0
