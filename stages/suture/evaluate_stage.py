@@ -18,7 +18,7 @@ from scenewright.stages.suture.parameters import EvaluateParameters
 from scenewright.stages.suture.rig import NeedlePose
 
 ROUNDING = 1e-9
-"""Of a baseline [m]."""
+"""Baselines that differ by less than this are the same [m]."""
 
 
 def run(

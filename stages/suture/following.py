@@ -30,6 +30,7 @@ from scenewright.stages.suture.pairs import SQUARE, Pair
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 LARGEST_PICTURE = 64 * 2**20
+"""Largest file that is read [bytes]; by eye."""
 RIG_HINT = (
     'a rig is {"camera": {"width", "height", "fx", "fy", "cx", "cy"}, "baseline": metres}; docs/STITCH.md shows one'
 )
@@ -39,7 +40,9 @@ AROUND, RIM = NEEDLE_RADIUS / 2, 48
 in another outline of the same masks), and how far a window reaches beyond that [px], so that what lies at its edge is
 judged with what is around it."""
 ARC = np.linspace(0.0, np.pi, 33)
+"""Angles [rad] along the needle at which its window is measured."""
 UNKNOWN = {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5}
+"""What the line of a pair says where no pose is answered."""
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from scenewright.stages.suture.segmentation.infer import Masks
 
 SEED_OF_MASKS = 5
+"""First number of the seed from which masks are spoiled."""
 BUNDLED = Path(__file__).resolve().parents[2] / "data" / CHECKPOINT
 OTHER_MASKS = "--segmentation spoiled, or --masks FOLDER"
 DRIVER_GROWTH = 5

@@ -29,7 +29,7 @@ from scenewright.stages.suture.parameters import NeedleParameters
 from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 RADIUS_FRAMES = 20
-"""From so many frames a radius is fitted."""
+"""Number of first frames from which a radius is fitted; by eye."""
 
 
 def run(

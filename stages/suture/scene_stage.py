@@ -24,6 +24,7 @@ from scenewright.stages.suture.world.scene import NeedleScene, moved_scene, rand
 
 RIGS: dict[str, StereoRig] = {"two_cameras": TWO_CAMERAS, "endoscope": ENDOSCOPE}
 SEED_OF_MOTION = 6
+"""First number of the seed from which motions of the needle are drawn."""
 RATE = 10.0
 """Frames a second."""
 CAMERA_NAME = "camera"

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from scenewright.stages.suture.trials.sight import LookingEyes
 
 PANELS_SHOWN = 18
+"""Most pictures of the strip; by eye."""
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
 
 

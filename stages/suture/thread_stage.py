@@ -22,7 +22,7 @@ from scenewright.stages.suture.parameters import ThreadParameters
 from scenewright.stages.suture.rig import StereoRig
 
 WIDTH = 720
-"""Of each eye's picture [px]."""
+"""Width of each eye's picture [px]."""
 
 
 def run(

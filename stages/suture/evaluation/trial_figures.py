@@ -9,6 +9,7 @@ from scenewright.schemas.suture_trial import SutureRun
 from scenewright.stages.kit.measurement.bootstrap import Interval, bootstrap_interval
 
 SEED_OF_INTERVALS, DRAWS = 0, 2000
+"""Seed of the bootstrap, and the number of its draws."""
 KINDS = "IEHT"
 Pairs = Sequence[tuple[str, str]]
 PAIRS = (("ours", "thesis"), ("ours_supervised", "thesis_supervised"))

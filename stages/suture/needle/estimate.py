@@ -17,12 +17,16 @@ from scenewright.stages.suture.needle.windows import EyeMask, needle_masks, wind
 from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 FEWEST_PIXELS = 30
+"""Pixels of needle that each eye has to see; by eye."""
 STARTS, MIRRORED, FINALISTS = 14, 3, 6
+"""Starts that are fitted, the best of them that are also tried mirrored, and outlines that are fitted closely; by
+eye."""
 NEAR_STARTS, NEAR_FINALISTS = 2, 2
-"""Where a needle that hardly moved is looked for again."""
+"""The same where a needle that hardly moved is looked for again: starts, and outlines that are fitted closely."""
 COARSE_LEVELS, NARROW_LEVELS = ((3.0, 5), (1.5, 3)), ((1.5, 4), (0.7, 8))
 """Widths of the outline [px], and the most steps with each."""
 POLISH = 4
+"""Most steps of the last fit of an outline; by eye."""
 SAMPLED = 90
 """Pixels of each mask on which starts are scored."""
 SAME, ALIKE = (0.001, np.radians(15.0)), (0.0003, np.radians(3.0))
@@ -30,21 +34,25 @@ SAME, ALIKE = (0.001, np.radians(15.0)), (0.0003, np.radians(3.0))
 TOLERANCE = (0.001, np.radians(10.0))
 """What a robot needs of the centre [m] and of the plane [rad] to grasp the needle."""
 BASIN = (0.003, np.radians(20.0))
-"""Other outlines within this [m], [rad] of the best one are in its covariance."""
+"""Other outlines within this [m], [rad] of the best one are in its covariance; by eye."""
 VARIANCE = 0.36
-"""Of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they should."""
+"""Variance of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they
+should."""
 LEAST_PROBABILITY = 0.45
-"""Of being within TOLERANCE, below which the pose is not answered."""
+"""Probability of being within TOLERANCE, below which the pose is not answered."""
 LEAST_PRESENCE = 0.5
 """Probability that there is a needle, below which none is answered: no needle is then the likelier explanation."""
 MOST_OF_IT = 0.8
-"""Of the probability, about one pose: what is not known then is where in its neighbourhood the needle is."""
+"""Share of the probability that one pose must have about it: what is not known then is where in its neighbourhood the
+needle is."""
 LEAST_SEEN = 0.1
+"""Share of the needle's arc that each eye has to see where it best fits; by eye."""
 SECOND_PIXELS, SECOND_SEEN = 150, 0.5
 """A second needle leaves so many pixels of mask in either eye, and each eye sees so much of its arc."""
 MOST_SURE = 1.0 - 1e-5
-"""Of tip and swage: the evidence is no better than that."""
+"""Highest probability of which end is the tip: the evidence is no better than that."""
 DRAWS = 200
+"""Poses drawn from the covariance to tell the chance of being within TOLERANCE; by eye."""
 
 
 @dataclass(frozen=True)

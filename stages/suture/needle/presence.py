@@ -21,7 +21,9 @@ EDGE_ON = 0.25
 """Quarter turns from edge-on beyond which it makes no difference."""
 FEATURES = ("filled_least", "own", "facing")
 WEIGHTS = np.array([6.8, 16.79, 19.1])
+"""Weights (3,) of FEATURES, fitted on rendered tuning views (`python -m benchmarks.training.needle_presence`)."""
 BIAS = -23.27
+"""Constant of the logistic function, fitted with WEIGHTS."""
 
 
 def presence_features(rig: StereoRig, sheets: tuple[Sheet, Sheet], outline: Outline) -> np.ndarray:

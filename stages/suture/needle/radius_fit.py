@@ -39,7 +39,7 @@ STARTS, AT_A_RADIUS, REFINED = 6, 2, 8
 """Outlines begun with at each radius of the grid, and those of them that are kept; outlines from which the best radius
 is sought."""
 WIDTHS = (0.06, 0.02, 0.01)
-"""Half of what a parabola spans, as a share of the radius: the last one's curvature is the information."""
+"""Half of what each parabola spans, as a share of the radius: the last one's curvature is the information."""
 CALIBRATED = 1.45
 """Deviations are larger than the fit's by this, so that two of them held 95 % of the errors in 79 tuning views (seeds
 300 to 379, spoiled masks): lumps in masks err together over more pixels than VARIANCE counts."""

@@ -20,12 +20,17 @@ from scenewright.stages.suture.needle.windows import EyeMask
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 PIECES = 45
+"""Pieces of the outline along the arc; by eye."""
 ANGLES = np.linspace(0.0, np.pi, PIECES + 1)
+"""Angles [rad] of the pieces' ends, from the tip (0) to the swage (pi)."""
 WIRE_RADIUS, TIP_RADIUS, TAPER_ANGLE = 0.0005, 0.00004, 0.7
-"""Of the needle's data sheet: half the wire's and the tip's thickness [m]; the taper runs over 8.4 mm [rad]."""
+"""Half the wire's and the tip's thickness [m] of the needle's data sheet; the taper runs over 8.4 mm [rad]."""
 ALONG = np.clip(ANGLES / TAPER_ANGLE, 0.0, 1.0)
+"""Share of the taper at each of ANGLES, 1 from its end on."""
 RADII = TIP_RADIUS + (WIRE_RADIUS - TIP_RADIUS) * (1.0 - (1.0 - ALONG) ** 1.6)
+"""Half the wire's thickness [m] at each of ANGLES; the power of the taper is by eye."""
 ON_CIRCLE = NEEDLE_RADIUS * np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+"""Points (PIECES + 1, 2) of the arc in the needle's plane [m]."""
 GROWTH = 0.03
 """Masks are wider than the wire by this on either side [px]."""
 CALIBRATION_SIGMA = 0.3
@@ -39,7 +44,7 @@ HIDDEN_WEIGHT = 0.5
 LARGEST_STEP, LEAST_GAIN = 0.4, 0.05
 """A step turns by no more than this [rad]; steps that gain less [px] are the last."""
 OFF_BY = 0.8
-"""Where drawn and found outline are off by this [px] a polishing step counts them half: lumps are not the wire."""
+"""Distance [px] between drawn and found outline that a polishing step counts half: lumps are not the wire."""
 UNDETERMINED = np.diag([1.0 / 0.06**2] * 3 + [1.0 / 3.0**2] * 3 + [0.0] * 2)
 """Holds what the masks do not determine, in units of 60 mm and 3 rad."""
 

@@ -19,9 +19,13 @@ from scenewright.stages.suture.needle.windows import EyeMask
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 NEAREST, FARTHEST = 0.04, 0.80
+"""Depths [m] between which a needle may lie; by eye."""
 TRIPLES = 6000
+"""Triples of points through which circles are laid; by eye."""
 SCORED_ROWS, SCORED_DISPARITY = 1200, 300
+"""Circles that are scored, of those through points of rows and of those through points of the disparity; by eye."""
 LONGEST_RUN = 16
+"""Longest run of mask in a row that is taken for the wire's width [px]; by eye."""
 DIFFERENT = np.radians(12.0), 0.0025, np.radians(60.0)
 """Two starts differ if their planes [rad], centres [m] or the directions of their arcs' middles [rad] do by this."""
 CLOSE = 3.0

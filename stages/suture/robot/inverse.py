@@ -21,6 +21,7 @@ from scenewright.stages.suture.robot.psm import (
 )
 
 SMALLEST = 1e-9
+"""Lengths below this [m] have no direction."""
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

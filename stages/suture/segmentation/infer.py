@@ -13,6 +13,7 @@ from scenewright.stages.suture.segmentation.checkpoint import BUNDLED, load_netw
 from scenewright.stages.suture.segmentation.model import STRIDE, SutureNetwork
 
 THRESHOLD = 0.5
+"""Probability above which a pixel is mask."""
 SMALLEST_NEEDLE, SMALLEST_THREAD, SMALLEST_DRIVER = 25, 8, 200
 """Pieces of mask of fewer pixels are taken out."""
 

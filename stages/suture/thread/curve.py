@@ -9,8 +9,11 @@ from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
 DEGREE = 3
+"""Degree of the splines."""
 ROUNDS = 5
+"""Rounds in which samples are weighed anew; by eye."""
 FLAT = 1e-9
+"""Added to the information's diagonal, so that what nothing determines can be solved."""
 
 
 @dataclass(frozen=True)

@@ -19,15 +19,21 @@ NEAREST, FARTHEST = 0.06, 0.8
 ROWS = 2.0
 """Places up to so many rows away are considered."""
 ROW_SIGMA = 0.7
+"""Standard deviation of the rows between both eyes [px]; by eye."""
 EVERY = 2
 """One in so many points of the path is matched."""
 MOST_PLACES = 24
+"""Most places of the right eye that are considered for one point; by eye."""
 CARRIED = 8
+"""Cheapest places of a point from which one goes on to the next; by eye."""
 UNSEEN_COST = 2.5
+"""Cost of a point that the right eye does not see; by eye."""
 SLOPE, LEAST_STEP = 0.5, 0.5
+"""Change of the disparity that costs nothing [px/px of path], and what is added to it [px]; by eye."""
 SLOPE_IN_GAPS, GAP = 0.1, 16.0
-"""The disparity changes by about SLOPE px a px of path and LEAST_STEP more; over steps longer than GAP px by less."""
+"""The same over what a step is longer than GAP [px]; by eye."""
 HIGHEST_STEP_COST = 60.0
+"""Highest cost of a change of the disparity; by eye."""
 LARGEST_LEAN = 2.0
 """Rows that do not quite agree are made up for along the right eye's line where it leans less than so many columns a
 row."""

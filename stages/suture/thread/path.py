@@ -17,17 +17,19 @@ FIRST_GAP = 90.0
 GAP_UNIT, HIGHEST_COST = 45.0, 3.2
 """A gap costs its length in this unit [px] and its two turns [rad]; it is bridged up to the highest cost."""
 BLUNT = 7.0
-"""Over gaps shorter than this [px] the gap's own direction says nothing."""
+"""Length of a gap [px] below which its own direction says nothing; by eye."""
 CUT, MARGIN = 4.0, 8.0
-"""To begin in a strand's middle counts as so much farther away [px]; of beginnings that are so much [px] alike the one
-with the longest thread is taken, in doubt if another one's is longer than RIVAL of it."""
+"""Extra distance of a beginning in a strand's middle, and distance within which beginnings are alike [px]: of these the
+one with the longest thread is taken, in doubt if another one's is longer than RIVAL of it."""
 RIVAL = 0.3
+"""Length of another way, as a share of the best one's, from which on the start is in doubt; by eye."""
 FOLD, FOLD_COST = 40, 1.8
 """A strand whose first so many points lie beside the path's end, or that begins beside the path's last points, may go
 on from there: the thread turned back on itself."""
 CLEAR = 0.5
 """The next way must cost so much more, or the gap is in doubt."""
 DIRECTION_OVER = 14
+"""Points of a line's end from which its direction is taken; by eye."""
 
 
 @dataclass(frozen=True)

@@ -21,27 +21,41 @@ from scenewright.stages.suture.thread.strands import strands
 CENTRE_SIGMA = 0.35
 """Standard deviation [px] of a skeleton's point across the line; its errors are alike over CORRELATED pixels."""
 CORRELATED = 4.0
+"""Pixels of a line over which its errors are alike; by eye."""
 ROW_ERROR = 0.2
 """Standard deviation [px] between the eyes' rows: calibration."""
 COLUMN_ERROR = 0.15
-"""The same along rows; it shifts the whole curve and is not made smaller by many samples."""
+"""Standard deviation [px] between the eyes' columns: it shifts the whole curve, and many samples do not make it
+smaller."""
 BEND = 110.0
 """Standard deviation of the thread's curvature [1/m]."""
 PATH_SPACING, DISPARITY_SPACING = 8.0, 16.0
 """Distances of the splines' knots [px]."""
 CAUCHY = 2.5
+"""Misfit, in standard deviations, from which on a sample counts less; by eye."""
 FEWEST = 10
+"""Matched points that a curve needs; by eye."""
 LEVEL = 0.15
-"""Where the line rises by less than this [rows a px of line] the rows say little of its disparity."""
+"""Rise of the line [rows a px of line] below which rows say little of its disparity."""
 POINTS_EVERY = 0.0005
+"""Distance between points of the curve [m]; by eye."""
 BORDER = 4.0
+"""Width of the picture's border, where a thread leaves it [px]; by eye."""
 DOUBTED_GAP = 40.0
+"""Length of a gap from which on a curve is in doubt [px]; by eye."""
 DOUBTED_LEFT_OVER = 0.012
+"""Length of thread beside the curve from which on it is in doubt [m]; by eye."""
 DOUBTED_SHARE = 0.15
+"""Share of a curve in gaps, or vaguely known, from which on it is in doubt; by eye."""
 DOUBTED_LEVEL = 0.012
+"""Length of a stretch along the rows from which on a curve is in doubt [m]; by eye."""
 DOUBTED_UNMATCHED = 0.25
+"""Share of points without a match from which on a curve is in doubt; by eye."""
 DOUBTED_DEVIATION, DOUBTED_SOMEWHERE = 0.002, 0.006
+"""Standard deviation of a point that is vaguely known, and one from which on a single point puts the curve in doubt
+[m]; by eye."""
 DOUBTED_CUT = 0.003
+"""Length left out at the end from which on a curve is in doubt [m]; by eye."""
 
 
 @dataclass(frozen=True)

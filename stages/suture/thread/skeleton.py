@@ -18,6 +18,7 @@ SMOOTHING = 2.0
 AROUND_CENTRE = 4
 """The middle of the mask is sought in so many pixels on each side of a skeleton's pixel."""
 FARTHEST_MOVE = 1.0
+"""Farther than this a point is not moved across the line [px]; by eye."""
 AROUND = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 """(row, column) of the eight neighbours, clockwise from above."""
 

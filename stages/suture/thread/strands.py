@@ -20,11 +20,14 @@ LONGEST_SHARED = 60.0
 REACH = 12
 """Pixels of a branch from which its direction is taken, beyond SKIPPED ones: thinning bends lines at crossings."""
 SKIPPED = 3
+"""Pixels next to a crossing that say nothing of a branch's direction; by eye."""
 LARGEST_TURN = np.radians(80.0)
+"""Turn at a crossing beyond which two branches are not one thread [rad]; by eye."""
 CLOSE = np.radians(14.0)
 """A pairing is in doubt if another one's turns sum up to less than this more."""
 MOST_BRANCHES = 8
-"""Of more branches the pairs are taken one after the other, the straightest first."""
+"""Branches of a crossing of which all pairs are tried; of more, pairs are taken one after the other, the straightest
+first."""
 
 End = tuple[int, int]
 """A stretch's number and which of its ends: 0 or 1."""

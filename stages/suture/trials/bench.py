@@ -20,11 +20,15 @@ HOME = {
     "right": transform_from(jaws(np.array([0.5, 0.0, -0.85])), np.array([-0.050, 0.0, 0.055])),
     "left": transform_from(jaws(np.array([-0.5, 0.0, -0.85])), np.array([0.050, 0.0, 0.055])),
 }
+"""Arm -> pose (4, 4) of its tool at the beginning, world frame; by eye."""
 CORNER = transform_from(jaws(np.array([1.0, 0.0, 0.0])), np.array([-0.045, -0.030, 0.032]))
 """The lower, back, right corner: away from the cameras, on the right driver's side."""
 SHAFT, SHAFT_RADIUS = 0.06, 0.004
+"""Length of a tool's shaft that may touch, and its radius [m]; by eye."""
 TURNING_RADIUS = 0.02
+"""Way that a turn counts for in a motion's time [m/rad]; by eye."""
 SETTLING = 30
+"""Steps in which the thread comes to rest at the beginning; by eye."""
 CHECKED_EVERY = 5
 """Every so many poses of a path the arm is asked whether it reaches them, and at the last."""
 

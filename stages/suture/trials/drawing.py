@@ -31,8 +31,11 @@ COLORS = {
 MILLIMETRES = np.array([-1000.0, -1000.0, 1000.0])
 """Seen as by one who stands at the cameras, which look along -y: x runs to the left, away is up."""
 VIEWS = ((0, 2, "from the cameras"), (0, 1, "from above"))
+"""Axis across, axis up, and name of each view."""
 LIMITS = {0: (-72, 72), 1: (-76, 56), 2: (-4, 102)}
+"""Axis -> what of it is drawn [mm]."""
 ACROSS, SIDE = 6, 2.3
+"""Pictures in a row, and the side of one [inches]."""
 ORDER = "abcdefghijk"
 
 

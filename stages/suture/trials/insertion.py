@@ -13,7 +13,7 @@ from scenewright.stages.suture.trials.policy import Coordination
 from scenewright.stages.suture.trials.wound import entry, exit_, passage
 
 STAND_OFF = np.array([-0.008, 0.0, 0.0])
-"""From the place of insertion to where the push begins [m]."""
+"""Way from the place of insertion to where the push begins [m]; by eye."""
 
 
 def insert(bench: Bench, belief: Belief, coordination: Coordination) -> None:

@@ -10,7 +10,9 @@ from scenewright.stages.suture.trials.perception import Seen
 from scenewright.stages.suture.trials.policy import Trust
 
 LOOKS = 10
+"""Looks at one place before the needle is said to be unseen; by eye."""
 TOO_MANY_LOOKS = 60
+"""Most looks in the corner until enough are believed; by eye."""
 
 
 def until_known(look: Callable[[], Seen | None], most: int = LOOKS) -> Seen | None:

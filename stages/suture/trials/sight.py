@@ -38,11 +38,12 @@ SIGHTS = {
     "pictures": "estimates of rendered pictures of the trial, masks by the network",
 }
 LOOKS_OF_A_TRIAL = 100_000
+"""Distance between the seeds of two trials: more than a trial has looks."""
 CALIBRATION_ERROR, DISPARITY_NOISE = 0.15, 1.0
 """[px], those of the needle benchmark."""
 BODIES = {"right": RIGHT_DRIVER, "left": LEFT_DRIVER}
 HELD_OPEN, OPEN = 0.05, 0.35
-"""Half the angle between jaws [rad]."""
+"""Half the angle between jaws that hold the needle, and between open ones [rad]; by eye."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ from scenewright.stages.suture.world.render import Eye, StereoView
 from scenewright.stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD
 
 BLOOD = np.array([96.0, 10.0, 12.0])
+"""Colour of blood (RGB); by eye."""
 MOST_GLINTS, MOST_BLOOD = 14, 4
-"""Of one picture."""
+"""Most highlights and most stains of blood in one picture; by eye."""
 SUBPIXEL = 3
 """Bits of cv2's fixed-point coordinates."""
 

@@ -14,9 +14,11 @@ from scenewright.stages.suture.world.tubes import NEEDLE, Tubes
 from scipy.spatial.transform import Rotation
 
 SHADOW_SIZE, SHADOW_SCALE, SHADOW_ORIGIN = 800, 2000.0, -0.20
+"""Side of the shadow picture [px], its scale [px/m], and the world's x and y at its corner [m]; by eye."""
 NEAR = 70
-"""Without pictures only this many pixels about the needle are drawn."""
+"""Pixels about the needle that are drawn where no pictures are wanted."""
 ARC_ANGLES = np.linspace(0.0, np.pi, 121)
+"""Angles [rad] of the needle at which it is said whether an eye sees it."""
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,11 @@ import numpy as np
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose
 
 NEEDLE, THREAD, LEFT_DRIVER, RIGHT_DRIVER = 1, 2, 3, 4
+"""Numbers of the bodies in pictures."""
 WIRE_RADIUS = 0.0005
 """Half the thickness of the needle's wire [m]; a needle for a 2-0 thread is about 1 mm thick."""
 TIP_RADIUS = 0.00004
+"""Half the thickness of the needle's tip [m]."""
 
 
 @dataclass(frozen=True)

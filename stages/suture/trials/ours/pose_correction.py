@@ -17,6 +17,7 @@ from scenewright.stages.suture.trials.places import NOMINAL
 from scenewright.stages.suture.trials.policy import Trust
 
 SERVO_TURNS, SERVO_LOOKS, FEWEST_POSES, SERVOED = 4, 5, 2, np.radians(3.0)
+"""Most turns of the correction, looks of each, poses that are needed, and the error at which it ends [rad]; by eye."""
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,15 @@ from scenewright.stages.suture.trials.thread import draw, pull_on
 TAIL_TO_LEAVE = 0.030
 """What bookkeeping leaves behind the first hole [m]."""
 BOOK_MARGIN = 0.002
+"""Thread that bookkeeping leaves over [m]; by eye."""
 WANTED = 0.080
 """Thread [m] between stitch and needle that handover and pose correction take."""
 LAST_DRAWN = 3
-"""From this suture (0 to 5) on, friction in the stitches made holds the tail: what is wanted later is drawn here."""
+"""Suture (0 to 5) from which on friction in the stitches made holds the tail: what is wanted later is drawn here."""
 PULLS_ON, LOOSE_SEEN, LOOSE_ERROR = 2, 0.003, 0.001
 """How often thread seen loose is pulled on, from what length [m] on, and what it is off by [m] beside its share."""
 LONGEST_PUSH, SHORT_BY = 0.05, 0.005
+"""Longest push sideways, and by how little too short a thread may be [m]; by eye."""
 
 
 class ByTheBooks:

@@ -13,6 +13,7 @@ PASSES = 0.010
 """A needle seen farther than this [m] from where it must be is not believed: jaws are 12 mm deep, and thread that pulls
 turns a needle about their middle."""
 LOOKS_AFTER = 20
+"""Looks after an extraction until one is believed; by eye."""
 
 
 class InPlace:
