@@ -23,8 +23,9 @@ from scenewright.stages.tableware.world.items import Table
 from scenewright.stages.tableware.world.setting import Gripper, Setting
 
 ANIMATION_WIDTH = 560
+"""Largest width of an animation [px]; by eye."""
 SIMULATION = "scenewright.stages.tableware.simulation"
-"""Its modules of physics are loaded only when they are asked for."""
+"""Package whose modules of physics are loaded only when they are asked for."""
 Again = Callable[[Table, Done, int], Action]
 """Decides in the policy's place after actions that changed nothing (trial.run_in)."""
 

@@ -18,8 +18,9 @@ from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Kind, Ta
 from scenewright.stages.tableware.world.setting import Gripper
 
 SUPERSAMPLING = 2
+"""Sub-pixels of a pixel along each side."""
 MARGIN = 0.03
-"""Around the table [m]."""
+"""Room around the table in a picture [m]."""
 COLORS: dict[Kind, str] = {
     "bowl": "#5b8fc9",
     "cup": "#e0904a",

@@ -23,6 +23,7 @@ from scenewright.stages.tableware.planning.trip_options import Part, TripOptions
 from scenewright.stages.tableware.world.items import Table
 
 MOST_ITEMS = 16
+"""Most items that the exact optimum takes: its tables have 2^items rows."""
 SAME_PLACE = 1e-6
 """Things that stand no farther [m] from where they stood have not moved."""
 

@@ -21,6 +21,7 @@ FRICTION = 0.5
 """Coefficient of friction between a foot and a table that is reckoned with: plastic and china on wood have 0.2 to 0.5;
 on cloth it may be more."""
 GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
 HEADINGS = 8
 """Directions of a pull that are tried: fingers that go in beside a utensil do not in every one."""
 

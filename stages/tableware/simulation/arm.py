@@ -20,20 +20,21 @@ from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolut
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 BASE = np.array([0.0, -0.46, 0.15])
-"""Where the arm stands, higher than the table top: else the upper arm sweeps dishes off it when it reaches far [m]."""
+"""Place of the arm [m], higher than the table top: else the upper arm sweeps dishes off it when it reaches far."""
 PAD_FRICTION, BACK_FRICTION = 1.6, 0.3
-"""Of rubber pads, and of the bare metal that pushes a dish from inside; Bullet multiplies the two of a contact."""
+"""Friction of rubber pads, and of the bare metal that pushes a dish from inside; Bullet multiplies the two of a
+contact. By eye."""
 PAD_STIFFNESS, PAD_DAMPING = 4.0e4, 2.0e2
 """Give of the rubber [N/m, N s/m]: 2.5 MPa over a patch of 22 by 3 mm, 4 mm thick. Rigid pads would hold one of two
 utensils that lie on each other, the one wider by a tenth of a millimetre."""
 JOINT_EFFORTS = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
 """Torques [N m] of the UR5's joints."""
 CLOSING_SPEED = 0.06
-"""Of each finger [m/s]."""
+"""Speed of each finger [m/s]."""
 PAUSE = 0.15
-"""Before and after each movement of the fingers [s]."""
+"""Wait before and after each movement of the fingers [s]; by eye."""
 STEP = 0.02
-"""Between two poses of the tool on a straight way [m]."""
+"""Distance between two poses of the tool on a straight way [m]; by eye."""
 ROOM_TO_TURN = pi
 """The last joint turns two half turns either way from its middle; an empty hand begins within one of them [rad]."""
 WRIST_OFFSET = 0.10915

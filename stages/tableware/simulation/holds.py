@@ -21,19 +21,20 @@ JAW_HEIGHT, PAD, PAD_WIDTH, KNUCKLE = 0.045, 0.007, 0.022, 0.014
 DEPTH = 0.020
 """How far the pads reach below the lowest lip where they can [m]."""
 PAIR_DEPTHS, PAIR_ROOMS, PAIR_FREE = (0.030, 0.022, 0.014), (0.007, 0.004), 0.001
-"""When two dishes are pressed together: how far the pads reach below the lowest lip, how far open ones keep from the
-walls, the best first, and what they keep from all else there [m]."""
+"""For two dishes that are pressed together: how far the pads reach below the lowest lip, how far open ones keep from
+the walls, the best first, and what they keep from all else there [m]; by eye."""
 FLAT_DEPTH, MOST_LEAN = 0.008, 0.5
 """The first for a plate, whose rim is nearer to the table; the most that the hand leans [rad]: plates slant by more."""
 ROOM = 0.007
-"""Between an open pad and the wall on each side [m]."""
+"""Room between an open pad and the wall on each side [m]; by eye."""
 PALM_ROOM = 0.003
+"""Room between the palm and the highest lip [m]; by eye."""
 PAIR_SHIFTS = (0.0, 0.01, -0.01, 0.02, -0.02)
-"""Where two utensils side by side are taken, from the middle between them along them [m], the best first."""
+"""Places at which two utensils side by side are taken, from the middle between them along them [m], the best first."""
 FREE = 0.003
 """What open jaws keep from others [m]."""
 ABOVE = 0.0005
-"""Of the fingertips over the table when they take a utensil [m]."""
+"""Height of the fingertips over the table when they take a utensil [m]; by eye."""
 HAND = Gripper()
 """The standard one, whose measures the constants above are."""
 

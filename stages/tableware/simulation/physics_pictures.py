@@ -24,14 +24,20 @@ from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Measures
 from scenewright.stages.tableware.world.shape_files import COLORS
 
 EYE, TARGET = np.array([0.62, 1.02, 0.80]), np.array([0.14, -0.12, 0.0])
+"""Place of the eye, and the point that it looks at [m]; by eye."""
 FIELD_OF_VIEW = np.deg2rad(58.0)
+"""Horizontal field of view [rad]; by eye."""
 ASPECT = 0.62
+"""Height of a picture over its width."""
 TABLE_COLOR, BIN_COLOR, ARM_COLOR, HAND_COLOR = (236, 232, 224), (120, 128, 140), (176, 184, 194), (90, 98, 110)
+"""Colours (RGB) of the table, the bin, the arm and the hand."""
 BIN_DEPTH, WALL = 0.12, 0.008
+"""Depth of the bin, and thickness of its walls, as drawn [m]."""
 HAND_LINKS = ("hand", "left_finger", "right_finger")
 SHOWN = ("inside", "pulled", "placed", "lifted", "over the bin", "released")
 """Moments that are shown, of all that are recorded."""
 MOST_FRAMES = 64
+"""Most frames of an animation; by eye."""
 
 
 class PhysicsPictures:

@@ -18,7 +18,7 @@ from scenewright.stages.tableware.world.items import Item, Table
 NEAR = 0.015
 """An item that is seen within this [m] of where one of its kind stands is seen rightly."""
 LEAST_CONFIDENCE = 0.3
-"""Of what is planned for, as the command's."""
+"""Least confidence of what is planned for, as the command's."""
 
 Sight = Literal["truth", "image"]
 

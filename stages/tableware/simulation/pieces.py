@@ -18,11 +18,12 @@ from scenewright.stages.tableware.world.items import Kind, Measures
 OUTER = 3
 """Facets of a wedge's outer face: nearly round, while the inner face is one facet."""
 THINNEST = 2e-4
-"""Of a piece without its margin [m]."""
+"""Least thickness of a piece without its margin [m]; by eye."""
 FOOT = 0.0006
-"""By how much the floor stands clear of the table, so that the dish rests on its foot ring all round [m]."""
+"""Height at which the floor stands clear of the table, so that the dish rests on its foot ring all round [m]; by
+eye."""
 MARGIN = 0.001
-"""By which Bullet rounds convex hulls off [m]."""
+"""Distance by which Bullet rounds convex hulls off [m]."""
 DISH_DENSITY = 1500.0
 """Melamine [kg/m^3]."""
 UTENSIL_DENSITY = 7800.0

@@ -12,6 +12,7 @@ from scenewright.stages.tableware.planning.policy import Policy
 from scenewright.stages.tableware.world.items import Table
 
 MOST_ACTIONS, MOST_IDLE = 400, 8
+"""Most actions of a trial, and most in a row that move nothing; by eye."""
 STILL = 0.004
 """What moved less than this [m] has not been moved."""
 

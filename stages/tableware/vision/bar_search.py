@@ -14,6 +14,7 @@ ALONG, ACROSS = 4.0, 2.5
 FLANK = 0.6
 """What is beside a bar counts against it by this."""
 DIRECTIONS = 45
+"""Directions of bars in half a turn; by eye."""
 
 
 @njit(cache=True)

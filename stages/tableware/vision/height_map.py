@@ -13,9 +13,11 @@ from scenewright.stages.tableware.world.items import TABLE_SIDES
 from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 TALLEST = 0.20
-"""Nothing on the table reaches higher [m]."""
+"""Height above which nothing on the table reaches [m]."""
 LOWEST = np.float32(-0.02)
+"""Height to which lower ones are cut [m]; by eye."""
 LEAST_VALID = 0.2
+"""Share of pixels with depth that an image needs; by eye."""
 PLANE_WIDTH = 0.0025
 """Width of the last fit's weights [m]: the noise of a dim image."""
 PLANE_BAND, PLANE_OFF = 0.015, 0.03

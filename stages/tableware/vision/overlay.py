@@ -22,7 +22,9 @@ COLORS = {
 }
 """sRGB by kind; None is unknown."""
 SURE = 0.9
+"""Confidence from which on an outline is drawn full; by eye."""
 FONT, LINE = cv2.FONT_HERSHEY_SIMPLEX, 20
+"""Font of the labels, and height of a line of text [px]."""
 HALO = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """Offsets [px] of a label's dark edge."""
 

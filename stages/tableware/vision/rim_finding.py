@@ -17,7 +17,7 @@ from scenewright.stages.tableware.vision.rim_votes import cast_votes
 from scenewright.stages.tableware.world.items import DishSizes, Kind
 
 LEAST_SLOPE = 0.0012
-"""Of an edge [m/px]."""
+"""Least slope of an edge [m/px]; by eye."""
 LEAST_VOTES, LEAST_SUPPORT = 0.22, 0.42
 """Shares of the circumference that must vote, and that the fitted circle must explain."""
 

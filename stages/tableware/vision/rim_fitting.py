@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 DIRECTIONS = 96
+"""Directions in which the fall of a rim is looked for; by eye."""
 WINDOW = 14
 """Pixels on either side of the expected circle that are searched."""
 LEAST_STEP = 0.006
@@ -15,7 +16,9 @@ LEAST_STEP = 0.006
 CREST = 0.012
 """The height before a fall may differ this much [m] from the lip's."""
 _ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+"""Angles [rad] of these directions."""
 RAYS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
+"""The same as unit vectors (DIRECTIONS, 2)."""
 
 
 @njit(cache=True)

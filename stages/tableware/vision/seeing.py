@@ -26,12 +26,13 @@ from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 Sizes = Literal["known", "estimated"]
 LEAST_SIZE = (240, 180)
-"""Of an image [px]."""
+"""Least width and height of an image [px]."""
 MILLIMETRES = 20.0
 """A median depth beyond this [m] is one in millimetres."""
 LEVEL = 0.9995
 """Cosine of the angle to the vertical, from which a camera looks straight down."""
 OBLIQUE, OBLIQUE_TRUST = np.deg2rad(15.0), 0.8
+"""Tilt of the camera [rad] from which on what was seen is trusted less, and by which factor; by eye."""
 OBLIQUE_VIEW = "oblique view"
 """A view this far off the vertical is oblique; what is left of a confidence there."""
 OVER_MIDDLE = 0.002
@@ -43,7 +44,7 @@ COARSE = 350.0
 GLARE_AREA = 0.0004
 """Saturated colour without depth on more than this [m^2] hides what is there."""
 HOLE_AREA = 0.002
-"""So do holes in the depth of more than this [m^2] that are 14 mm wide at least."""
+"""Area of a hole in the depth [m^2] from which on it is reported; it has to be 14 mm wide at least."""
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,13 @@ ROUGH = 3.0
 AROUND = 0.012
 """What is this near to a dish belongs to it: handles, what flies about its edge [m]."""
 DRAWS = 200
+"""Triples of points through which circles are laid; by eye."""
 NEAR = 0.0035
 """Points this near to a circle are on it [m]."""
 LEAST_TRIED, SURE_ROUND = 0.30, 0.70
 """Shares of a circle's directions from which it is looked at, and from which more adds nothing to the confidence."""
 RADII = (0.028, 0.160)
+"""Least and largest radius of a dish [m]."""
 HOLLOW_SHARE = 0.4
 """What is inside of a dish's edge lies lower than it by `hollow` or by this share of its height, whichever is less."""
 

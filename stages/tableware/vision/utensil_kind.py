@@ -22,8 +22,10 @@ LEAST_CONTRAST = 15.0
 SHIFTS = (0.0, 0.005, -0.005)
 """A spoon is 10 mm shorter: where the head ends may be off by half of that [m]."""
 WEIGHTS: dict[str, tuple[float, float, float]] = {"table": (26.8, 1.7, 2.2), "dish": (26.1, 1.6, 4.6)}
-"""Of the outlines' difference in score, the tines' height [mm] and their colour over the contrast, less MIDDLE."""
+"""Weights of the outlines' difference in score, of the tines' height [mm] and of their colour over the contrast, less
+MIDDLE."""
 MIDDLE: dict[str, tuple[float, float, float]] = {"table": (0.0, 1.3, 0.3), "dish": (0.0, 1.3, 0.3)}
+"""Features at which fork and spoon are equally likely, of utensils on the table and on a dish."""
 
 
 def kind_features(

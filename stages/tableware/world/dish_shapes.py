@@ -12,6 +12,7 @@ import trimesh
 from scenewright.stages.tableware.world.items import Item, Measures
 
 SIDES = 64
+"""Corners of a dish's circles as a mesh; by eye."""
 HEAD_SHARE = 0.36
 """Share of a utensil's length that is its head."""
 NECK_SHARE, HANDLE_SHARE = 0.32, 0.55

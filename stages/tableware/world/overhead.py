@@ -55,6 +55,7 @@ LEVELS: dict[str, Level] = {
     "usual": Level(key=0.45, ambient=0.25, grain=4.0, gloss=0.25, dark_signal=0.015, axial=0.001),
     "dim": Level(key=0.18, ambient=0.07, grain=7.0, gloss=0.6, dark_signal=0.035, axial=0.002),
 }
+"""Name of a light -> exposure, ambient share, grain, gloss and noise of the depth; by eye."""
 _TONES: dict[Scheme, tuple[float, float]] = {"dark_on_white": (0.90, 0.22), "white_on_dark": (0.20, 0.88)}
 """sRGB of table and of dishes."""
 

@@ -43,6 +43,7 @@ class Tier:
 
 
 MIXED: dict[Kind, int] = {"bowl": 4, "cup": 4, "fork": 2, "spoon": 2}
+"""Kind -> number of items on a table of tiers 1 and 2."""
 TIERS: dict[str, Tier] = {
     "tier0_cups": Tier({"cup": 6}),
     "tier0_bowls": Tier({"bowl": 6}),
@@ -51,6 +52,7 @@ TIERS: dict[str, Tier] = {
     "tier2": Tier(MIXED, intersections=4, highest=3),
     "tier3": Tier({**MIXED, "plate": 2}, intersections=7, highest=4, touching=0.5),
 }
+"""Name of a tier -> what is on its table (section 7.1; the fourth is ours)."""
 
 
 def make_table(tier: str, seed: int, sizes: DishSizes = STANDARD) -> Table:
