@@ -20,12 +20,15 @@ from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 Limits = Literal["fr3", "panda"]
 FR3_LOWER = np.array([-5.3093, -1.5133, -2.4937, -2.7478, -2.48, 0.8521, -5.7995])
+"""Lower joint limits [rad] of the published environment (docs/LLM3.md)."""
 FR3_UPPER = np.array([5.3093, 1.5133, 2.4937, -0.4461, 2.48, 4.2094, 5.7995])
-"""Joint limits [rad] of the published environment (docs/LLM3.md)."""
+"""Upper joint limits [rad] of the published environment (docs/LLM3.md)."""
 HOME = np.array([0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4])
+"""Home configuration [rad], Franka's own."""
 SEARCHES = 10
 """Random seeds of the numeric search, beside the nearest planar configuration and the home one."""
 LEAN_OUT = np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0])
+"""Turn of the elbow out of the plane in which a search starts [rad]; by eye."""
 
 
 @dataclass(frozen=True)

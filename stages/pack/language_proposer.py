@@ -22,6 +22,7 @@ TRACE_LENGTH = 5
 ORDER_CALLS = 5
 """Orders that the model may be asked for in one proposal, each without an arrangement before."""
 MOST_NAMES = 100
+"""Most names in an answer; by eye."""
 
 PlacementSolver = Callable[[Observation, tuple[str, ...], Sequence[Attempt]], "tuple[Action, ...] | Failure"]
 """Observation, names in the order to pack, the trace -> the full plan of picks and places, or why there is none."""

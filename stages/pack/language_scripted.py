@@ -22,6 +22,7 @@ from scenewright.stages.pack.language_prompt import Variant
 from scenewright.stages.pack.language_reading import Place, Seen, SeenPlan, read_prompt
 
 PLACES_LOOKED_AT = 3
+"""Draws of a placement of which the roomiest is taken; by eye."""
 TURNED = 0.2
 """Share of boxes that are put down turned by a quarter."""
 OFFENDER_MOVED = 0.3

@@ -23,9 +23,11 @@ SCORE, ROW_X, ROW_Y, ROW_TURN = 0, 1, 2, 3
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = 0, 1, 2, 3
 """Columns of rectangles."""
 NODES = 500
+"""Most nodes of one search; by eye."""
 RESTARTS = 16
+"""Searches with other orders; by eye."""
 HAND_GAP, TOUCH_GAP = 0.001, 0.0011
-"""Between the hand and what it must not hit, and where positions are tried [m]."""
+"""Gap between the hand and what it must not hit, and gap at which positions are tried [m]; by eye."""
 DENSEST = 0.97
 """Share of the container beyond which no layout is looked for."""
 

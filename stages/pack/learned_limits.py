@@ -14,6 +14,7 @@ from scenewright.stages.pack.records import Action, Attempt, BoxState, Observati
 from scenewright.stages.pack.solids import block_over, flat_depth
 
 REACH_MARGIN = 0.001
+"""Distance by which reach is set below what failed [m]; by eye."""
 REFUSED_SIDE = 0.012
 """Half side [m] of the square of placements that are not tried again when no cause was understood."""
 

@@ -16,13 +16,17 @@ from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolut
 from scenewright.stages.pack.arm import FixedArm, Limits, planar_joints
 
 STEP = 0.02
+"""Distance between two entries [m]; by eye."""
 MARGIN = 0.02
-"""Between two entries the lowest point moves by less than this [m]."""
+"""Largest change of the lowest point between two entries [m]."""
 RADII = np.arange(0.20, 0.83, STEP)
+"""Distances of the tool from the arm's axis [m]."""
 HEIGHTS = np.arange(0.04, 0.56, STEP)
+"""Heights of the tool [m]."""
 BASE_RADIUS = 0.27
 """Links 0 to 2 stay within this distance of the axis, up to the shoulder [m]; link 3 begins there."""
 LINKS = tuple(f"panda_link{number}" for number in range(3, 8))
+"""Links whose lowest point is kept."""
 
 
 @cache

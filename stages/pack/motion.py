@@ -24,13 +24,13 @@ from scenewright.stages.pack.solids import overlap
 OVER = 0.015
 """What is carried over something passes this far above it [m]."""
 STRIDE = 0.03
-"""Between two configurations of an up-over-down path [m]."""
+"""Distance between two configurations of an up-over-down path [m]; by eye."""
 RESOLUTION = 0.05
 """Largest step of a joint between two mesh checks [rad]."""
 SAMPLES = 60
 """Samples of one search, as many as the published planner draws in its three tries."""
 HOME_POSE = ToolPose(0.306891, 0.0, 0.485302, 0.0)
-"""Where the tool is at the home configuration."""
+"""Pose of the tool at the home configuration."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from scenewright.stages.pack.records import Action, Attempt, BoxState, Observati
 from scenewright.stages.pack.sampling import pick_and_place
 
 QUARTER = pi / 2
+"""Quarter turn [rad]."""
 RESTARTS = (2, 2, 3, 6, 16, 16, 16)
 """Orders of boxes tried at each spacing: a roomy layout is found soon or not at all."""
 SPACING = ((0.02, 0.0), (0.012, 0.0), (0.007, 0.0), (0.004, 0.0), (0.0025, 0.0), (0.0025, 0.006), (0.0015, 0.012))

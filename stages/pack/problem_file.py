@@ -15,6 +15,7 @@ from scenewright.stages.pack.records import BoxState, Rectangle
 from scenewright.stages.pack.solids import overlap
 
 LARGEST_FILE = 1_000_000
+"""Largest file that is read [bytes]; by eye."""
 FORM = "docs/LLM3.md shows the form"
 
 
