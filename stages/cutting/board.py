@@ -11,13 +11,15 @@ from scenewright.stages.kit.geometry.transforms import transform_from_quaternion
 from scenewright.stages.kit.simulation.engine import engine
 
 SIZE = (1.2, 0.6)
-"""Of the board [m]; its top is at z = 0, the floor far below."""
+"""Length and width of the board [m]; its top is at z = 0, the floor far below."""
 DENSITY = 900.0
 """[kg/m^3]."""
 TIME_STEP, SECONDS = 1 / 480, 0.75
+"""Time step of the physics and time that fragments get to come to rest [s]; by eye."""
 LIFT = 0.001
-"""From which fragments fall [m]."""
+"""Height from which fragments fall [m]; by eye."""
 DIRECTIONS = 96
+"""Directions in which a fragment's outermost points are sought; by eye."""
 
 
 class Board:

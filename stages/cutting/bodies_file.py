@@ -12,6 +12,7 @@ from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 HINT = "make the artifact again"
 MOST_BODIES = 8192
+"""Most bodies of a file; by eye."""
 
 
 def write_bodies(path: Path, bodies: Sequence[Body]) -> None:

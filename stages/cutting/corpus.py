@@ -14,6 +14,7 @@ from scenewright.stages.kit.geometry.transforms import inverse
 POINTS, QUERIES = 256, 384
 """Surface points that the encoder sees, and places at which the decoder is asked, of each fragment."""
 QUERY_VOXELS = 24
+"""Voxels along the longest edge, of the grid on which the decoder is asked; by eye."""
 
 
 @dataclass(frozen=True)

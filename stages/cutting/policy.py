@@ -15,7 +15,7 @@ from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 MOST_REFUSALS = 20
 """One after the other, after which nothing more is tried."""
 GAP = 0.005
-"""By which fragments are pushed apart [m]."""
+"""Distance by which fragments are pushed apart [m]; by eye."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from scenewright.stages.cutting.world.canonical import canonical
 from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 
 ATTEMPTS = 8
-"""To place a plane that the knife cuts."""
+"""Most attempts to place a plane that the knife cuts; by eye."""
 
 
 @dataclass(frozen=True)

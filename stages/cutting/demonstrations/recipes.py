@@ -46,6 +46,7 @@ CELLS = {
 }
 """110 trials in all, as in section 6.4.1, which does not say how many each; 40 % of n1m1 are for training."""
 TRAINING_SHARE = 0.4
+"""Share of the trials of n1m1 that are for training."""
 
 
 def equal_parts(axis: int, count: int, then: Recipe) -> Recipe:

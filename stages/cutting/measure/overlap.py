@@ -10,7 +10,7 @@ from scenewright.stages.cutting.world.voxels import Grid
 from scipy.optimize import linear_sum_assignment
 
 VOXELS = 48
-"""Along the longest edge of the two fragments."""
+"""Voxels along the longest edge of the two fragments; by eye."""
 
 
 def overlaps(made: Sequence[Canonical], wanted: Sequence[Canonical]) -> np.ndarray:

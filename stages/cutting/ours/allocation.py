@@ -20,8 +20,9 @@ from scenewright.stages.cutting.ours.structures import (
 )
 
 MOST_PIECES = 4
-"""Beyond these, pieces are filled one by one."""
+"""Most pieces that are filled together; of more, one is filled after the other. By eye."""
 MOST_GROUPS = 6
+"""Most groups of fragments; by eye."""
 BEAM, FINALISTS = 60, 6
 """Ways to share groups among the pieces that are judged on points, and then by whole trees."""
 UNLIKE = 0.5
@@ -30,11 +31,11 @@ fragments of two pieces differ by little."""
 MOST_WAYS = 4000
 """Partly shared out, that are gone on with."""
 SLACK = 0.3
-"""By how much of a piece's volume a way may miss it, by the groups' mean volumes."""
+"""Share of a piece's volume by which a way may miss it, by the groups' mean volumes; by eye."""
 SETTLED = 12
 """Ways that are settled by volumes."""
 VOLUME_DEVIATION = 0.02
-"""Of the volume of a piece beside that of its fragments, as a share: what seeing adds."""
+"""Standard deviation of a piece's volume beside that of its fragments, as a share: what seeing adds. By eye."""
 DONE = 0.9
 """Likeness at which a piece is taken for a fragment that is wanted."""
 

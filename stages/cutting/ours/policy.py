@@ -17,7 +17,8 @@ from scenewright.stages.cutting.world.body import Body, Plane
 from scenewright.stages.cutting.world.knife import Knife, face_edges
 
 DOUBT = 0.02
-"""Of what is there that a goal may ask for beyond it, or leave over without that being a fragment of its own."""
+"""Share of what is there that a goal may ask for beyond it, or leave over without that being a fragment of its own; by
+eye."""
 TILT, ASIDE = 0.12, 0.12
 """Angle [rad] and distance, as a share of a part's thickness, by which one cut through several pieces may miss the
 planes that each would get alone: about what the scripted cutter misses."""

@@ -22,7 +22,7 @@ UNLIKE = 1.5
 MOST_GROUPS = 4
 """Groups of unlike fragments that are set apart within one piece before anything else."""
 MOST_BITS = 60.0
-"""That one fragment which does not fit can cost: one odd fragment does not decide."""
+"""Highest cost of one fragment which does not fit [bits], so that one odd fragment does not decide; by eye."""
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,13 @@ from scenewright.stages.kit.geometry.transforms import look_at
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 WIDTH, HEIGHT = 480, 360
-"""Of one picture [px]."""
+"""Size of one picture [px]."""
 EYES = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
+"""Directions from which it is looked: above, front and end."""
 UPS = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+"""Direction that is up in each picture."""
 FAR = 8.0
-"""From where it is looked [m]: so far that planes through the eye are almost parallel to each other."""
+"""Distance from which it is looked [m]: so far that planes through the eye are almost parallel to each other."""
 SHORTEST = 8.0
 """Distance between two clicks that is a line [px]."""
 

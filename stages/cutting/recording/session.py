@@ -18,9 +18,9 @@ from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 GAP = 0.008
-"""By which what was cut is pushed apart [m]."""
+"""Distance by which what was cut is pushed apart [m]; by eye."""
 CELL = "n1m1"
-"""Of the thesis's table: one object, one category."""
+"""Cell of the thesis's table: one object, one category."""
 HINT = "give the file of a recording (scenewright cutting record FILE)"
 LYING = transform_from(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]), np.zeros(3))
 """Spine along x, shortest edge up."""

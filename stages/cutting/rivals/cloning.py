@@ -17,8 +17,11 @@ from scenewright.stages.cutting.thesis.model import FEATURES
 from scenewright.stages.cutting.world.body import Body
 
 EMBEDDING = 32
+"""Numbers of the embedding of a piece; by eye."""
 DISCOUNT, MARGIN = 0.95, 0.2
+"""Discount of a later cut, and the margin by which other pieces are worth less; by eye."""
 STEPS, BATCH = 600, 16
+"""Steps of the training and examples of a step; by eye."""
 POOL = 0.1
 """Sums over fragments are brought to the size of one of ten."""
 Rule = Literal["bc", "qnet"]

@@ -15,6 +15,7 @@ BETWEEN = 0.05
 ROW = 0.5
 """Length of a row, where all fragments are laid out together [m]."""
 UP = np.array([0.0, 0.0, 1.0])
+"""Direction up (3,)."""
 
 
 class Hand:

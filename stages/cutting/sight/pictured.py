@@ -27,8 +27,11 @@ from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 HINT = "a folder of color.png, depth.png and camera.json, or of such folders (docs/CUTTING.md)"
 MILLIMETRE = 0.001
+"""Unit of the depth in files [m]."""
 MOST_CAMERAS, MOST_PIXELS, LARGEST_CAMERA = 8, 10_000_000, 100_000
+"""Most cameras, most pixels of a picture, and the largest file of a camera [bytes]; by eye."""
 WOOD = np.array([196, 164, 124, 255], np.uint8)
+"""Colour (RGBA) of the board."""
 
 
 class CameraFile(Model):

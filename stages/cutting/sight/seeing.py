@@ -22,9 +22,10 @@ FEWEST = 40
 LATTICE = 40
 """Steps along a fragment's longest edge, but none finer or coarser than these [m]."""
 FINEST, COARSEST = 0.0008, 0.0025
+"""Finest and coarsest step of the lattice that is carved [m]; by eye."""
 DOUBT = 0.15
-"""By which share of volume what two cameras see may be off: more than that which is wanted and that which is there
-differ by where nothing is left over."""
+"""Share of volume by which what two cameras see may be off. Where wanted and seen volume differ by less, nothing is
+left over or missing."""
 DOUBT_OF_ONE = 0.35
 """The same of one camera: undersides that it does not see are filled down to the board."""
 BLUR = 0.8

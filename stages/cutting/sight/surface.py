@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 
 _UNIT = np.eye(3, dtype=np.int64)
+"""Unit steps along the axes of the lattice."""
 _TETRAHEDRA = np.array(
     [[np.zeros(3, int), _UNIT[a], _UNIT[a] + _UNIT[b], np.ones(3, int)] for a, b, _ in permutations(range(3))]
 )
@@ -50,3 +51,4 @@ def zero_surface(field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 _QUAD = (((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2)))
+"""The two triangles of a tetrahedron's section with four corners, by the edges that they lie on."""

@@ -15,14 +15,15 @@ from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
 from scenewright.stages.kit.rendering.depth_noise import disturb_depth
 
 WIDTH, HEIGHT, FOCAL = 1280, 720, 900.0
-"""Of the sensors [px]."""
+"""Size and focal length of the sensors [px]."""
 EYES = (np.array([0.32, 0.32, 0.45]), np.array([-0.32, -0.32, 0.45]))
-"""Where the cameras stand [m]: opposite each other and across the rows, so that both see the board's middle."""
+"""Places of the cameras [m]: opposite each other and across the rows, so that both see the board's middle."""
 FRAMES = 9
-"""That a camera takes of a board on which nothing moves; of each pixel the median counts."""
+"""Frames that a camera takes of a board on which nothing moves; of each pixel the median counts. By eye."""
 REFLECTANCE = 0.4
+"""Reflectance of all that is seen; by eye."""
 MARGIN = 14
-"""Of board around what lies there that is looked at [px]."""
+"""Width of board around what lies there that is looked at [px]; by eye."""
 
 
 @dataclass(frozen=True)

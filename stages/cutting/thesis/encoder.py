@@ -12,7 +12,9 @@ from scenewright.stages.cutting.world.body import Body
 from scenewright.stages.cutting.world.canonical import Canonical, canonical
 
 CODE = 16
+"""Numbers of a shape's code; widths are not stated in the thesis: by eye."""
 STEPS, BATCH = 800, 24
+"""Steps of the training and shapes of a step; not stated in the thesis: by eye."""
 
 
 class Encoder(torch.nn.Module):

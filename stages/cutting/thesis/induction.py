@@ -9,6 +9,7 @@ from scenewright.stages.cutting.corpus import Corpus
 from scipy.cluster.vq import kmeans2
 
 MOST_TYPES = 9
+"""Most types that are tried; by eye."""
 GAMMA = 0.28
 """Coefficient of the model's size in eq. 6.1, per production of the corpus. The thesis states neither its value nor its
 sign: with fewer types productions become likelier, so that a grammar of one type would win were it not positive. At

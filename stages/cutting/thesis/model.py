@@ -14,6 +14,7 @@ from scenewright.stages.cutting.thesis.encoder import CODE, Features, train_enco
 from scenewright.stages.cutting.thesis.induction import Grammar, induce, production_of
 
 FEATURES = CODE + 1
+"""Numbers of a piece: its shape's code and the logarithm of its size."""
 
 
 @dataclass(frozen=True)

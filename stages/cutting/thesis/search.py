@@ -12,11 +12,13 @@ from scipy.optimize import linear_sum_assignment
 ROUNDS = 160
 """Rollouts a decision; the thesis does not say."""
 EXPLORATION = 0.7
+"""Weight of exploration; by eye."""
 ANNEALED = 6
 """Rollouts, the best by prior and shapes, that are annealed for the layout: all of them would take minutes a cut."""
 SWAPS = 60
+"""Swaps of an annealing of the layout; by eye."""
 UNMATCHED = math.log(1e-4)
-"""For a terminal without a fragment, or a fragment without a terminal."""
+"""Logarithm of the likelihood of a terminal without a fragment, or a fragment without a terminal; by eye."""
 
 
 @dataclass

@@ -10,7 +10,7 @@ from scenewright.stages.cutting.world.voxels import Grid, occupancy
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
 
 OCTANT_VOXELS = 24
-"""Along the longest edge, to tell which octant holds most."""
+"""Voxels along the longest edge, by which the octant that holds most is told; by eye."""
 TURNS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 """Signs of the axes that keep the frame right-handed."""
 

@@ -47,6 +47,7 @@ FAMILIES: dict[str, Family] = {
     "bread": Family((0.14, 0.22), (0.05, 0.075), flatness=(1.1, 1.5), profile=_blunt(7.0), squareness=3.5),
     "cheese": Family((0.08, 0.14), (0.035, 0.055), (1.1, 1.6), _blunt(20.0), squareness=10.0, roughness=0.004),
 }
+"""Family -> lengths, thicknesses and shapes from which a food is drawn [m]; by eye."""
 
 
 def make_food(family: str, random: np.random.Generator) -> Body:

@@ -16,6 +16,7 @@ from scenewright.stages.kit.formats.mesh_files import read_mesh
 LONGEST, SHORTEST = 1.0, 0.004
 """Edge of what lies on a board [m]."""
 MOST_FACES = 200_000
+"""Most triangles of a mesh that is cut; by eye."""
 UNLIKE = 0.05
 """Share by which the volume that faces enclose may differ from the space inside: overlaps count twice."""
 LATTICE = 64

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 MARGIN = 1e-4
-"""Of a voxel: middles of columns are set off from where vertices of regular meshes lie."""
+"""Share of a voxel by which middles of columns are set off from where vertices of regular meshes lie."""
 
 
 @dataclass(frozen=True)
