@@ -19,6 +19,7 @@ from scenewright.stages.predicates.world.actions import act
 from scenewright.stages.predicates.world.kitchen import Kitchen
 
 MOST_STEPS, MOST_FAILURES = 20, 5
+"""Most actions of a task, and most failures; by eye."""
 ARITY = {name: count for setting in SETTINGS.values() for name, count in setting.arity.items()}
 PLANNING_LIMIT, SHORTENING = 5_000, 300
 """Expanded states of one search, and of each that looks for a shorter plan: plans are wanted within moments."""

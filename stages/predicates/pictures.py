@@ -17,6 +17,7 @@ from scenewright.stages.predicates.world.kitchen import FAUCET_HEIGHT, SINK_DEPT
 
 Polygons = Sequence[tuple[str, Sequence[tuple[float, float]]]]
 LEFT, RIGHT, BOTTOM, TOP = -42.0, 40.0, -12.0, 30.0
+"""Part of the kitchen that is drawn [units]."""
 COLORS = {
     "gripper": (70, 70, 80),
     "water": (60, 130, 220),
@@ -28,7 +29,9 @@ COLORS = {
     "tallcup": (140, 90, 160),
     "coaster": (190, 160, 90),
 }
+"""Name -> colour (RGB)."""
 USUAL = (205, 110, 80)
+"""Colour (RGB) of everything else."""
 ROOM_HALF = 3.0
 """Half the width of the plots of a room [m]; their height is 2 m."""
 GRID = 60

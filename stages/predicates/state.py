@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from scenewright.stages.kit.predicates.vocabulary import Vocabulary
 
 TABLE_HEIGHT, TABLE_LEFT, TABLE_RIGHT = 0.0, -40.0, 25.0
+"""Height of the table and its ends [units]."""
 FINGER_HEIGHT, LARGEST_OPENING = 2.0, 5.0
+"""Height of the fingers and largest gap between them [units]."""
 TOLERANCE = 0.2
 """What `near` allows; it is that of the example which every learner is given."""
 KITCHEN_WORDS = Vocabulary(

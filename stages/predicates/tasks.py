@@ -15,9 +15,11 @@ from scenewright.stages.predicates.world.kitchen import Kitchen
 
 SETS = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
 LAYOUTS = 20
+"""Most tries to draw a layout in which nothing overlaps; by eye."""
 LONGEST_WALK = 14
 """Actions of the walk whose end a generated goal is taken from."""
 MOST_LITERALS = 6
+"""Most literals of a generated goal; by eye."""
 FRUITLESS = 40
 """Walks, for each goal that is asked for, after which there are taken to be no more."""
 

@@ -22,11 +22,11 @@ from scenewright.stages.predicates.learning.synthesis import FOLLOWED, Label, Sy
 from scenewright.stages.predicates.teacher.simulated import Teacher
 
 MOST_QUESTIONS = 3
-"""About one phrase, told apart from its rivals."""
+"""Most questions about one phrase, by which it is told apart from its rivals; by eye."""
 ASKED_AGAIN = 2.0
 """Weight of a sentence that was confirmed."""
 MOST_TRIES = 3
-"""Of an action in one situation, when nothing that was named speaks against it."""
+"""Most tries of an action in one situation, when nothing that was named speaks against it; by eye."""
 DOUBT_AFTER = 2
 """Episodes without their goal after which what was said once is tried."""
 

@@ -26,7 +26,7 @@ CATEGORIES = ("food", "can", "coaster", "shelf", "cup", "pot", "basket", "placem
 """The categories that perception knows."""
 GREATER, SMALLER = ("wide", "large", "larger", "greater", "tall", "high"), ("small", "smaller", "less", "narrow")
 _REASON = re.compile(r" so you| because |, thus| as it|, only| and can")
-"""Where a reason or a consequence begins."""
+"""Words with which a reason or a consequence begins."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 

@@ -156,6 +156,7 @@ ROOM_GIVEN = _predicates(
 )
 """What the hand holds, the links of the contact graph, and two relations of boxes."""
 _HALF_OPEN: Tree = ("less", ("openness", "?x"), 0.5)
+"""A door is less than half open."""
 _NARROW: Tree = ("less", ("width", "?x"), ("hand_opening",))
 ROOM = Setting(
     name="room",
@@ -190,4 +191,5 @@ ROOM = Setting(
     ),
     tells_apart=True,
 )
+"""What a learner is given of a room."""
 SETTINGS = {setting.name: setting for setting in (KITCHEN, ROOM)}

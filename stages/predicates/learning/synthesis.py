@@ -16,6 +16,7 @@ VIOLATION = 6.0
 RIVAL = 0.5
 """Meanings within this of the cheapest are its rivals."""
 MOST_TRIED = 400
+"""Most meanings of a phrase that are compared with the labels, the cheapest first; by eye."""
 FOLLOWED = "accepted "
 """How the source of a label begins that followed from an action which was allowed."""
 

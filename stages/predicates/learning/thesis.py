@@ -37,7 +37,7 @@ ROUNDS = 3
 EXPLORING = 0.5
 """Probability of an action by chance in training."""
 MOST_EXAMPLES = 6
-"""That a correction is shown."""
+"""Most examples that a correction is shown; by eye."""
 NEVER: Tree = ("not", ("at_most", 0.0, 0.0))
 """What a predicate means that nobody could write: it never holds."""
 

@@ -16,6 +16,7 @@ from scenewright.stages.kit.tasks.strips import Atom, Domain, Schema
 from scenewright.stages.predicates.learning.operators import Transition
 
 FALL = 1e-5
+"""Fall of the log-likelihood that counts as none."""
 MOST_OTHERS = 2
 """Objects beside the action's that one lifted transition may speak of."""
 Case = tuple[frozenset[Atom], frozenset[Atom], frozenset[Atom]]

@@ -19,9 +19,9 @@ from scenewright.stages.predicates.truth import true_predicates, truth_of
 from scenewright.stages.predicates.world.catalogue import DomainSetup, kitchen_file
 
 HALVINGS = 7
-"""Of the way between a state where a predicate holds and one where it does not."""
+"""Halvings of the way between a state where a predicate holds and one where it does not; by eye."""
 DRAWS = 30
-"""Of a state on the other side of a predicate."""
+"""Draws of a state on the other side of a predicate; by eye."""
 Case = tuple[State, tuple[str, ...], bool]
 """A state, objects, and whether the teacher's predicate holds of them."""
 

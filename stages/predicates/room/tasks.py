@@ -20,6 +20,7 @@ ROBOT = "panda"
 ITEMS, SUPPORTS, CONTAINERS = 4, 3, 2
 """Most things of each kind in a task: rooms have dozens, and what is learned is about pairs of them."""
 WALK, LITERALS, TRIES = 6, 2, 200
+"""Most actions of the walk whose end a goal is taken from, most literals of a goal, and most tries; by eye."""
 
 
 @dataclass(frozen=True)

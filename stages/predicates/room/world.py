@@ -10,11 +10,13 @@ from scenewright.stages.kit.predicates.room import Body, RoomState
 from scenewright.stages.kit.tasks.strips import Atom
 
 OPEN, SHUT = 1.0, 0.0
+"""Openness of a door that is open, and of one that is shut."""
 HALF_OPEN = 0.5
+"""Openness from which on a door counts as open."""
 DRAWS, CLEARANCE = 60, 0.01
 """Places that are tried on a top; distance kept from what stands there [m]."""
 CARRIED = (0.3, 0.0, 1.1)
-"""Where what is held is, before the robot [m]."""
+"""Place of what is held, before the robot [m]; by eye."""
 
 
 class RoomWorld:

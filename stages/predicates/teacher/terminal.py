@@ -20,6 +20,7 @@ from scenewright.stages.kit.tasks.strips import Atom
 from scenewright.stages.predicates.truth import truth_of
 
 LARGEST_DIALOGUE, LONGEST_ANSWER = 16 * 2**20, 1000
+"""Largest file of a dialogue [bytes] and longest answer [characters]; by eye."""
 YES, NO = ("yes", "y", "ja", "true"), ("no", "n", "nein", "false")
 HINT = "the teacher.jsonl of an earlier run, or --teacher terminal in a terminal"
 

@@ -22,14 +22,17 @@ from scenewright.stages.predicates.world.kitchen import (
 )
 
 CLEARANCE = 2.0
-"""Between things on the table."""
+"""Gap between things on the table [units]; by eye."""
 TRIES = 5
+"""Tries to find a free place on a thing; by eye."""
 SAMPLES = 400
-"""Of a place on the table, before there is said to be none."""
+"""Places on the table that are drawn before there is said to be none; by eye."""
 EPSILON = 0.1
-"""Between what is let go and what it falls on."""
+"""Gap between what is let go and what it falls on [units]; by eye."""
 FAUCET_SECONDS, FAUCET_RATE = 6.0, 0.2
+"""Time that the faucet runs [s], and its drops a step on average; by eye."""
 ENOUGH_DROPS = 5
+"""Drops with which a container counts as filled; by eye."""
 POURED_INTO = ("cup", "pot")
 ARITY = {
     "pick_up": 1,
@@ -40,6 +43,7 @@ ARITY = {
     "get_water_from_faucet": 1,
     "pour_water_from_first_to_second": 2,
 }
+"""Action -> number of its objects."""
 
 
 def pick_up(kitchen: Kitchen, a: Thing) -> str:

@@ -16,24 +16,35 @@ from scenewright.stages.predicates.state import LARGEST_OPENING, TABLE_LEFT, TAB
 from scenewright.stages.predicates.world.catalogue import Kind
 
 STEP = 0.01
+"""Time step of the physics [s]."""
 GRAVITY = -10.0
+"""Acceleration of gravity [units/s^2]; by eye."""
 SPEED, PUSH_SPEED = 5.0, 0.6
-"""Of the gripper, and of one that pushes [units/s]."""
+"""Speed of the gripper, and of one that pushes [units/s]; by eye."""
 FINGER = 0.6
+"""Width of a finger [units]; by eye."""
 FINGER_HEIGHT = 2.0
+"""Height of a finger [units]; by eye."""
 HOME_X, HOME_Y = 0.0, 25.0
+"""Place of the gripper at the beginning [units]; by eye."""
 SINK_X, SINK_WIDTH, SINK_DEPTH = 31.0, 12.0, 10.0
+"""Middle of the sink, its width and its depth [units]; by eye."""
 FAUCET_HEIGHT = 15.0
+"""Height of the faucet [units]; by eye."""
 DROP_RADIUS = 0.12
+"""Radius of a drop [units]; by eye."""
 DROP_DENSITY = 0.5
+"""Density of a drop; by eye."""
 DENSITY = {"block": 0.05, "container": 0.5, "plate": 0.2, "mat": 0.5}
+"""Shape -> density; by eye."""
 FRICTION = {"block": 1.0, "container": 1.0, "plate": 0.1, "mat": 0.1}
+"""Shape -> friction; by eye."""
 RAMP = 100
 """Steps in which the gripper takes up speed while there is water, so that none slops over."""
 FRAME_EVERY = 40
 """Steps between pictures of a motion."""
 MARGIN = 0.05
-"""Between fingers and what they are about to close on."""
+"""Gap between fingers and what they are about to close on [units]; by eye."""
 
 
 def _paces(steps: int, ramp: int) -> np.ndarray:
