@@ -20,9 +20,9 @@ from scenewright.stages.kit.registration.rigid_motion import adjoint, angle_of, 
 from scenewright.stages.splat.views import PosedView
 
 WIDTH, LEVELS, FARTHEST = 160, 3, 6.0
-"""Of the pictures that are aligned [px], resolutions, and the farthest depth [m]."""
+"""Width of the pictures that are aligned [px], their resolutions, and the farthest depth [m]; by eye."""
 LIMITS = Limits(overlap=0.3, agreement=0.75, residual=0.03, uncertainty=0.05, brightness=0.1)
-"""When an alignment is believed: those of `poses` (docs/POSES.md)."""
+"""Limits within which an alignment is believed: those of `poses` (docs/POSES.md)."""
 PER_VIEW = 2
 """Earlier views that a view is aligned with, beside the one before it, at most."""
 PLACED_BY = 4
@@ -32,8 +32,10 @@ GIVEN_STILL = np.array([0.01] * 3 + [0.01] * 3)
 GIVEN_SHARE = 0.05
 """... and what is added for its own length."""
 SWITCHES = (1e4, 1e2, SWITCH)
-"""From believing all alignments to dropping those that contradict the others: far drift is no reason to drop one."""
+"""Weights from believing all alignments to dropping those that contradict the others: far drift is no reason to drop
+one."""
 SPARSE = 200
+"""Points of a picture of which overlap is told; by eye."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from scenewright.stages.splat.views import evenly, held_out, posed_frames, read_
 from scipy.spatial.transform import Rotation
 
 CHECKPOINT_EVERY = 60.0
-"""Of a training that may be killed [s]."""
+"""Time between two checkpoints of a training that may be killed [s]; by eye."""
 
 
 def run(

@@ -36,9 +36,11 @@ from scenewright.stages.splat.strays import no_strays
 from scenewright.stages.splat.views import evenly, posed_frames
 
 SIZES = tuple(round(float(size), 4) for size in np.geomspace(0.08, 1.5, 8))
-"""At which every Gaussian is asked for, up to the thesis's largest [m]."""
+"""Sizes at which every Gaussian is asked for, up to the thesis's largest [m]."""
 LAST = 50
+"""Last steps whose mean loss is kept; by eye."""
 COVERED = 0.5
+"""Opacity from which on a pixel counts as covered."""
 
 
 def run(

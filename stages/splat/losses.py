@@ -9,8 +9,9 @@ import numpy as np
 from scenewright.stages.kit.rendering.splatting.rasterizer import Picture
 
 WINDOW, SIGMA = 11, 1.5
-"""Of the structural similarity (Wang et al. 2004)."""
+"""Side [px] and standard deviation [px] of the window of the structural similarity (Wang et al. 2004)."""
 C1, C2 = 0.01**2, 0.03**2
+"""Constants of the structural similarity, of colours from 0 to 1 (Wang et al. 2004)."""
 
 
 @dataclass(frozen=True)

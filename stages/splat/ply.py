@@ -19,8 +19,11 @@ COLUMNS = (
     *(f"scale_{k}" for k in range(3)),
     *(f"rot_{k}" for k in range(4)),
 )
+"""Names of a Gaussian's numbers, in order."""
 LARGEST_FILE = 4 * 2**30
+"""Largest file that is read [bytes]; by eye."""
 LARGEST_HEADER = 4000
+"""Longest header [bytes]; by eye."""
 
 
 def write_gaussians(path: Path, gaussians: Gaussians) -> None:

@@ -21,6 +21,7 @@ from scenewright.stages.splat.views import PosedView
 from scipy.spatial.transform import Rotation
 
 MOMENTS = (0.9, 0.999)
+"""Decay of the moments of Adam, for poses (Kingma and Ba 2015)."""
 
 
 @dataclass(frozen=True)

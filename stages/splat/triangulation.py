@@ -16,14 +16,15 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.splat.views import PosedView
 
 FEATURES = 2000
-"""Of a picture, at most."""
+"""Most features of a picture; by eye."""
 LONGEST_EXHAUSTIVE = 60
-"""So many pictures are matched each with each; of more, each with the NEIGHBOURS that follow."""
+"""Most pictures that are matched each with each; of more, each is matched with the NEIGHBOURS that follow. By eye."""
 NEIGHBOURS = 12
+"""Pictures that follow one with which it is matched; by eye."""
 LARGEST_ERROR = 2.0
-"""Of a point in the pictures that show it [px]."""
+"""Largest error of a point in the pictures that show it [px]; by eye."""
 LEAST_ANGLE = 2.0
-"""Between the rays of a point [degrees]."""
+"""Least angle between the rays of a point [degrees]; by eye."""
 
 
 def with_points(views: Sequence[PosedView], seed: int) -> list[PosedView]:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 NONE = -1
+"""Number that stands for no entity."""
 REACH = 0.05
 """A Gaussian farther from every surface than this is of none [m]."""
 MOST = 0.5

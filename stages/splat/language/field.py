@@ -12,15 +12,23 @@ import torch
 from torch import nn
 
 GRIDS = ((16, 128), (128, 512))
+"""Coarsest and finest cells along each side of the two hash grids."""
 LEVELS = 12
+"""Levels of each grid."""
 ENTRIES = 2**16
+"""Entries of a level's table: 2^16, where the thesis has 2^19 (docs/SPLATS.md)."""
 NUMBERS = 4
+"""Numbers of an entry."""
 HIDDEN, LAYERS = 256, 3
+"""Width of the network's layers, and their number."""
 PRIMES = (1, 2654435761, 805459861)
+"""Factors of the spatial hash (Mueller et al. 2022)."""
 CORNERS = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
+"""The corners (8, 3) of a cell."""
 INNER = (1.0, 99.0)
 """Percentiles of the Gaussians' centres between which space is not contracted."""
 CHUNK = 32768
+"""Places that are asked for at once: memory, not results, depends on it. By eye."""
 
 
 class HashGrid(nn.Module):

@@ -22,7 +22,9 @@ from scenewright.stages.splat.language.field import LanguageField
 from scenewright.stages.splat.language.pyramid import Level
 
 DELTA = 1.25
+"""Difference from which on the Huber loss is linear."""
 FIRST_RATE, LAST_RATE = 2.5e-3, 1e-3
+"""Rates of learning at the first and the last step."""
 SAMPLES = 3072
 """Pixels of all pictures in a step."""
 SMALLER = 0.25

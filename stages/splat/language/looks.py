@@ -18,7 +18,7 @@ LEAST_SIDE = 12
 MARGIN = 1.25
 """Side of a square over that of what is seen of the region."""
 MOST_POINTS = 200
-"""Of a region that are looked for."""
+"""Most points of a region that are looked for; by eye."""
 LEAST_SEEN = 0.25
 """Share of the points that a look shows, at least."""
 BEHIND = (0.03, 0.02)

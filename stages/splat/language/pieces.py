@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 SEEN = 0.15
 """Opacity from which on a Gaussian belongs to a surface."""
 NEIGHBOURS = 10
+"""Nearest Gaussians that one may be joined with; by eye."""
 SMOOTH = 16
 """Neighbours whose plane is a Gaussian's normal."""
 REACH = 3.0
@@ -21,9 +22,11 @@ REACH = 3.0
 GRANULARITIES = (0.15, 0.6, 2.0)
 """How readily pieces join: the constant k of the method."""
 SMALLEST = 6
+"""Gaussians that a piece needs; by eye."""
 COLOR, BEND = 1.0, 0.7
 """Weights of a difference of colour (sRGB, length) and of 1 - |cosine| of normals."""
 FIRST_HARMONIC = 0.28209479177387814
+"""Value of the first spherical harmonic, 1 / (2 sqrt(pi))."""
 
 
 def pieces(gaussians: Gaussians) -> np.ndarray:

@@ -9,10 +9,11 @@ import numpy as np
 from scenewright.stages.kit.open_words.encoder import Encoder
 
 LEVELS = 7
+"""Number of sizes of squares."""
 SMALLEST, LARGEST = 0.10, 0.45
 """Sides of the squares, over the height of the picture."""
 STRIDE = 0.5
-"""From one square to the next, over the side."""
+"""Way from one square to the next, over the side."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from scenewright.stages.splat.seeding import Seeds, at_pixels
 from scenewright.stages.splat.views import PosedView
 
 PIXELS, DEVIATION, OPACITY = 500, 0.02, 0.2
+"""Pixels with depth at which a new picture seeds Gaussians, their standard deviation [m] and their opacity."""
 
 
 def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random: np.random.Generator) -> Seeds:
@@ -38,3 +39,4 @@ METHOD = Method(
     visible_alone=False,
     carried=False,
 )
+"""The thesis's constants (docs/SPLATS.md)."""
