@@ -11,6 +11,7 @@ from scenewright.stages.agent.scene_map import SceneMap
 from scenewright.stages.agent.senses import Base
 
 MOST_STOPS = 60
+"""Most stops of an exploration; by eye."""
 NEAR = 0.5
 """Frontiers this near to where the robot has looked around already, or could not get, are left alone [m]."""
 

@@ -14,6 +14,7 @@ from scipy.ndimage import binary_dilation
 CELL = 0.1
 """Edge of a cell [m]; cell (i, j) has its middle at (i, j) * CELL of the map frame."""
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
+"""States of a cell."""
 DEARER = 4.0
 """What a cell costs there: the corners of a turning base come nearer than its sides."""
 DEAREST = 20.0
@@ -23,6 +24,7 @@ BESIDE_MOVABLE = 2.0
 """Cells that the base keeps from the outline of something movable: that is known finely, and looked at with the arm's
 collision model before anything is done there."""
 HALF = int(LARGEST_SIDE / CELL) + 20
+"""Half a side of the map [cells], with room around the largest apartment."""
 
 
 def cell_of(x: float, y: float) -> tuple[int, int]:

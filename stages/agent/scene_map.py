@@ -23,7 +23,7 @@ has corners: in one it is within that share along both sides, and within the sec
 UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
 TWICE = 0.5
-"""Within this share of the distance of one thing a second detection of one look is of it as well."""
+"""Share of the distance of one thing within which a second detection of one look is of it as well; by eye."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
 FLOOR, PATCH = "floor", 0.1
@@ -31,7 +31,7 @@ FLOOR, PATCH = "floor", 0.1
 Region = tuple[int | str, bool]
 """Quarter turn (or `hand`, or `map`) from which something was seen, and whether from near by."""
 MAPPED: Region = ("map", False)
-"""Of what was mapped before the robot came."""
+"""Region of the votes for what was mapped before the robot came."""
 
 
 @dataclass(frozen=True)

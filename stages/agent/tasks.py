@@ -226,4 +226,6 @@ TASKS = {
     )
 }
 THESIS_TASKS = tuple(TASKS)[:8]
+"""Names of the thesis's tasks."""
 TABLETOP = tuple(TASKS)[:4]
+"""Names of those at a table."""

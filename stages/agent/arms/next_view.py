@@ -23,10 +23,11 @@ LOOK_SECONDS, SPEED = 10.0, 0.5
 FALLS = 0.8
 """What falls off furniture lies this near to it [m]."""
 ROLLS = 0.4
-"""Of the distance from where it was lost at which it is e times less likely [m]."""
+"""Distance from where a thing was lost at which it is e times less likely [m]; by eye."""
 FLOOR_FROM, FLOOR_TO, FLOOR_ASIDE = 0.8, 1.9, 1.0
 """Distances from the base [m], and bearings off the middle [rad], of floor that three wrist poses show well."""
 HEADINGS = 8
+"""Headings at each place that are compared; by eye."""
 Question = tuple[tuple[float, float], frozenset[int], int]
 """Where something is [m], quarter turns from which it was looked at, regions by which what it is taken for is ahead."""
 

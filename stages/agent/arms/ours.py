@@ -29,12 +29,13 @@ SURE_OF_USE = 2
 SEEN_FROM = 2
 """Regions of views from which every corner of furniture is looked at before what is not seen there counts as absent."""
 MOST_VIEWS = 6
+"""Most regions of views that one look at furniture takes; by eye."""
 TRIES = 6
 """Executions within one call."""
 BESIDE = 0.4
 """How far around its spot something is looked for that is not on it [m]."""
 AWAY = 0.1
-"""Of what was placed from its spot, at most [m]."""
+"""Farthest that what was placed may lie from its spot [m]; by eye."""
 OFF_SPOT = 0.05
 """Spots this near to one that something rolled off are not tried again [m]."""
 SAME_POSE = 0.15
@@ -44,16 +45,17 @@ SAME_ON_SIDE, SAME_BEFORE_OPEN = 0.3, 0.1
 SAME_TARGET = 0.1
 """A base pose that failed for one position fails for those this near [m]."""
 HAND_VIEWS = 3
+"""Looks at the hand from which what it holds is told; by eye."""
 FLOOR_VIEWS, FLOOR_AT = 4, 1.2
 """Looks at the floor for what fell, and how far before the base they are at [m]."""
 LITTLE = 0.1
 """No look is taken that shows less of where it may lie."""
 PULLS = 3
-"""At one door within one call: where it does not move from there, the rest is not the base pose."""
+"""Most pulls at one door within one call: where it does not move from there, the rest is not the base pose. By eye."""
 DEEPER = (0.0, 0.07, 0.14)
-"""Before what is open a base with a short arm stands so much farther away [m], too, and at more places."""
+"""Extra distances at which a base with a short arm stands before what is open [m], too, and at more places; by eye."""
 ON_FLOOR = 0.2
-"""Lower things lie on the floor [m]."""
+"""Height below which things lie on the floor [m]; by eye."""
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from scenewright.stages.agent.scene_map import Item, SceneMap, quarter
 from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 
 APART = 0.35
-"""Between neighbouring base poses along an edge [m]."""
+"""Distance between neighbouring base poses along an edge [m]; by eye."""
 FINE = 0.03
-"""Between positions around a middle, and of one from the rim of what is known to stand near [m]."""
+"""Distance between positions around a middle, and of one from the rim of what is known to stand near [m]; by eye."""
 RING = 0.5
-"""Of the radius of a small carrier, where things are put on it."""
+"""Share of the radius of a small carrier at which things are put on it; by eye."""
 INSIDE = 0.2
-"""Of a spot from the edge over which it is placed [m]."""
+"""Distance of a spot from the edge over which it is placed [m]; by eye."""
 
 
 def facing(x: float, y: float, at: tuple[float, ...]) -> Base:

@@ -12,7 +12,7 @@ from scenewright.stages.kit.language.messages import Message, say
 from scenewright.stages.kit.language.reply_schema import schema_of
 
 SHOWN_TURNS = 30
-"""Of the latest programs and what came of them, shown with every question."""
+"""Latest programs that are shown with every question, with what came of them; by eye."""
 
 
 class ProgramReply(Model):

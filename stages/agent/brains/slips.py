@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 EXECUTION = re.compile(r"\b(navigate|grasp|place|place_among|open|close)\((.*)\)\s*$")
 KINDS = ("place", "name", "call")
-"""As in 3.4.3: placing without a grasp before, a name where an object belongs; and a call of another interface."""
+"""Slips of 3.4.3: placing without a grasp before, a name where an object belongs; and a call of another interface."""
 
 
 class Slips:

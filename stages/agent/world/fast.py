@@ -18,7 +18,7 @@ from scenewright.stages.agent.world.floor import Floor
 from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors
 
 REACH, HIGHEST = 1.3, 1.4
-"""Of the arm from the middle of the base over the ground, and the highest place [m]."""
+"""Reach of the arm from the middle of the base over the ground, and the highest place that it reaches [m]."""
 FOUND_WITHIN = 0.12
 """The hand closes on what is nearest to where it goes, up to this far [m]."""
 NOISE, FURNITURE_NOISE = 0.006, 0.02
@@ -30,7 +30,7 @@ ROLLS, BESIDE = 0.22, 0.1
 CLEARANCE = 3.0
 """Cells of the obstacle map that the base keeps from what is occupied."""
 SPEED = 0.4
-"""Of the base [m/s]."""
+"""Speed of the base [m/s]."""
 SECONDS = {
     "sweep": 8.0,
     "drive": 4.0,

@@ -10,9 +10,9 @@ from scenewright.stages.agent.obstacle_map import CELL, cell_of
 from scenewright.stages.agent.senses import Base
 
 RANGE, RAYS = 5.0, 360
-"""Of the head camera [m], and rays of one turn."""
+"""Range of the head camera [m], and rays of one turn."""
 ROBOT_CELLS = 2
-"""Around the base's own that have to be free."""
+"""Cells around the base's own that have to be free."""
 SEEN_CELLS = 3
 """Cells of a piece of furniture that have to be hit for it to be made out."""
 Swept = tuple[np.ndarray, np.ndarray, tuple[int, ...]]

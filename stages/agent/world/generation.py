@@ -20,9 +20,9 @@ PLACES = 200
 RIM = 0.1
 """Things keep this far from the edge of what carries them [m]."""
 GAP = 0.09
-"""Between things [m]: room for fingers."""
+"""Gap between things [m]: room for fingers. By eye."""
 BESIDE = 0.45
-"""Of the robot's start from the edge of the table in front of it [m]."""
+"""Distance of the robot's start from the edge of the table in front of it [m]; by eye."""
 
 
 class Piece(Model):

@@ -10,9 +10,10 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.motion.doors import body_from_moved, closing_direction
 
 AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
-"""From where a side is looked at: before it, and beside its middle [m]."""
+"""Distances before a side, and beside its middle, from which it is looked at [m], in the order in which they are
+tried."""
 OFFS = (0.0, 0.25, -0.25)
-"""Beside the middle of a leaf from where it is pushed [m]."""
+"""Distances beside the middle of a leaf from which it is pushed [m], in the order in which they are tried."""
 
 
 def bases_before(front: Front) -> list[np.ndarray]:

@@ -23,12 +23,13 @@ SHELF = 0.5
 DRAWER, TRAY = 0.20, 0.10
 """Height of a drawer's front, and of its other sides [m]."""
 BEHIND = 0.04
-"""Of a drawer stays in the furniture when it is out [m]."""
+"""Length of a drawer that stays in the furniture when it is out [m]; by eye."""
 WIDEST = 2.0
 """Angle at which a leaf stops [rad]."""
 BAR, BEFORE = 0.02, 0.045
 """Thickness of a handle's bar, and its middle before the front [m]."""
 BAR_LENGTH, FROM_EDGE = 0.2, 0.06
+"""Length of a handle's bar, and its distance from the leaf's edge [m]; by eye."""
 
 
 @dataclass(frozen=True)

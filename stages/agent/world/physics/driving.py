@@ -20,7 +20,8 @@ TRIES = 6
 TOUCHES = 0.001
 """Contacts less deep do not count [m]."""
 STEP, BACK_STEPS = 0.05, 2
-"""Between poses of the base at which collisions are looked for [m], and how many of them it backs off a touch."""
+"""Distance between poses of the base at which collisions are looked for [m], and how many of them it backs off a touch;
+by eye."""
 
 
 class Driving:

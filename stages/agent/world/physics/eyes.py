@@ -13,11 +13,13 @@ from scenewright.stages.kit.rendering.object_views import Picture, cloud
 from scipy.spatial import cKDTree
 
 HEAD = Camera(width=160, height=120, fx=100.0, fy=100.0, cx=79.5, cy=59.5)
+"""Intrinsics of the head camera."""
 WRIST = Camera(width=240, height=180, fx=175.0, fy=175.0, cx=119.5, cy=89.5)
+"""Intrinsics of the wrist camera."""
 NEAR_BY = Camera(width=240, height=180, fx=350.0, fy=350.0, cx=119.5, cy=89.5)
 """The middle of the wrist camera's full resolution, of which looks at a whole surface take every second pixel."""
 LEAST_POINTS = 16
-"""Of an object (ConceptGraphs)."""
+"""Least points of an object (ConceptGraphs)."""
 VOXEL, OVERLAP = 0.025, 0.5
 """Edge of a cell in which two clouds overlap [m], and the share from which they are one (ConceptGraphs)."""
 COINCIDE = 0.03

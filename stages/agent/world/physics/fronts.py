@@ -24,17 +24,17 @@ WITH_DRAWERS, WITH_LEAVES = ("dresser",), ("fridge",)
 PARTS = ("handle", "door", "drawer")
 """Words for what moves of furniture: no things."""
 THICK, LEAF = 0.03, 0.02
-"""Of walls, and of leaves and drawer fronts [m]."""
+"""Thickness of walls, and of leaves and drawer fronts [m]; by eye."""
 HALF_BAR = 0.01
 """Half of a bar's thickness: the middle of a handle lies so far behind what is seen of it [m]."""
 ROOM = 0.008
-"""Around a bar that the hand keeps when it goes past it [m]."""
+"""Room around a bar that the hand keeps when it goes past it [m]; by eye."""
 OVER = 0.025
 """Believed of a front over where its mask ends, which is a pixel too low [m]."""
 BEHIND_BAR = 0.03
 """Room of a hand's fingers behind a bar: so far is a front from it where it was not seen itself [m]."""
 STAYS = 0.04
-"""Of a drawer stays in [m]."""
+"""Length of a drawer that stays in [m]."""
 WIDEST = 1.9
 """Angle to which a leaf opens [rad]."""
 NEAR_HINGE = 0.15
@@ -42,8 +42,9 @@ NEAR_HINGE = 0.15
 LOOK_AT = 0.6
 """Height at which it is looked into, as a share of its own."""
 NARROWEST = 0.25
-"""Of a front that was looked at, and not its edge [m]."""
+"""Least width of a front that was looked at, and not its edge [m]; by eye."""
 EDGE_CELL = 0.01
+"""Edge of a cell on which a front's outline is told [m]; by eye."""
 TRAY = 0.5
 """Height of the sides of a drawer, as a share of its front's."""
 

@@ -26,16 +26,17 @@ ALIKE, ALIKE_WIDE = 0.1, 0.006
 LEAST = 10
 """Points between the fingers."""
 HEADINGS = 16
+"""Headings of the hand that are tried; by eye."""
 PITCHES = (np.pi / 2, 1.1, 0.7)
 """How steeply the hand comes, from above first [rad]."""
 FORWARD_PITCHES = (0.15, 0.0, 0.35)
-"""The same of the hand that goes into a shelf."""
+"""Pitches of the hand that goes into a shelf [rad], in the order in which they are tried."""
 LEVEL = 0.5
-"""Below this a hand sees nothing of a thing's top [rad]: its middle lies half its width behind its front."""
+"""Pitch below which a hand sees nothing of a thing's top [rad]: its middle lies half its width behind its front."""
 BEFORE_PALM = 0.004
 """Room that such a hand leaves between its palm and the thing [m]."""
 STEEP = 1.5
-"""From here on it comes from above [rad]."""
+"""Pitch from which on a hand comes from above [rad]."""
 HEIGHTS = (0.5, 0.65, 0.8, 0.35)
 """Shares of the thing's height at which an aslant hand grips it, that of its middle first."""
 OFF = 0.012

@@ -22,7 +22,7 @@ CANDIDATES = 20
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
 APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
-"""Of the hand before and after it closes, and after it does behind a front [m]."""
+"""Ways of the hand before and after it closes, and after it closes behind a front [m]; by eye."""
 CLEAR = 0.04
 """What comes out of a shelf is so far before its front before it goes anywhere else [m]."""
 SLOW = 0.35
@@ -30,7 +30,7 @@ SLOW = 0.35
 ELBOWS = 12
 """Ways to hold the elbow that are tried where the first is in the way."""
 SAMPLES = 500
-"""Of one path search."""
+"""Most samples of one path search; by eye."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,8 @@ DROP = 0.15
 JUST_OVER = 0.008
 """Height at which ours does, if nothing was touched before [m]."""
 UP, OVER_RIM = 0.06, 0.015
-"""Of the hand from where it lets go before it goes anywhere else, and of what it holds over the rim of a box [m]."""
+"""Way of the hand up from where it lets go before it goes anywhere else, and of what it holds over the rim of a box
+[m]; by eye."""
 SOME_WAY_OVER = 0.06
 """Height at which ours does where the hand has no room farther down [m]."""
 TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6))

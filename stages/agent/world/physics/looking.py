@@ -37,9 +37,9 @@ STEEP, OVER = (1.5, 1.3, 1.1), 0.45
 FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
 INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
-"""The same of looks into a shelf."""
+"""Pitches [rad], distances and shifts aside [m] of looks into a shelf, in the order in which they are tried."""
 WIDEST = 0.5
-"""Of what lies about on furniture or in it [m]."""
+"""Largest width of what lies about on furniture or in it [m]; by eye."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
 

@@ -42,7 +42,7 @@ from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.kit.simulation.shapes import joined, link_shapes
 
 HEIGHT_OF_LOOK = 0.65
-"""At which share of its height a side is looked at."""
+"""Share of its height at which a side is looked at; by eye."""
 PITCHES = (0.0, 0.5, 0.9)
 """How far the hand comes down to a bar [rad]."""
 TILTS, WIDE_TILTS = (0.0, 0.35, -0.35, 0.7, -0.7), ((1.0, 0.0), (-1.0, 0.0), (0.5, -0.5), (-0.5, 0.5))
@@ -50,22 +50,24 @@ TILTS, WIDE_TILTS = (0.0, 0.35, -0.35, 0.7, -0.7), ((1.0, 0.0), (-1.0, 0.0), (0.
 FINE = 0.02
 """Largest step of a joint between two checks [rad]: a bar is thinner than what the elbow sweeps in a larger one."""
 GRIP_OPENING = 0.06
-"""Of the fingers around a bar before they close [m]: there is little room behind it."""
+"""Gap of the fingers around a bar before they close [m]: there is little room behind it."""
 DEEPER = 0.008
-"""Of the tool point behind the middle of a bar [m]: held by their ends alone, the fingers slide off it."""
+"""Distance of the tool point behind the middle of a bar [m]: held by their ends alone, the fingers slide off it."""
 NOTHING_GRIPPED = 0.01
 """Opening of the fingers below which they hold no bar [m]."""
 PRESS, OVERSHOOT = 0.006, 0.02
 """The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
 PUSHES = 4
-"""At one front, at most: something may be in the way of one."""
+"""Most pushes at one front: something may be in the way of one. By eye."""
 NOTICED = 0.1
-"""Of an angle by which it pays to push a leaf on [rad]."""
+"""Least angle by which it pays to push a leaf on [rad]; by eye."""
 SHARES = (1.0, 0.75, 0.5)
-"""Of what a door opens to, tried one after the other."""
+"""Shares of what a door opens to, tried one after the other."""
 FAR_OUT = 1.1
-"""The same of a drawer first: what lies at its back is under the furniture's edge otherwise, and the hand is wide."""
+"""Share of what a drawer opens to that is tried first: what lies at its back is under the furniture's edge otherwise,
+and the hand is wide."""
 SAMPLES = 500
+"""Most samples of one path search; by eye."""
 SEEN_TO = 0.15
 """How well the eyes tell how far a front is open [rad] or [m]."""
 HERE = 0.12

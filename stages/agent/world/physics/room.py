@@ -35,6 +35,7 @@ FURNITURE_COLORS = {
     "fridge": (0.88, 0.88, 0.90),
     "dresser": (0.55, 0.42, 0.30),
 }
+"""Class -> colour (RGB) of the furniture."""
 RESTS = 0.06
 """A thing whose foot is at most this far below a top is on it [m]."""
 HANDLES = (0.25, 0.25, 0.28)

@@ -27,8 +27,9 @@ COLORS = {
 STAIN = (0.30, 0.16, 0.06)
 """What a used cup has on its top."""
 RIM_PARTS = 12
+"""Pieces of a round rim; by eye."""
 MOVING_MASS = 3.0
-"""Of a leaf or a drawer [kg]."""
+"""Mass of a leaf or a drawer [kg]; by eye."""
 
 
 class Piece(Model):
