@@ -24,8 +24,9 @@ from scenewright.stages.kit.formats.foxglove_log import foxglove_log
 TRANSFORMS, MAP, SCENE, LOG, WRIST = "/tf", "/map", "/scene", "/log", "/camera/wrist"
 _TOPICS = {TRANSFORMS: FrameTransforms, MAP: Grid, SCENE: SceneUpdate, LOG: Log, WRIST: CompressedImage}
 FURNITURE_COLOR, THING_COLOR = (0.80, 0.69, 0.54, 0.9), (0.78, 0.33, 0.24, 1.0)
+"""Colours (RGBA) of furniture and of things."""
 THING_HEIGHT = 0.08
-"""With which a thing of the map is drawn, of which no height is kept [m]."""
+"""Height with which a thing of the map is drawn, of which no height is kept [m]."""
 
 
 @dataclass(frozen=True)

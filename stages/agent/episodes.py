@@ -73,11 +73,11 @@ class Watching:
         area = round(float(np.count_nonzero(scene.obstacles.window != UNKNOWN)) * CELL**2, 2)
         things = _things(scene)
         views = [picture for _, picture in world.pictures]
-        fresh = tuple(v for v in views if not any(v is old for old in self._views))
+        fresh = tuple(v for v in views if not any(v is earlier for earlier in self._views))
         self._views = views
         window, origin = scene.obstacles.window.copy(), scene.obstacles.origin
-        said = turn_text(self._turn, _turn(turn))
-        self.moments.append(Moment(turn.seconds, turn.base, said, window, origin, things, fresh))
+        text = turn_text(self._turn, _turn(turn))
+        self.moments.append(Moment(turn.seconds, turn.base, text, window, origin, things, fresh))
         if self.snapshots and self.snapshots[-1].things == things and self.snapshots[-1].known_area == area:
             return
         self.snapshots.append(MapSnapshot(turn=self._turn, known_area=area, things=things))
@@ -104,7 +104,7 @@ def write_episode(
     the service that was asked for masks says it is."""
     watching = Watching()
     session, world = run_trial(setting, arm, brain, one_program=one_program, watch=watching.see)
-    made = score(setting.goals, impossible, session, world)
+    scored = score(setting.goals, impossible, session, world)
     write_views(output / "views.png", world.pictures)
     world.close()
     file = EpisodeFile(
@@ -123,7 +123,7 @@ def write_episode(
         stopped=session.stopped,
         understood=bool(setting.goals),
         turns=tuple(_turn(turn) for turn in session.turns),
-        score=EpisodeScore(**asdict(made)),
+        score=EpisodeScore(**asdict(scored)),
         language=language(),
     )
     file.write(output / "episode.json")
@@ -135,7 +135,7 @@ def write_episode(
     write_log(output / "episode.mcap", watching.moments)
     draw_growing_map(output / "map.png", watching.panels, width)
     animate_map(output / "map.gif", watching.panels, width // 2)
-    success = made.success if setting.goals else session.end == "done"
+    success = scored.success if setting.goals else session.end == "done"
     return AgentEpisode(root=output, outcome=_outcome(session, success), summary=_summary(file))
 
 
@@ -175,7 +175,7 @@ def _call(called: Called) -> EpisodeCall:
 
 
 def _things(scene: SceneMap) -> tuple[MapThing, ...]:
-    made = [
+    mapped_things = [
         MapThing(
             key=key,
             label=piece.label,
@@ -187,7 +187,7 @@ def _things(scene: SceneMap) -> tuple[MapThing, ...]:
         )
         for key, piece in scene.furniture.items()
     ]
-    made += [
+    mapped_things += [
         MapThing(
             key=item.key,
             label=item.label,
@@ -199,7 +199,7 @@ def _things(scene: SceneMap) -> tuple[MapThing, ...]:
         )
         for item in scene.items.values()
     ]
-    return tuple(made)
+    return tuple(mapped_things)
 
 
 def episode_text(file: EpisodeFile) -> str:
@@ -208,11 +208,11 @@ def episode_text(file: EpisodeFile) -> str:
     lines += [] if file.language else ["No language model was asked: the programs are written by rules."]
     for number, turn in enumerate(file.turns, 1):
         lines += ["", turn_text(number, turn)]
-    made = file.score
-    truly = ("It is done." if made.success else "It is not done.") if file.understood else "No judge knows."
+    scored = file.score
+    truly = ("It is done." if scored.success else "It is not done.") if file.understood else "No judge knows."
     lines += ["", f"end: {file.end}{f': {file.said}' if file.said else ''}. {truly}"]
-    lines.append(f"{made.calls} calls, {made.executed} of {made.executions} executions did what they were to do,")
-    lines.append(f"{made.recovered} of {made.replanned} tried again; {made.seconds:.0f} s, {made.metres:.0f} m")
+    lines.append(f"{scored.calls} calls, {scored.executed} of {scored.executions} executions did what they were to do,")
+    lines.append(f"{scored.recovered} of {scored.replanned} tried again; {scored.seconds:.0f} s, {scored.metres:.0f} m")
     return "\n".join(lines) + "\n"
 
 

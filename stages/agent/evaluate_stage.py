@@ -18,10 +18,10 @@ from scenewright.stages.kit.stage import Context
 
 def run(*, parameters: EvaluateParameters, context: Context) -> AgentEvaluation:
     """Compare arms, each on the same apartments with the same luck."""
-    for names, there, what in ((parameters.tasks, TASKS, "task"), (parameters.arms, ARMS, "arm")):
+    for names, available, sort in ((parameters.tasks, TASKS, "task"), (parameters.arms, ARMS, "arm")):
         for name in names:
-            if name not in there:
-                raise UsageError(f"there is no {what} {name!r}", hint=f"choose of {', '.join(there)}")
+            if name not in available:
+                raise UsageError(f"there is no {sort} {name!r}", hint=f"choose of {', '.join(available)}")
     rows = []
     for task in context.progress.track(parameters.tasks, total=len(parameters.tasks), description="tasks"):
         by_arm = _scores(task, parameters)
@@ -40,14 +40,14 @@ def run(*, parameters: EvaluateParameters, context: Context) -> AgentEvaluation:
 
 def _scores(name: str, parameters: EvaluateParameters) -> dict[str, list[Score]]:
     task, rates = TASKS[name], Rates().scaled(parameters.failures, parameters.perception)
-    made: dict[str, list[Score]] = {arm: [] for arm in parameters.arms}
+    scores_of_arm: dict[str, list[Score]] = {arm: [] for arm in parameters.arms}
     for seed in range(parameters.first_seed, parameters.first_seed + parameters.trials):
         apartment = make_apartment(task, seed)
         setting = Setting(apartment, task.words, task.goals, rates, seed, floor=Floor(apartment))
         for arm in parameters.arms:
             session, world = run_trial(setting, arm)
-            made[arm].append(score(task.goals, task.impossible, session, world))
-    return made
+            scores_of_arm[arm].append(score(task.goals, task.impossible, session, world))
+    return scores_of_arm
 
 
 def _row(task: str, arm: str, scores: Sequence[Score]) -> EvaluatedArm:

@@ -11,6 +11,7 @@ from scenewright.stages.agent.scene_map import SceneMap
 from scenewright.stages.agent.senses import Base
 
 MOST_STOPS = 60
+"""Most stops of an exploration; by eye."""
 NEAR = 0.5
 """Frontiers this near to where the robot has looked around already, or could not get, are left alone [m]."""
 
@@ -18,14 +19,14 @@ NEAR = 0.5
 def explore(body: Body, scene: SceneMap, until: Callable[[], object] = lambda: None) -> int:
     """Drive through everything that can be reached, or until something is found; return the number of stops."""
     scene.sweep(body)
-    left = [(body.base.x, body.base.y)]
+    visited = [(body.base.x, body.base.y)]
     for stop in range(MOST_STOPS):
         if until():
             return stop
-        goal = _nearest_frontier(body.base, scene, np.array(left))
+        goal = _nearest_frontier(body.base, scene, np.array(visited))
         if goal is None:
             return stop
-        left.append(goal)
+        visited.append(goal)
         x, y = goal
         yaw = float(np.arctan2(y - body.base.y, x - body.base.x))
         arrived = body.drive(Base(x, y, yaw), "").ok
@@ -38,8 +39,8 @@ def _nearest_frontier(base: Base, scene: SceneMap, left: np.ndarray) -> tuple[fl
     points = scene.obstacles.frontiers()
     if not len(points):
         return None
-    known = np.hypot(*(points[:, None] - left[None]).transpose(2, 0, 1)).min(axis=1) > NEAR
-    points = points[known]
+    is_far = np.hypot(*(points[:, None] - left[None]).transpose(2, 0, 1)).min(axis=1) > NEAR
+    points = points[is_far]
     field, origin = scene.obstacles.distances_from(base.x, base.y), np.array(scene.obstacles.origin)
     if not len(points):
         return None

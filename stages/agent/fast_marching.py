@@ -15,9 +15,9 @@ def distances(free: np.ndarray, cost: np.ndarray, row: int, column: int) -> np.n
     First-order upwind solution of the eikonal equation; `cost` (H, W): of a cell's length in each cell.
     """
     height, width = free.shape
-    found = np.full((height, width), np.inf)
+    distance = np.full((height, width), np.inf)
     done = np.zeros((height, width), np.bool_)
-    found[row, column] = 0.0
+    distance[row, column] = 0.0
     queue = [(0.0, row, column)]
     while len(queue) > 0:
         value, r, c = heapq.heappop(queue)
@@ -28,12 +28,16 @@ def distances(free: np.ndarray, cost: np.ndarray, row: int, column: int) -> np.n
             i, j = r + (k == 0) - (k == 1), c + (k == 2) - (k == 3)
             if i < 0 or j < 0 or i >= height or j >= width or done[i, j] or not free[i, j]:
                 continue
-            up = min(found[i - 1, j] if i > 0 else np.inf, found[i + 1, j] if i + 1 < height else np.inf)
-            side = min(found[i, j - 1] if j > 0 else np.inf, found[i, j + 1] if j + 1 < width else np.inf)
-            near, far = min(up, side), max(up, side)
+            up = min(distance[i - 1, j] if i > 0 else np.inf, distance[i + 1, j] if i + 1 < height else np.inf)
+            side = min(distance[i, j - 1] if j > 0 else np.inf, distance[i, j + 1] if j + 1 < width else np.inf)
+            smaller, larger = min(up, side), max(up, side)
             h = cost[i, j]
-            new = near + h if far - near >= h else 0.5 * (near + far + np.sqrt(2.0 * h * h - (far - near) ** 2))
-            if new < found[i, j]:
-                found[i, j] = new
-                heapq.heappush(queue, (new, i, j))
-    return found
+            through_cell = (
+                smaller + h
+                if larger - smaller >= h
+                else 0.5 * (smaller + larger + np.sqrt(2.0 * h * h - (larger - smaller) ** 2))
+            )
+            if through_cell < distance[i, j]:
+                distance[i, j] = through_cell
+                heapq.heappush(queue, (through_cell, i, j))
+    return distance

@@ -45,14 +45,14 @@ def score(goals: tuple[Goal, ...], impossible: str, session: Session, world: Wor
     if impossible:
         success = session.end in ("give_up", "ask") and impossible in session.words.lower()
     acted = [event for event in world.events if event.verb != "look"]
-    again = [event for event in acted if event.replanned]
+    replanned_events = [event for event in acted if event.replanned]
     return Score(
         success=success,
         claimed=session.end == "done",
         executions=len(acted),
         executed=sum(event.ok for event in acted),
-        replanned=len(again),
-        recovered=sum(event.ok for event in again),
+        replanned=len(replanned_events),
+        recovered=sum(event.ok for event in replanned_events),
         calls=len(session.calls),
         seconds=world.seconds,
         metres=world.metres,
@@ -94,7 +94,7 @@ def _holds(goal: Goal, world: World) -> bool:
             return any(_in_the_middle(name, around, world) for name in _things(what, world))
         case Move(what=what, onto=onto, every=every, start=start):
             names = [n for n in _things(what, world) if not start or _label(_root_before(n, world), world) == start]
-            on = [_carried(name, onto, world) for name in names]
+            on = [_is_carried_by(name, onto, world) for name in names]
             return bool(names) and (all(on) if every else any(on))
 
 
@@ -109,20 +109,20 @@ def _label(name: str, world: World) -> str:
 
 def _root_before(name: str, world: World) -> str:
     """Return the furniture on or in which a thing was at the beginning."""
-    before = {thing.name: thing.on for thing in world.apartment.things}
+    before = {placed.name: placed.on for placed in world.apartment.things}
     at = before[name]
     while at in before:
         at = before[at]
     return at
 
 
-def _carried(name: str, onto: Description, world: World) -> bool:
+def _is_carried_by(name: str, onto: Description, world: World) -> bool:
     """Whether a thing is on something of a description, or on what that carries."""
     on = world.bodies[name].on
     while on:
         if on in world.bodies:
-            thing = world.bodies[on].thing
-            if onto.fits(thing.label, thing.color, thing.used):
+            carrier = world.bodies[on].thing
+            if onto.fits(carrier.label, carrier.color, carrier.used):
                 return True
             on = world.bodies[on].on
         else:

@@ -14,6 +14,7 @@ from scipy.ndimage import binary_dilation
 CELL = 0.1
 """Edge of a cell [m]; cell (i, j) has its middle at (i, j) * CELL of the map frame."""
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
+"""States of a cell."""
 DEARER = 4.0
 """What a cell costs there: the corners of a turning base come nearer than its sides."""
 DEAREST = 20.0
@@ -23,6 +24,7 @@ BESIDE_MOVABLE = 2.0
 """Cells that the base keeps from the outline of something movable: that is known finely, and looked at with the arm's
 collision model before anything is done there."""
 HALF = int(LARGEST_SIDE / CELL) + 20
+"""Half a side of the map [cells], with room around the largest apartment."""
 
 
 def cell_of(x: float, y: float) -> tuple[int, int]:
@@ -95,21 +97,23 @@ class ObstacleMap:
     def drivable(self) -> np.ndarray:
         """(H, W) bool: cells of the window where the base fits."""
         if self._drivable is None:
-            near = _around(self.window == OCCUPIED, self.clearance) | _around(self._taken_now(), BESIDE_MOVABLE)
-            self._drivable = (self.window == FREE) & ~near
+            too_close = _around(self.window == OCCUPIED, self.clearance) | _around(
+                self._movable_cells(), BESIDE_MOVABLE
+            )
+            self._drivable = (self.window == FREE) & ~too_close
         return self._drivable
 
     def _near_obstacles(self, cells: float) -> np.ndarray:
         """Return (H, W) bool: cells of the window at most so far from what is occupied, for good or now."""
-        return _around((self.window == OCCUPIED) | self._taken_now(), cells)
+        return _around((self.window == OCCUPIED) | self._movable_cells(), cells)
 
-    def _taken_now(self) -> np.ndarray:
+    def _movable_cells(self) -> np.ndarray:
         """Return (H, W) bool: cells of the window that something movable stands over."""
-        taken = np.zeros(self.window.shape, bool)
+        occupied = np.zeros(self.window.shape, bool)
         rows = self._aside - self._zero - self._low
-        rows = rows[np.all((rows >= 0) & (rows < taken.shape), axis=1)]
-        taken[rows[:, 0], rows[:, 1]] = True
-        return taken
+        rows = rows[np.all((rows >= 0) & (rows < occupied.shape), axis=1)]
+        occupied[rows[:, 0], rows[:, 1]] = True
+        return occupied
 
     def put_aside(self, points: np.ndarray) -> None:
         """Say over which points (N, 2) [m] something movable stands now, in place of those said before."""
@@ -146,7 +150,7 @@ class ObstacleMap:
             before = self._driven[self._low[0] : self._high[0], self._low[1] : self._high[1]].copy()
             before[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] = True
             # it stands here already, however near to something
-            free = self.drivable | (before & (self.window == FREE) & ~self._taken_now())
+            free = self.drivable | (before & (self.window == FREE) & ~self._movable_cells())
             cost = np.ones(self.window.shape)
             if self.comfort > 0:
                 self._dear = self._near_obstacles(self.comfort)

@@ -17,11 +17,15 @@ from scenewright.stages.agent.obstacle_map import CELL
 from scenewright.stages.agent.senses import Base
 
 MOST_PANELS = 6
+"""Most panels of the picture; by eye."""
 MOST_FRAMES, FRAME_MILLISECONDS = 24, 500
+"""Most frames of the animation, and time that one is shown [ms]; by eye."""
 VIEWS, VIEWS_ACROSS = 24, 6
+"""Latest views that are shown, and how many in a row; by eye."""
 DOTS = 100
+"""Resolution of a picture [px/inch]."""
 SHADES = np.array([0.72, 1.0, 0.35])
-"""Of unknown, free and occupied cells."""
+"""Grey of unknown, free and occupied cells."""
 FURNITURE_COLOR, THING_COLOR, WAY_COLOR = "#cdb18a", "#c8553d", "#3d6cb9"
 
 

@@ -42,7 +42,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         known=Apartment.read(episode.path("known.json")) if episode.path("known.json").is_file() else None,
         segmenter=parameters.segmenter,
     )
-    made = write_episode(
+    replayed = write_episode(
         context.output,
         setting,
         file.arm,
@@ -58,6 +58,6 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
     )
     if episode.path("transcript.jsonl").is_file():
         shutil.copyfile(episode.path("transcript.jsonl"), context.output / "transcript.jsonl")
-    if made.info != file:
-        return AgentEpisode(root=made.root, outcome="differs", summary=made.summary)
-    return made
+    if replayed.info != file:
+        return AgentEpisode(root=replayed.root, outcome="differs", summary=replayed.summary)
+    return replayed

@@ -39,9 +39,9 @@ def run(
     `world`, or in an apartment of the seed."""
     task = TASKS.get(parameters.task)
     words = task.words if task else parameters.task
-    known = None
+    known_apartment = None
     if scene is not None and truth is not None:
-        known = apartment_of(scene.info.bodies, str(scene.root))
+        known_apartment = apartment_of(scene.info.bodies, str(scene.root))
         room = InteractiveSceneFile.read(truth.path("room") / "scene.json")
         apartment = apartment_of(room.bodies, str(truth.root))
     elif world is not None:
@@ -56,7 +56,7 @@ def run(
         context.seed,
         Limits(turns=parameters.turns),
         world=parameters.simulation,
-        known=known,
+        known=known_apartment,
         segmenter=parameters.segmenter,
     )
     chat = _chat(parameters, transcript, context) if parameters.brain == "language" else None

@@ -23,7 +23,7 @@ has corners: in one it is within that share along both sides, and within the sec
 UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
 TWICE = 0.5
-"""Within this share of the distance of one thing a second detection of one look is of it as well."""
+"""Share of the distance of one thing within which a second detection of one look is of it as well; by eye."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
 FLOOR, PATCH = "floor", 0.1
@@ -31,7 +31,7 @@ FLOOR, PATCH = "floor", 0.1
 Region = tuple[int | str, bool]
 """Quarter turn (or `hand`, or `map`) from which something was seen, and whether from near by."""
 MAPPED: Region = ("map", False)
-"""Of what was mapped before the robot came."""
+"""Region of the votes for what was mapped before the robot came."""
 
 
 @dataclass(frozen=True)
@@ -60,35 +60,35 @@ class Item:
     @property
     def label(self) -> str:
         """The class that most regions say; the first said among equals."""
-        said = Counter(vote for vote in self.votes.values() if vote is not None)
-        return said.most_common(1)[0][0] if said else "thing"
+        counts = Counter(vote for vote in self.votes.values() if vote is not None)
+        return counts.most_common(1)[0][0] if counts else "thing"
 
     @property
     def margin(self) -> int:
         """By how many regions its class is ahead of any other, and of the sides from which nothing was seen."""
-        said = Counter(vote for vote in self.votes.values() if vote is not None)
-        own = said.pop(self.label, 0)
-        return own - max([*said.values(), len(self.sides(seen=False))])
+        counts = Counter(vote for vote in self.votes.values() if vote is not None)
+        count_of_label = counts.pop(self.label, 0)
+        return count_of_label - max([*counts.values(), len(self.sides(seen=False))])
 
     @property
     def doubt(self) -> str:
         """The class that it may as well be, as many regions say the one as the other; empty without one."""
-        said = Counter(vote for vote in self.votes.values() if vote is not None)
-        own = said.pop(self.label, 0)
-        other, count = said.most_common(1)[0] if said else ("", 0)
-        return other if count == own else ""
+        counts = Counter(vote for vote in self.votes.values() if vote is not None)
+        count_of_label = counts.pop(self.label, 0)
+        second_label, count = counts.most_common(1)[0] if counts else ("", 0)
+        return second_label if count == count_of_label else ""
 
     @property
     def disputed(self) -> str:
         """The class that most regions say of those that say another one; empty where all agree."""
-        said = Counter(vote for vote in self.votes.values() if vote not in (None, self.label))
-        return said.most_common(1)[0][0] or "" if said else ""
+        counts = Counter(vote for vote in self.votes.values() if vote not in (None, self.label))
+        return counts.most_common(1)[0][0] or "" if counts else ""
 
     def sides(self, *, seen: bool) -> set[int | str]:
         """Return the sides from which it was seen from near or far, or from which it should have been and was not:
         what hides a thing hides it from a side."""
-        there = {side for (side, _), vote in self.votes.items() if vote is not None}
-        return there if seen else {side for side, _ in self.votes} - there
+        sides_with_item = {side for (side, _), vote in self.votes.items() if vote is not None}
+        return sides_with_item if seen else {side for side, _ in self.votes} - sides_with_item
 
     @property
     def used(self) -> bool | None:
@@ -116,22 +116,24 @@ class SceneMap:
     def know(self, before: Mapped) -> None:
         """Believe in what somebody mapped before, the things as if one view had shown them."""
         self.obstacles.add(before.floor)
-        keys = [self._enter(seen) for seen in before.floor.furniture]
+        keys = [self._enter(piece_seen) for piece_seen in before.floor.furniture]
         for number, detection in before.things:
             self.add(detection, keys[number], MAPPED)
 
     def sweep(self, body: Body) -> None:
         """Turn the head camera around and enter the furniture that it saw."""
-        for seen in body.sweep().furniture:
-            self._enter(seen)
+        for piece_seen in body.sweep().furniture:
+            self._enter(piece_seen)
 
     def _enter(self, seen: SeenFurniture) -> str:
-        known = [key for key, piece in self.furniture.items() if _same_piece(piece, seen)] or [self._name(seen.label)]
-        key = known[0]
-        for other in known[1:]:  # two ends of one piece, which were seen before its middle
-            del self.furniture[other]
+        same_keys = [key for key, piece in self.furniture.items() if _same_piece(piece, seen)] or [
+            self._name(seen.label)
+        ]
+        key = same_keys[0]
+        for duplicate in same_keys[1:]:  # two ends of one piece, which were seen before its middle
+            del self.furniture[duplicate]
             for item in self.items.values():
-                item.place = key if item.place == other else item.place
+                item.place = key if item.place == duplicate else item.place
         self.furniture[key] = seen
         return key
 
@@ -143,9 +145,11 @@ class SceneMap:
 
     def in_front(self, base: Base) -> str:
         """Return the key of the furniture before a base pose, rather what it faces; or nothing."""
-        near = [(edge_distance(f, base.x, base.y), key, f) for key, f in self.furniture.items() if f.label != FLOOR]
-        near = [entry for entry in near if entry[0] <= IN_FRONT]
-        return min(((not _faces(base, f), gap, key) for gap, key, f in near), default=(False, 0.0, ""))[2]
+        within_reach = [
+            (edge_distance(f, base.x, base.y), key, f) for key, f in self.furniture.items() if f.label != FLOOR
+        ]
+        within_reach = [entry for entry in within_reach if entry[0] <= IN_FRONT]
+        return min(((not _faces(base, f), gap, key) for gap, key, f in within_reach), default=(False, 0.0, ""))[2]
 
     def add(self, detection: Detection, place: str, region: Region) -> Item:
         """Enter one detection."""
@@ -190,11 +194,16 @@ class SceneMap:
             for apart in [_apart(i.position, d.position)]
             if apart <= self._same_thing
         )
-        found: dict[int, str] = {}
+        key_of_detection: dict[int, str] = {}
         for _, key, number, apart in pairs:
-            if number not in found and (key not in found.values() or apart <= TWICE * self._same_thing):
-                found[number] = key
-        return [self.items[found[number]] if number in found else None for number in range(len(detections))]
+            if number not in key_of_detection and (
+                key not in key_of_detection.values() or apart <= TWICE * self._same_thing
+            ):
+                key_of_detection[number] = key
+        return [
+            self.items[key_of_detection[number]] if number in key_of_detection else None
+            for number in range(len(detections))
+        ]
 
     def carrier_of(self, item: Item) -> str:
         """Return the key of the small carrier on which a thing lies, or nothing."""

@@ -99,8 +99,8 @@ def _move_toy(draft: Draft) -> None:
 
 def _transfer_all_toys(draft: Draft) -> None:
     tables = _furnish(draft)
-    for place, label in enumerate(_some(draft, TOYS, 2, 3)):
-        draft.add_thing(label, tables[place % len(tables)])
+    for number, label in enumerate(_some(draft, TOYS, 2, 3)):
+        draft.add_thing(label, tables[number % len(tables)])
     _clutter(draft, tables)
 
 
@@ -115,8 +115,8 @@ def _move_cup_and_toy(draft: Draft) -> None:
 
 def _gather_cups(draft: Draft) -> None:
     tables = _furnish(draft)
-    for place in range(int(draft.random.integers(2, 4))):
-        draft.add_thing("cup", tables[place % 2], color=COLORS[place])
+    for number in range(int(draft.random.integers(2, 4))):
+        draft.add_thing("cup", tables[number % 2], color=COLORS[number])
     _clutter(draft, tables)
 
 
@@ -226,4 +226,6 @@ TASKS = {
     )
 }
 THESIS_TASKS = tuple(TASKS)[:8]
+"""Names of the thesis's tasks."""
 TABLETOP = tuple(TASKS)[:4]
+"""Names of those at a table."""

@@ -102,6 +102,8 @@ def run_trial(
         if watch is not None:
             watch(turn, skills, world)
 
-    one = one_program or (brain is None and ARMS[arm].one_program)
-    session = run_session(brain or rules_brain(setting, arm), skills, world, setting.limits, one_program=one, watch=see)
+    single_program = one_program or (brain is None and ARMS[arm].one_program)
+    session = run_session(
+        brain or rules_brain(setting, arm), skills, world, setting.limits, one_program=single_program, watch=see
+    )
     return session, world

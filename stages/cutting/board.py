@@ -11,13 +11,15 @@ from scenewright.stages.kit.geometry.transforms import transform_from_quaternion
 from scenewright.stages.kit.simulation.engine import engine
 
 SIZE = (1.2, 0.6)
-"""Of the board [m]; its top is at z = 0, the floor far below."""
+"""Length and width of the board [m]; its top is at z = 0, the floor far below."""
 DENSITY = 900.0
 """[kg/m^3]."""
 TIME_STEP, SECONDS = 1 / 480, 0.75
+"""Time step of the physics and time that fragments get to come to rest [s]; by eye."""
 LIFT = 0.001
-"""From which fragments fall [m]."""
+"""Height from which fragments fall [m]; by eye."""
 DIRECTIONS = 96
+"""Directions in which a fragment's outermost points are sought; by eye."""
 
 
 class Board:
@@ -43,8 +45,8 @@ class Board:
 
     def rest(self, board: dict[int, Body]) -> None:
         """Let what lies there come to rest, in place. What falls off the board stays where it went over the edge."""
-        there = {number: body for number, body in board.items() if number not in self.fallen}
-        bodies = {number: self._add(body) for number, body in there.items()}
+        on_board = {number: body for number, body in board.items() if number not in self.fallen}
+        bodies = {number: self._add(body) for number, body in on_board.items()}
         for _ in range(round(SECONDS / TIME_STEP)):
             engine.stepSimulation(physicsClientId=self.client)
         for number, added in bodies.items():
@@ -54,8 +56,8 @@ class Board:
             if position[2] < 0.0:
                 self.fallen.add(number)
                 continue
-            pose[:3, 3] -= pose[:3, :3] @ there[number].moments[0]
-            board[number] = there[number].moved(pose)
+            pose[:3, 3] -= pose[:3, :3] @ on_board[number].moments[0]
+            board[number] = on_board[number].moved(pose)
             self.turned.append(float(np.arccos(np.clip((np.trace(pose[:3, :3]) - 1.0) / 2.0, -1.0, 1.0))))
 
     def _add(self, body: Body) -> int:
@@ -63,8 +65,8 @@ class Board:
         points = outermost(body.vertices - center)
         shape = engine.createCollisionShape(engine.GEOM_MESH, vertices=points.tolist(), physicsClientId=self.client)
         above = max(0.0, LIFT - body.extent_along(np.array([0.0, 0.0, 1.0]))[0])
-        place = (center + np.array([0.0, 0.0, above])).tolist()
-        added = int(engine.createMultiBody(DENSITY * body.volume, shape, -1, place, physicsClientId=self.client))
+        position = (center + np.array([0.0, 0.0, above])).tolist()
+        added = int(engine.createMultiBody(DENSITY * body.volume, shape, -1, position, physicsClientId=self.client))
         self._rub(added)
         return added
 

@@ -12,6 +12,7 @@ from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 HINT = "make the artifact again"
 MOST_BODIES = 8192
+"""Most bodies of a file; by eye."""
 
 
 def write_bodies(path: Path, bodies: Sequence[Body]) -> None:
@@ -27,8 +28,8 @@ def write_bodies(path: Path, bodies: Sequence[Body]) -> None:
 def read_bodies(path: Path) -> list[Body]:
     """Return the bodies of a file. Raises BadInput for one that is torn, or holds what is no closed body."""
     vertices, faces, sizes = read_arrays(path, "vertices", "faces", "sizes", shapes=("V 3", "F 3", "N 2"), hint=HINT)
-    whole = len(sizes) <= MOST_BODIES and (sizes > 0).all() and np.isfinite(vertices).all()
-    if not whole or (sizes.sum(axis=0) != (len(vertices), len(faces))).any():
+    is_valid = len(sizes) <= MOST_BODIES and (sizes > 0).all() and np.isfinite(vertices).all()
+    if not is_valid or (sizes.sum(axis=0) != (len(vertices), len(faces))).any():
         raise BadInput(f"{path}: its sizes do not fit its vertices and faces", hint=HINT)
     bodies = []
     starts = np.concatenate([np.zeros((1, 2), np.int64), np.cumsum(sizes, axis=0)])

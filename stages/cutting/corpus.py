@@ -14,6 +14,7 @@ from scenewright.stages.kit.geometry.transforms import inverse
 POINTS, QUERIES = 256, 384
 """Surface points that the encoder sees, and places at which the decoder is asked, of each fragment."""
 QUERY_VOXELS = 24
+"""Voxels along the longest edge, of the grid on which the decoder is asked; by eye."""
 
 
 @dataclass(frozen=True)
@@ -57,23 +58,23 @@ def corpus_of(demonstrations: Sequence[Demonstration]) -> Corpus:
     for demonstration in demonstrations:
         start = len(shapes)
         shapes += [canonical(body) for body in demonstration.pieces]
-        there = [start + k for k in range(len(demonstration.objects))]
-        roots += there
+        present = [start + k for k in range(len(demonstration.objects))]
+        roots += present
         goal = tuple(start + k for k in demonstration.final)
         for number, cut in enumerate(demonstration.cuts):
             piece, results = start + cut.piece, tuple(start + k for k in cut.results)
             plane = plane_in(shapes[piece], cut.plane)
-            after = tuple([k for k in there if k != piece] + list(results))
+            after = tuple([k for k in present if k != piece] + list(results))
             last = demonstration.finished and number == len(demonstration.cuts) - 1
-            choices.append(Choice(tuple(there), piece, plane, results, after, goal, last))
-            there = list(after)
+            choices.append(Choice(tuple(present), piece, plane, results, after, goal, last))
+            present = list(after)
     return Corpus(shapes, choices, tuple(roots))
 
 
 def plane_in(shape: Canonical, plane: Plane) -> np.ndarray:
     """Return a world plane as (4,): n and d over the scale in the fragment's frame, its largest component positive."""
-    own = plane.moved(inverse(shape.world_from_fragment))
-    values = np.append(own.normal, own.d / float(shape.size.max()))
+    plane_in_shape = plane.moved(inverse(shape.world_from_fragment))
+    values = np.append(plane_in_shape.normal, plane_in_shape.d / float(shape.size.max()))
     return np.asarray(values * np.sign(values[np.argmax(np.abs(values[:3]))]))
 
 
@@ -114,8 +115,8 @@ def queries(shapes: Sequence[Canonical], random: np.random.Generator) -> tuple[n
         edge = np.zeros(padded.shape, bool)
         for axis in range(3):
             edge |= padded != np.roll(padded, 1, axis)
-        near = np.argwhere(edge)
-        chosen = near[random.integers(len(near), size=QUERIES // 2)]
+        near_surface = np.argwhere(edge)
+        chosen = near_surface[random.integers(len(near_surface), size=QUERIES // 2)]
         spread = np.column_stack([random.integers(n, size=QUERIES - QUERIES // 2) for n in padded.shape])
         voxels = np.concatenate([chosen, spread])
         places[number] = (grid.origin + (voxels - 2 + 0.5) * grid.voxel) / scale

@@ -33,7 +33,7 @@ def run(record: Path | None, *, parameters: DemonstrateParameters, context: Cont
         else:
             scatter = Scatter(tilt=parameters.tilt, spacing=parameters.spacing)
             trials = make_trials(context.seed, scatter, parameters.share)
-            records = _scripted(trials)
+            records = _scripted_records(trials)
     training = sum(each.training for each in records)
     statement = f"{len(trials)} trials, {training} of them to learn from, {sum(len(t.cuts) for t in trials)} cuts"
     if record is not None:
@@ -52,13 +52,13 @@ def run(record: Path | None, *, parameters: DemonstrateParameters, context: Cont
     return CuttingDemonstrations(root=context.output, summary=summary)
 
 
-def _scripted(trials: list[Demonstration]) -> list[DemonstrationRecord]:
+def _scripted_records(trials: list[Demonstration]) -> list[DemonstrationRecord]:
     of_cell = Counter(trial.cell for trial in trials)
-    seen: Counter[str] = Counter()
+    trials_of_cell: Counter[str] = Counter()
     records = []
     for trial in trials:
-        records.append(record_of(trial, is_for_training(trial.cell, seen[trial.cell], of_cell[trial.cell])))
-        seen[trial.cell] += 1
+        records.append(record_of(trial, is_for_training(trial.cell, trials_of_cell[trial.cell], of_cell[trial.cell])))
+        trials_of_cell[trial.cell] += 1
     return records
 
 

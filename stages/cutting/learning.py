@@ -10,10 +10,10 @@ import torch
 
 def layers(*widths: int) -> torch.nn.Sequential:
     """Return fully connected layers of these widths with ReLU between them."""
-    parts: list[torch.nn.Module] = []
+    modules: list[torch.nn.Module] = []
     for first, second in zip(widths[:-1], widths[1:], strict=True):
-        parts += [torch.nn.Linear(first, second), torch.nn.ReLU()]
-    return torch.nn.Sequential(*parts[:-1])
+        modules += [torch.nn.Linear(first, second), torch.nn.ReLU()]
+    return torch.nn.Sequential(*modules[:-1])
 
 
 def fit(

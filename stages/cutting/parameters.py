@@ -93,8 +93,8 @@ def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) ->
 
 def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError unless there is one goal, and words that can be read."""
-    given = [name for name in ("goal_meshes", "goal_pictures", "demonstrations") if inputs.get(name) is not None]
-    goals = [f"--{name.replace('_', '-')}" for name in given if name.startswith("goal")]
+    given_inputs = [name for name in ("goal_meshes", "goal_pictures", "demonstrations") if inputs.get(name) is not None]
+    goals = [f"--{name.replace('_', '-')}" for name in given_inputs if name.startswith("goal")]
     goals += ["--goal"] if parameters.goal else []
     if len(goals) > 1:
         raise UsageError(f"{' and '.join(goals)} both say what is wanted", hint="give one of them")
@@ -102,14 +102,14 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
         read_words(parameters.goal)
         if parameters.method != "ours":
             raise UsageError(f"--method {parameters.method} plans for fragments, not for words", hint="--method ours")
-    elif not given:
+    elif not given_inputs:
         raise UsageError(
             "cutting plan: nothing is wanted",
             hint='give --goal "6 slices", --goal-meshes, --goal-pictures or --demonstrations',
         )
     if parameters.together and parameters.method != "ours":
         raise UsageError(f"--together: {parameters.method} cuts one piece at a time", hint="--method ours")
-    if "demonstrations" in given and inputs.get("mesh") is not None:
+    if "demonstrations" in given_inputs and inputs.get("mesh") is not None:
         raise UsageError("--mesh and --demonstrations both say what is cut", hint="give one of them")
 
 

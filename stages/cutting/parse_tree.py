@@ -13,7 +13,7 @@ from scenewright.stages.kit.drawing.tree_layout import tree_layout
 DOTS, ROW = 100, 0.3
 """Dots and inches of a row."""
 TALLEST = 60.0
-"""Of the picture [inches]: rows of larger trees stand closer."""
+"""Greatest height of the picture [inches]: rows of larger trees stand closer."""
 EDGE = "#90a0b0"
 
 

@@ -15,10 +15,13 @@ from scenewright.stages.kit.geometry.transforms import look_at
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 APART = 1.7
-"""By which distances between fragments grow in an exploded view."""
+"""Factor by which distances between fragments grow in an exploded view; by eye."""
 VIEW = np.array([0.75, -0.9, 0.95])
+"""Direction (3,) from the bodies to the eye; by eye."""
 SECONDS_OF_A_FRAME = 0.45
+"""Time that a frame of an animation is shown [s]; by eye."""
 MOST_FRAMES = 40
+"""Most frames of an animation; by eye."""
 ROW = 4
 """Pictures beside each other."""
 

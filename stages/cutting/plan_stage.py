@@ -103,13 +103,13 @@ def _task(
 ) -> _Task:
     notes: list[str] = []
     goal: list[Body] = []
-    said, doubt = parameters.goal, None
+    goal_text, doubt = parameters.goal, None
     pictures: tuple[np.ndarray, ...] = ()
     if demonstrations is not None:
         (trial,) = read_demonstrations(demonstrations, only=parameters.trial)
         objects = trial.objects
         if not parameters.goal and goal_meshes is None and goal_pictures is None:
-            goal, said = trial.fragments, f"the fragments of trial {parameters.trial}"
+            goal, goal_text = trial.fragments, f"the fragments of trial {parameters.trial}"
     elif mesh is not None:
         body, mended = read_body(mesh, parameters.unit)
         objects, notes = [body], [f"{mesh.name}: {text}" for text in mended]
@@ -117,23 +117,23 @@ def _task(
         objects = [make_food(parameters.food, context.random(0))]
     if goal_meshes is not None:
         goal, mended = read_bodies_of(goal_meshes, parameters.unit)
-        said, notes = f"{len(goal)} meshes of {goal_meshes.name}", notes + mended
+        goal_text, notes = f"{len(goal)} meshes of {goal_meshes.name}", notes + mended
     if goal_pictures is not None:
-        seen = read_pictures(goal_pictures)
-        goal, pictures = see([view for view, _ in seen]), tuple(color for _, color in seen)
+        pictures_read = read_pictures(goal_pictures)
+        goal, pictures = see([view for view, _ in pictures_read]), tuple(color for _, color in pictures_read)
         if not goal:
             raise BadInput(
                 f"{goal_pictures}: nothing lies on the board", hint="is the board's top z = 0 in camera.json?"
             )
-        said, doubt = (
-            f"{len(goal)} fragments seen by {len(seen)} cameras",
-            SEEN_DOUBT if len(seen) > 1 else DOUBT_OF_ONE,
+        goal_text, doubt = (
+            f"{len(goal)} fragments seen by {len(pictures_read)} cameras",
+            SEEN_DOUBT if len(pictures_read) > 1 else DOUBT_OF_ONE,
         )
     if parameters.goal:
         items, names = imagine(objects, read_words(parameters.goal), learned.grammar)
     else:
         items, names = [item_of(body, k) for k, body in enumerate(goal)], [""] * len(goal)
-    return _Task(objects, goal, items, names, said, tuple(notes), doubt, pictures)
+    return _Task(objects, goal, items, names, goal_text, tuple(notes), doubt, pictures)
 
 
 def _file(
@@ -237,10 +237,10 @@ def _draw(output: Path, task: _Task, carving: Carving, file: CuttingPlanFile, wi
     images += [captioned(Image.fromarray(color), width // 3, "wanted, its picture") for color in task.pictures[:1]]
     strip(images).save(output / "fragments.png")
     draw_tree(file, width).save(output / "tree.png")
-    there = dict(enumerate(task.objects))
-    frames = [dict(there)]
+    on_board = dict(enumerate(task.objects))
+    frames = [dict(on_board)]
     for step in carving.steps:
-        del there[step.action.piece]
-        there |= {number: carving.pieces[number] for number in step.results}
-        frames.append(apart(there))
+        del on_board[step.action.piece]
+        on_board |= {number: carving.pieces[number] for number in step.results}
+        frames.append(apart(on_board))
     animate(output / "cuts.gif", frames, width // 3, [f"{k} cuts" for k in range(len(frames))])

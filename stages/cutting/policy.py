@@ -15,7 +15,7 @@ from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 MOST_REFUSALS = 20
 """One after the other, after which nothing more is tried."""
 GAP = 0.005
-"""By which fragments are pushed apart [m]."""
+"""Distance by which fragments are pushed apart [m]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -133,19 +133,19 @@ def _make(
     """Cut one piece, and tell the policy what came of it."""
     board = carving.board
     try:
-        parts = cut(board[action.piece], action.plane, knife)
+        bodies = cut(board[action.piece], action.plane, knife)
     except Refused as refused:
         carving.refusals.append(refused.failure)
         policy.refused(action, refused.failure)
         return
     del board[action.piece]
     first = len(carving.pieces)
-    sides = action.plane.height(np.array([part.moments[0] for part in parts])) > 0
-    for number, (part, up) in enumerate(zip(parts, sides, strict=True), start=first):
-        board[number] = part.shifted((0.5 if up else -0.5) * GAP * action.plane.normal)
+    sides = action.plane.height(np.array([body.moments[0] for body in bodies])) > 0
+    for number, (body, up) in enumerate(zip(bodies, sides, strict=True), start=first):
+        board[number] = body.shifted((0.5 if up else -0.5) * GAP * action.plane.normal)
     if lie is not None:
         lie(board)
-    results = {number: board[number] for number in range(first, first + len(parts))}
+    results = {number: board[number] for number in range(first, first + len(bodies))}
     carving.pieces |= results
     carving.steps.append(Step(action, tuple(results), carving.strokes))
     policy.done(action, results, frozenset(n for n, up in zip(results, sides, strict=True) if up))

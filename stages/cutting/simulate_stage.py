@@ -37,23 +37,23 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
     objects, goal = laid_out(bodies[: file.objects]), bodies[file.objects : file.objects + file.goal_bodies]
     policy = _policy(read_learned(model), file, goal, parameters, context.seed)
     frames: list[Mapping[int, Body]] = []
-    with closing(Hand() if parameters.cameras else Board()) as place, context.progress.step("cut"):
-        board = place.board if isinstance(place, Hand) else place
+    with closing(Hand() if parameters.cameras else Board()) as table, context.progress.step("cut"):
+        board = table.board if isinstance(table, Hand) else table
 
         def lie(there: dict[int, Body]) -> None:
-            if isinstance(place, Hand):
-                place.lay(there)
+            if isinstance(table, Hand):
+                table.lay(there)
                 frames.append(dict(zip(there, in_rows(list(there.values()), ROW, BETWEEN), strict=True)))
             else:
-                place.rest(there)
+                table.rest(there)
                 frames.append(dict(there))
 
         start = dict(enumerate(objects))
         lie(start)
         most = len(file.wanted) + (parameters.method == "ours")
         carving = carry_out(policy, list(start.values()), most=most, lie=lie)
-        if isinstance(place, Hand):
-            laid = place.lay_out(carving.fragments)
+        if isinstance(table, Hand):
+            laid = table.lay_out(carving.fragments)
             write_pictures(context.output / "seen", look(laid, context.random(2)), laid)
     scores = scores_record(score(carving.fragments, goal)) if goal else None
     reached = carving.stopped is None and len(carving.board) >= len(file.wanted) and not board.fallen
@@ -109,7 +109,7 @@ def _policy(
         return learned.policy(method, Goal(tuple(goal)), seed)
     if method != "ours":
         raise UsageError(f"--method {method} cuts towards fragments, the plan's goal is words", hint="--method ours")
-    items = [Item(k, wanted.edges, wanted.volume) for k, wanted in enumerate(file.wanted)]
+    items = [Item(k, fragment.edges, fragment.volume) for k, fragment in enumerate(file.wanted)]
     if parameters.cameras:
         return PerceivingPolicy(learned.grammar, items, seed, doubt=max(SEEN_DOUBT, file.doubt or 0.0))
     return learned.policy_for(items, doubt=file.doubt or DOUBT)

@@ -43,5 +43,5 @@ def reach(
 
 def again(trial: Demonstration, seed: int) -> Reached:
     """Return what the scripted cutter makes, who knows the recipe that the goal was cut after."""
-    made = follow(trial.cell, trial.families, trial.objects, trial.recipes, np.random.default_rng([GOALS, seed, 1]))
-    return Reached(score(made.fragments, trial.fragments))
+    repeated = follow(trial.cell, trial.families, trial.objects, trial.recipes, np.random.default_rng([GOALS, seed, 1]))
+    return Reached(score(repeated.fragments, trial.fragments))

@@ -17,20 +17,20 @@ def read_words(text: str) -> list[tuple[int, CategoryName]]:
     """Return the counts and categories of a goal. Raises UsageError naming what cannot be read."""
     categories: dict[str, CategoryName] = {name.removesuffix("s"): name for name in get_args(CategoryName)}
     hint = f"write for example 6 slices, 8 cubes; there are {', '.join(categories.values())}"
-    found: dict[CategoryName, int] = {}
+    counts: dict[CategoryName, int] = {}
     for part in re.split(r",|\band\b", text):
-        read = _PART.fullmatch(part)
-        if read is None:
+        match = _PART.fullmatch(part)
+        if match is None:
             raise UsageError(f"--goal: {part.strip()!r:.60} is no number with a category", hint=hint)
-        name = categories.get(read[2].removesuffix("s"))
+        name = categories.get(match[2].removesuffix("s"))
         if name is None:
-            raise UsageError(f"--goal: there is no category {read[2]!r:.40}", hint=hint)
-        if name in found:
+            raise UsageError(f"--goal: there is no category {match[2]!r:.40}", hint=hint)
+        if name in counts:
             raise UsageError(f"--goal: {name} are named twice", hint="add their numbers")
-        found[name] = int(read[1])
-    for name, count in found.items():
+        counts[name] = int(match[1])
+    for name, count in counts.items():
         if count == 0:
             raise UsageError(f"--goal: 0 {name}", hint="leave them out")
-    if sum(found.values()) > MOST:
-        raise UsageError(f"--goal: {sum(found.values())} fragments, at most {MOST} are planned", hint="ask for fewer")
-    return [(count, name) for name, count in found.items()]
+    if sum(counts.values()) > MOST:
+        raise UsageError(f"--goal: {sum(counts.values())} fragments, at most {MOST} are planned", hint="ask for fewer")
+    return [(count, name) for name, count in counts.items()]

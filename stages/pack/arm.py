@@ -20,12 +20,15 @@ from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 Limits = Literal["fr3", "panda"]
 FR3_LOWER = np.array([-5.3093, -1.5133, -2.4937, -2.7478, -2.48, 0.8521, -5.7995])
+"""Lower joint limits [rad] of the published environment (docs/LLM3.md)."""
 FR3_UPPER = np.array([5.3093, 1.5133, 2.4937, -0.4461, 2.48, 4.2094, 5.7995])
-"""Joint limits [rad] of the published environment (docs/LLM3.md)."""
+"""Upper joint limits [rad] of the published environment (docs/LLM3.md)."""
 HOME = np.array([0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4])
+"""Home configuration [rad], Franka's own."""
 SEARCHES = 10
 """Random seeds of the numeric search, beside the nearest planar configuration and the home one."""
 LEAN_OUT = np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0])
+"""Turn of the elbow out of the plane in which a search starts [rad]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -176,9 +179,9 @@ class FixedArm:
         if key not in self._numeric:
             # The planar answer, pushed into the limits and out of its plane, is near: neighbouring poses then get
             # neighbouring answers.
-            near = np.clip(self._planar(radius, z) + LEAN_OUT, self.chain.lower, self.chain.upper)
+            planar_start = np.clip(self._planar(radius, z) + LEAN_OUT, self.chain.lower, self.chain.upper)
             others = random_starts(self.chain, SEARCHES, np.random.default_rng(7))
-            starts = np.concatenate([near[None], HOME[None], others])
+            starts = np.concatenate([planar_start[None], HOME[None], others])
             target = ToolPose(radius, 0.0, z, 0.0).matrix()
             answer = inverse_kinematics(self.chain, target, starts)
             self._numeric[key] = answer.arm if answer.found else None

@@ -52,7 +52,7 @@ class ArmScene:
     def _choose_self_collisions(self, joints: dict[str, int], arm_joints: tuple[str, ...]) -> None:
         """Switch off pairs that are near along the chain, and those of the wrist: their meshes overlap by design."""
         order = [-1, *(joints[name] for name in arm_joints)]
-        rank = {index: place for place, index in enumerate(order)}
+        rank = {index: rank_of_link for rank_of_link, index in enumerate(order)}
         for first in self._links:
             for second in self._links:
                 a, b = rank.get(first, 7), rank.get(second, 7)
@@ -80,7 +80,7 @@ class ArmScene:
         """
         for body, _ in self._bodies:
             engine.removeBody(body, physicsClientId=self.client)
-        self._bodies = [(self._stand(other.block), other.name) for other in others]
+        self._bodies = [(self._stand(solid.block), solid.name) for solid in others]
         self._held = None
         if held is not None:
             name, block, above = held
@@ -104,18 +104,18 @@ class ArmScene:
             bodies.append(body)
         engine.performCollisionDetection(physicsClientId=client)
         worst: Collision | None = None
-        for own in bodies:
-            for entry in engine.getContactPoints(bodyA=own, physicsClientId=client):
-                collision = self._collision(own, entry)
+        for own_body in bodies:
+            for entry in engine.getContactPoints(bodyA=own_body, physicsClientId=client):
+                collision = self._collision(own_body, entry)
                 if collision is not None and (worst is None or collision.depth > worst.depth):
                     worst = collision
         return worst
 
     def _collision(self, own: int, entry: tuple) -> Collision | None:
-        other, depth = entry[2], -entry[8]
-        held = self._held[0] if self._held is not None else None
-        if depth <= TOUCH or {own, other} == {self._robot, held}:
+        touched, depth = entry[2], -entry[8]
+        held_body = self._held[0] if self._held is not None else None
+        if depth <= TOUCH or {own, touched} == {self._robot, held_body}:
             return None
         names = dict(self._bodies) | {self._table: "table"}
         part = self._links[entry[3]] if own == self._robot else names[own]
-        return Collision(part, self._links[entry[4]] if other == self._robot else names[other], depth)
+        return Collision(part, self._links[entry[4]] if touched == self._robot else names[touched], depth)

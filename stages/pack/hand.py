@@ -11,15 +11,21 @@ from scenewright.stages.pack.solids import Block, overlap
 
 # Measured on the collision meshes with the fingers 8 cm apart; heights from the tool point, metres.
 PALM = (0.032, 0.104, 0.038, 0.133)
+"""Half width, half length, lowest and highest point of the palm [m]."""
 FINGER = (0.011, 0.014, -0.008, 0.047)
+"""Half width, half length, lowest and highest point of a finger [m]."""
 FINGER_OFFSET = 0.053
+"""Distance of a finger's middle from the hand's [m]."""
 TIP_BELOW_TOOL = 0.008
+"""Height of the tool point over the fingertips [m]."""
 TOOL_OVER_TOP = 0.015
 """The tool stays this far over the upper face of the box it takes [m]; 5 cm over the centre of a box of 7 cm."""
 TOOL_OVER_CENTRE = 0.05
+"""Height of the tool over the centre of the box that it takes [m], more over high boxes."""
 PLACE_CENTRE = 0.05
 """World z [m] at which a box's centre is let go; higher boxes are let go as far above the basket as those of 7 cm."""
 RELEASE_BOTTOM = 0.015
+"""Height of the underside of a high box at which it is let go [m]."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +74,13 @@ def end_collision(pose: ToolPose, held: Named | None, others: tuple[Named, ...])
     `goal_in_collision`: objects what is hit and what hits it (`hand` or the held box), numbers depth [m].
     """
     worst: tuple[float, str, str] | None = None
-    parts = [(held.name, held.block)] if held is not None else []
-    parts += [("hand", block) for block in hand_blocks(pose)]
-    for part, block in parts:
-        for other in others:
-            depth = overlap(block, other.block)
+    carried_blocks = [(held.name, held.block)] if held is not None else []
+    carried_blocks += [("hand", block) for block in hand_blocks(pose)]
+    for part, block in carried_blocks:
+        for obstacle in others:
+            depth = overlap(block, obstacle.block)
             if depth > 1e-9 and (worst is None or depth > worst[0]):
-                worst = (depth, part, other.name)
+                worst = (depth, part, obstacle.name)
     if worst is None:
         return None
     depth, part, other_name = worst

@@ -32,13 +32,15 @@ STARTS = (
     (0.15, -0.5),
     (0.15, 0.5),
 )
-"""Where boxes may start (x, y) [m], far enough apart for the hand."""
+"""Places (x, y) at which boxes may start [m], far enough apart for the hand."""
 CLEARANCE = 0.004
 """Boxes of the certificate stand at least this far apart [m]."""
 SHORTEST, LONGEST = 0.03, 0.13
+"""Shortest and longest side of a box [m]; by eye."""
 ORDERS = 6
 """Orders in which the certificate is tried."""
 TRIES = 200
+"""Most tries to draw a problem that can be certified; by eye."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,9 @@ HARD_CELLS: dict[str, Recipe] = {
     "boxes_8": Recipe((8, 8), (0.55, 0.62)),
     "boxes_10": Recipe((10, 10), (0.55, 0.62)),
 }
+"""Name of a suite -> how its problems are drawn."""
 OBSTACLE_TOPS = (0.03, 0.10, 0.16)
+"""Heights of obstacles [m]; by eye."""
 COLORS = ("red", "blue", "green", "tan", "cyan", "yellow", "purple", "orange", "white", "brown")
 
 
@@ -142,11 +146,11 @@ def _draw(
     cells = cells[blocked:]
     sides = np.array([cell[2:] - cell[:2] for cell in cells]) - CLEARANCE
     free = sum(float((cell[2] - cell[0]) * (cell[3] - cell[1])) for cell in cells)
-    wanted = random.uniform(*recipe.fill) * free
+    target_area = random.uniform(*recipe.fill) * free
     full = float(np.prod(sides, axis=1).sum())
-    if full < wanted:
+    if full < target_area:
         return None
-    sides = sides * np.sqrt(wanted / full)
+    sides = sides * np.sqrt(target_area / full)
     if sides.min() < SHORTEST or sides.max() > LONGEST:
         return None
     starts = random.permutation(len(STARTS))[:count]

@@ -75,11 +75,13 @@ BOX_SETS: dict[str, tuple[tuple[str, float, float, float], ...]] = {
         ("tan_box", 0.035, 0.035, 0.07),
     ),
 }
+"""Name of a set -> its boxes: name and extents [m]."""
 BASKETS: dict[str, Rectangle] = {
     "small": centred("basket", 0.65, 0.0, 0.22, 0.21),
     "medium": centred("basket", 0.70, 0.0, 0.32, 0.21),
     "large": centred("basket", 0.75, 0.0, 0.42, 0.21),
 }
+"""Name -> the basket in the table's plane [m]."""
 PUBLISHED_CELLS: dict[str, tuple[str, str]] = {
     "easy": ("easy", "small"),
     "medium": ("medium", "small"),
@@ -89,6 +91,7 @@ PUBLISHED_CELLS: dict[str, tuple[str, str]] = {
 }
 """Columns of table 4.1 -> (box set, basket). `hard` is also the column Small of setting 2: the same run."""
 GRIPPER_GAP = 0.09
+"""Room for the hand between two boxes at the start [m]; by eye."""
 
 
 def published_instance(cell: str, seed: int) -> Instance:

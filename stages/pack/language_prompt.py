@@ -56,9 +56,9 @@ FORMS: dict[Variant, str] = {"backtrack": PLAN_FORM, "scratch": PLAN_FORM, "symb
 
 def packing_language(observation: Observation) -> ActionLanguage:
     """Return what may be said in a plan for this scene."""
-    place = {"x": X_RANGE, "y": Y_RANGE, "theta": THETA_RANGE}
+    ranges = {"x": X_RANGE, "y": Y_RANGE, "theta": THETA_RANGE}
     return ActionLanguage(
-        (ActionType("pick", ("box",)), ActionType("place", ("box",), place)),
+        (ActionType("pick", ("box",)), ActionType("place", ("box",), ranges)),
         {"box": frozenset(box.name for box in observation.boxes)},
     )
 
@@ -71,13 +71,13 @@ def prompt(
     `reasons`: an action that failed is shown with the cause, else only that it failed (the ablation of table 4.1).
     """
     system = f"You plan the actions of a robot so that they reach a goal. {STRATEGY[variant]}"
-    parts = [
+    paragraphs = [
         TASK,
         "Initial state\n" + observation_text(observation),
         "Plans so far, with what the motion planner said\n" + trace_text(trace, reasons=reasons),
         QUESTIONS[variant] + "\n" + FORMS[variant],
     ]
-    return say("system", system), say("user", "\n\n".join(parts))
+    return say("system", system), say("user", "\n\n".join(paragraphs))
 
 
 def observation_text(observation: Observation) -> str:
@@ -106,12 +106,12 @@ def action_text(action: Action) -> str:
 
 def failure_text(failure: Failure) -> str:
     """Return the cause in the words of the three published categories; other kinds by their own message."""
-    what = ", ".join(quoted(name) for name in failure.objects)
+    names = ", ".join(quoted(name) for name in failure.objects)
     texts = {
-        "goal_in_collision": f"the goal configuration is in collision with {what or 'something'}",
+        "goal_in_collision": f"the goal configuration is in collision with {names or 'something'}",
         "no_inverse_kinematics": "the goal configuration has no inverse kinematics solution",
         "no_path": "no collision-free trajectory was found",
-        "unknown_object": f"there is no box {what}",
+        "unknown_object": f"there is no box {names}",
     }
     return texts.get(failure.kind) or " ".join(failure.message.split())
 

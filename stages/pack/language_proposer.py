@@ -22,6 +22,7 @@ TRACE_LENGTH = 5
 ORDER_CALLS = 5
 """Orders that the model may be asked for in one proposal, each without an arrangement before."""
 MOST_NAMES = 100
+"""Most names in an answer; by eye."""
 
 PlacementSolver = Callable[[Observation, tuple[str, ...], Sequence[Attempt]], "tuple[Action, ...] | Failure"]
 """Observation, names in the order to pack, the trace -> the full plan of picks and places, or why there is none."""
@@ -52,8 +53,8 @@ class LanguageProposer:
     def propose(self, observation: Observation, trace: Sequence[Attempt]) -> tuple[Action, ...]:
         """Return the plan of one call of the model."""
         self.calls += 1
-        shown = trace[max(0, len(trace) - self._trace_length) :]
-        messages = prompt(observation, shown, self._variant, reasons=self._reasons)
+        latest = trace[max(0, len(trace) - self._trace_length) :]
+        messages = prompt(observation, latest, self._variant, reasons=self._reasons)
         try:
             reply = self.chat.ask(messages, plan_schema(packing_language(observation)))
         except LanguageFailed as error:
@@ -93,11 +94,11 @@ class SymbolicProposer:
 
     def propose(self, observation: Observation, trace: Sequence[Attempt]) -> tuple[Action, ...]:
         """Return a full plan; empty when no order asked for has an arrangement or could be read."""
-        shown = trace[max(0, len(trace) - self._trace_length) :]
+        latest = trace[max(0, len(trace) - self._trace_length) :]
         refused: list[str] = []
         for _ in range(ORDER_CALLS):
             self.calls += 1
-            messages = prompt(observation, shown, "symbolic", reasons=self._reasons)
+            messages = prompt(observation, latest, "symbolic", reasons=self._reasons)
             if refused:
                 messages = (*messages, say("user", "\n".join(refused)))
             try:

@@ -113,8 +113,8 @@ def read_prompt(text: str) -> Seen:
 
 
 def _step(match: re.Match[str]) -> SeenStep:
-    place = None if match[1] else (float(match[3]), float(match[4]), float(match[5]))
-    return SeenStep(_name(match[1] or match[2]), place, match[6], match[7] or "")
+    target = None if match[1] else (float(match[3]), float(match[4]), float(match[5]))
+    return SeenStep(_name(match[1] or match[2]), target, match[6], match[7] or "")
 
 
 def _names(line: str) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from scenewright.stages.pack.language_prompt import Variant
 from scenewright.stages.pack.language_reading import Place, Seen, SeenPlan, read_prompt
 
 PLACES_LOOKED_AT = 3
+"""Draws of a placement of which the roomiest is taken; by eye."""
 TURNED = 0.2
 """Share of boxes that are put down turned by a quarter."""
 OFFENDER_MOVED = 0.3
@@ -48,9 +49,9 @@ def scripted_reply(request: Request, variant: Variant, seed: int) -> str:
     text = "\n".join(message.text for message in request.messages if message.role == "user")
     digest = hashlib.sha256(text.encode()).digest()
     random = np.random.default_rng([seed, *digest[:16]])
-    seen = read_prompt(text)
-    last = seen.plans[-1] if seen.plans else None
-    return json.dumps({"reasoning": _reasoning(last)} | _ANSWERS[variant](seen, last, random))
+    prompt_read = read_prompt(text)
+    last = prompt_read.plans[-1] if prompt_read.plans else None
+    return json.dumps({"reasoning": _reasoning(last)} | _ANSWERS[variant](prompt_read, last, random))
 
 
 def _backtrack(seen: Seen, last: SeenPlan | None, random: np.random.Generator) -> dict[str, Any]:
@@ -132,10 +133,10 @@ class _Planner:
         as far as that is known."""
         width, length = self._extents(box, place[2])
         gaps = [self._reach - math.hypot(place[0], place[1])]
-        for name, other in others.items():
-            other_width, other_length = self._extents(name, other[2])
-            gap_x = abs(place[0] - other[0]) - (width + other_width) / 2
-            gaps.append(max(gap_x, abs(place[1] - other[1]) - (length + other_length) / 2))
+        for name, placed in others.items():
+            other_width, other_length = self._extents(name, placed[2])
+            gap_x = abs(place[0] - placed[0]) - (width + other_width) / 2
+            gaps.append(max(gap_x, abs(place[1] - placed[1]) - (length + other_length) / 2))
         for low_x, high_x, low_y, high_y in self._seen.obstacles.values():
             gap_x = max(low_x - place[0], place[0] - high_x) - width / 2
             gaps.append(max(gap_x, max(low_y - place[1], place[1] - high_y) - length / 2))

@@ -23,9 +23,11 @@ SCORE, ROW_X, ROW_Y, ROW_TURN = 0, 1, 2, 3
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = 0, 1, 2, 3
 """Columns of rectangles."""
 NODES = 500
+"""Most nodes of one search; by eye."""
 RESTARTS = 16
+"""Searches with other orders; by eye."""
 HAND_GAP, TOUCH_GAP = 0.001, 0.0011
-"""Between the hand and what it must not hit, and where positions are tried [m]."""
+"""Gap between the hand and what it must not hit, and gap at which positions are tried [m]; by eye."""
 DENSEST = 0.97
 """Share of the container beyond which no layout is looked for."""
 
@@ -128,14 +130,14 @@ def _hand_at(hand, part, x, y, turn):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _allowed(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-def]
+def _may_stand(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-def]
     """Whether a box may stand at (x, y) beside those that are `placed` (B, 3)."""
-    own = _box_at(problem.extents, box, x, y, turn)
+    footprint = _box_at(problem.extents, box, x, y, turn)
     if (
-        own.low_x < problem.container[LOW_X] - 1e-9
-        or own.low_y < problem.container[LOW_Y] - 1e-9
-        or own.high_x > problem.container[HIGH_X] + 1e-9
-        or own.high_y > problem.container[HIGH_Y] + 1e-9
+        footprint.low_x < problem.container[LOW_X] - 1e-9
+        or footprint.low_y < problem.container[LOW_Y] - 1e-9
+        or footprint.high_x > problem.container[HIGH_X] + 1e-9
+        or footprint.high_y > problem.container[HIGH_Y] + 1e-9
     ):
         return False
     if x * x + y * y > problem.reach * problem.reach:
@@ -147,25 +149,29 @@ def _allowed(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-
             return False
     for f in range(problem.fixed.shape[0]):
         obstacle = _row(problem.fixed, f)
-        if not _apart(own, obstacle, gap):
+        if not _apart(footprint, obstacle, gap):
             return False
         for k in range(problem.hand.shape[1]):
             if problem.over_fixed[box, f, k] and not _apart(_hand_at(problem.hand, k, x, y, turn), obstacle, HAND_GAP):
                 return False
-    for other in range(placed.shape[0]):
-        if placed[other, PLACED_TURN] < 0:
+    for placed_box in range(placed.shape[0]):
+        if placed[placed_box, PLACED_TURN] < 0:
             continue
-        there_x, there_y, turned = placed[other, PLACED_X], placed[other, PLACED_Y], int(placed[other, PLACED_TURN])
-        stands = _box_at(problem.extents, other, there_x, there_y, turned)
-        if not _apart(own, stands, gap):
+        there_x, there_y, turned = (
+            placed[placed_box, PLACED_X],
+            placed[placed_box, PLACED_Y],
+            int(placed[placed_box, PLACED_TURN]),
+        )
+        stands = _box_at(problem.extents, placed_box, there_x, there_y, turned)
+        if not _apart(footprint, stands, gap):
             return False
         for k in range(problem.hand.shape[1]):
-            if problem.over_boxes[box, other, k] and not _apart(
+            if problem.over_boxes[box, placed_box, k] and not _apart(
                 _hand_at(problem.hand, k, x, y, turn), stands, HAND_GAP
             ):
                 return False
-            if problem.over_boxes[other, box, k] and not _apart(
-                _hand_at(problem.hand, k, there_x, there_y, turned), own, HAND_GAP
+            if problem.over_boxes[placed_box, box, k] and not _apart(
+                _hand_at(problem.hand, k, there_x, there_y, turned), footprint, HAND_GAP
             ):
                 return False
     return True
@@ -189,22 +195,22 @@ def _lines(problem, placed, box, turn, axis, gap, out):  # type: ignore[no-untyp
                 out[count] = problem.fixed[f, axis + 2] - problem.hand[turn, k, axis] + TOUCH_GAP
                 out[count + 1] = problem.fixed[f, axis] - problem.hand[turn, k, axis + 2] - TOUCH_GAP
                 count += 2
-    for other in range(placed.shape[0]):
-        if placed[other, PLACED_TURN] < 0:
+    for placed_box in range(placed.shape[0]):
+        if placed[placed_box, PLACED_TURN] < 0:
             continue
-        turned = int(placed[other, PLACED_TURN])
-        reach = (problem.extents[other, turned] if axis == 0 else problem.extents[other, 1 - turned]) / 2
-        out[count] = placed[other, axis] + reach + gap + half
-        out[count + 1] = placed[other, axis] - reach - gap - half
+        turned = int(placed[placed_box, PLACED_TURN])
+        reach = (problem.extents[placed_box, turned] if axis == 0 else problem.extents[placed_box, 1 - turned]) / 2
+        out[count] = placed[placed_box, axis] + reach + gap + half
+        out[count + 1] = placed[placed_box, axis] - reach - gap - half
         count += 2
         for k in range(problem.hand.shape[1]):
-            if problem.over_boxes[box, other, k]:
-                out[count] = placed[other, axis] + reach - problem.hand[turn, k, axis] + TOUCH_GAP
-                out[count + 1] = placed[other, axis] - reach - problem.hand[turn, k, axis + 2] - TOUCH_GAP
+            if problem.over_boxes[box, placed_box, k]:
+                out[count] = placed[placed_box, axis] + reach - problem.hand[turn, k, axis] + TOUCH_GAP
+                out[count + 1] = placed[placed_box, axis] - reach - problem.hand[turn, k, axis + 2] - TOUCH_GAP
                 count += 2
-            if problem.over_boxes[other, box, k]:
-                out[count] = placed[other, axis] + problem.hand[turned, k, axis + 2] + half + TOUCH_GAP
-                out[count + 1] = placed[other, axis] + problem.hand[turned, k, axis] - half - TOUCH_GAP
+            if problem.over_boxes[placed_box, box, k]:
+                out[count] = placed[placed_box, axis] + problem.hand[turned, k, axis + 2] + half + TOUCH_GAP
+                out[count + 1] = placed[placed_box, axis] + problem.hand[turned, k, axis] - half - TOUCH_GAP
                 count += 2
     return count
 
@@ -221,9 +227,9 @@ def _candidates(problem, placed, box, gap, corner, rows):  # type: ignore[no-unt
     for f in range(fixed.shape[0]):
         for k in range(hand.shape[1]):
             needs_hand = needs_hand or over_fixed[box, f, k]
-    for other in range(placed.shape[0]):
+    for placed_box in range(placed.shape[0]):
         for k in range(hand.shape[1]):
-            needs_hand = needs_hand or over_boxes[box, other, k] or over_boxes[other, box, k]
+            needs_hand = needs_hand or over_boxes[box, placed_box, k] or over_boxes[placed_box, box, k]
     turns = 1 if abs(extents[box, 0] - extents[box, 1]) < 1e-6 and not needs_hand else 2
     for turn in range(turns):
         half_x, half_y = extents[box, turn] / 2, extents[box, 1 - turn] / 2
@@ -237,19 +243,19 @@ def _candidates(problem, placed, box, gap, corner, rows):  # type: ignore[no-unt
                 extra = n + 1
             for i in range(extra):
                 x = xs[i]
-                if count < rows.shape[0] and _allowed(problem, placed, box, x, y, turn, gap):
+                if count < rows.shape[0] and _may_stand(problem, placed, box, x, y, turn, gap):
                     # Near the robot first; ties towards the side that the restart prefers.
-                    near = x - half_x
+                    low_edge = x - half_x
                     side = y - half_y if corner % 2 == 0 else -(y + half_y)
-                    rows[count, SCORE] = near + 0.3 * side if corner < 2 else 0.3 * near + side
+                    rows[count, SCORE] = low_edge + 0.3 * side if corner < 2 else 0.3 * low_edge + side
                     rows[count, ROW_X], rows[count, ROW_Y], rows[count, ROW_TURN] = x, y, turn
                     count += 1
     order = np.argsort(rows[:count, SCORE])
     sorted_rows = rows[:count][order]
-    kept = 0
+    distinct = 0
     for row in range(count):
         same = False
-        for earlier in range(kept):
+        for earlier in range(distinct):
             if (
                 abs(rows[earlier, ROW_X] - sorted_rows[row, ROW_X]) < 1e-6
                 and abs(rows[earlier, ROW_Y] - sorted_rows[row, ROW_Y]) < 1e-6
@@ -258,9 +264,9 @@ def _candidates(problem, placed, box, gap, corner, rows):  # type: ignore[no-unt
                 same = True
                 break
         if not same:
-            rows[kept] = sorted_rows[row]
-            kept += 1
-    return kept
+            rows[distinct] = sorted_rows[row]
+            distinct += 1
+    return distinct
 
 
 @njit(cache=True)
@@ -270,7 +276,7 @@ def _search(problem, order, gap, corner, nodes):  # type: ignore[no-untyped-def]
     placed = np.full((problem.extents.shape[0], 3), -1.0)
     for row in range(preset.shape[0]):
         box, turn = int(preset[row, BOX]), int(preset[row, TURN])
-        if not _allowed(problem, placed, box, preset[row, X], preset[row, Y], turn, 0.0):
+        if not _may_stand(problem, placed, box, preset[row, X], preset[row, Y], turn, 0.0):
             return placed, -1
         placed[box, PLACED_X], placed[box, PLACED_Y], placed[box, PLACED_TURN] = preset[row, X], preset[row, Y], turn
     depth_count = len(order)

@@ -14,6 +14,7 @@ from scenewright.stages.pack.records import Action, Attempt, BoxState, Observati
 from scenewright.stages.pack.solids import block_over, flat_depth
 
 REACH_MARGIN = 0.001
+"""Distance by which reach is set below what failed [m]; by eye."""
 REFUSED_SIDE = 0.012
 """Half side [m] of the square of placements that are not tried again when no cause was understood."""
 
@@ -49,7 +50,7 @@ def learn(observation: Observation, trace: Sequence[Attempt], reasons: bool) -> 
         if failed is not None and failed.failure is not None and failed.action.box in boxes:
             action, kind = failed.action, failed.failure.kind
             if not reasons or kind in ("no_path", "joint_limit"):
-                _refuse(limits, action, _placed(attempt), failed.failure.objects if reasons else (), boxes)
+                _refuse(limits, action, _placed_boxes(attempt), failed.failure.objects if reasons else (), boxes)
             elif kind == "no_inverse_kinematics" and action.name == "place":
                 numbers = failed.failure.numbers
                 limits.reach = min(limits.reach, hypot(numbers["nearest_x"], numbers["nearest_y"]) - REACH_MARGIN)
@@ -63,7 +64,7 @@ def learn(observation: Observation, trace: Sequence[Attempt], reasons: bool) -> 
     return limits
 
 
-def _placed(attempt: Attempt) -> tuple[str, ...]:
+def _placed_boxes(attempt: Attempt) -> tuple[str, ...]:
     return tuple(step.action.box for step in attempt.feedback[:-1] if step.action.name == "place")
 
 
@@ -72,8 +73,8 @@ def _refuse(
 ) -> None:
     """A place is not repeated; a pick waits until what blocks it, or the next box, is gone."""
     if action.name == "place" and action.x is not None and action.y is not None and action.yaw is not None:
-        again = sum(entry[0] == action.box for entry in limits.refused)
-        limits.refused.append((action.box, action.x, action.y, action.yaw, REFUSED_SIDE * (1 + 0.5 * again)))
+        times_refused = sum(entry[0] == action.box for entry in limits.refused)
+        limits.refused.append((action.box, action.x, action.y, action.yaw, REFUSED_SIDE * (1 + 0.5 * times_refused)))
         limits.culprit = next((name for name in blamed if name in placed), None)
         return
     waiting = [name for name in boxes if name != action.box and name not in placed]

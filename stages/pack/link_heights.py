@@ -16,13 +16,17 @@ from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolut
 from scenewright.stages.pack.arm import FixedArm, Limits, planar_joints
 
 STEP = 0.02
+"""Distance between two entries [m]; by eye."""
 MARGIN = 0.02
-"""Between two entries the lowest point moves by less than this [m]."""
+"""Largest change of the lowest point between two entries [m]."""
 RADII = np.arange(0.20, 0.83, STEP)
+"""Distances of the tool from the arm's axis [m]."""
 HEIGHTS = np.arange(0.04, 0.56, STEP)
+"""Heights of the tool [m]."""
 BASE_RADIUS = 0.27
 """Links 0 to 2 stay within this distance of the axis, up to the shoulder [m]; link 3 begins there."""
 LINKS = tuple(f"panda_link{number}" for number in range(3, 8))
+"""Links whose lowest point is kept."""
 
 
 @cache
@@ -30,9 +34,9 @@ def _hulls(robot: str) -> tuple[np.ndarray, ...]:
     description = FixedArm("fr3", robot).description
     root = read_urdf(description.urdf)
     keep = [link for link in root.findall("link") if link.get("name") in LINKS]
-    wanted = ElementTree.Element("robot", {"name": "links"})
-    wanted.extend(keep)
-    shapes = link_shapes(without_visuals(with_absolute_meshes(wanted, description.urdf.parent)))
+    kept_robot = ElementTree.Element("robot", {"name": "links"})
+    kept_robot.extend(keep)
+    shapes = link_shapes(without_visuals(with_absolute_meshes(kept_robot, description.urdf.parent)))
     return tuple(np.concatenate([mesh.convex_hull.vertices for mesh in shapes[name]]) for name in LINKS)
 
 

@@ -62,7 +62,7 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
     """Ask the proposer until a plan reaches the goal or a budget is spent."""
     observation = world.instance.observation
     attempts: list[Attempt] = []
-    kept: list[tuple[Action, State, Motion]] = []
+    done: list[tuple[Action, State, Motion]] = []
     """What the plan before carried out."""
     motion_calls = 0
     mesh_before = world.planner.mesh_calls
@@ -76,11 +76,11 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
             stopped = end.failure
             break
         shared = 0
-        while shared < min(len(kept), len(actions)) and kept[shared][0] == actions[shared]:
+        while shared < min(len(done), len(actions)) and done[shared][0] == actions[shared]:
             shared += 1
-        kept = kept[:shared]
-        state = kept[-1][1] if kept else world.initial
-        feedback = [StepFeedback(action) for action, _, _ in kept]
+        done = done[:shared]
+        state = done[-1][1] if done else world.initial
+        feedback = [StepFeedback(action) for action, _, _ in done]
         failure: Failure | None = None
         for action in actions[shared:]:
             try:
@@ -94,7 +94,7 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
             feedback.append(StepFeedback(action, failure))
             if failure is not None:
                 break
-            kept.append((action, state, motion))
+            done.append((action, state, motion))
         task = None
         if failure is None:
             # A plan that seems to reach the goal is carried out once more with physics after every place.
@@ -113,7 +113,7 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
         motion_calls,
         world.planner.mesh_calls - mesh_before,
         tuple(attempts),
-        (world.initial, *(entry[1] for entry in kept)),
-        tuple(entry[2] for entry in kept),
+        (world.initial, *(entry[1] for entry in done)),
+        tuple(entry[2] for entry in done),
         stopped,
     )

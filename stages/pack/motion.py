@@ -24,13 +24,13 @@ from scenewright.stages.pack.solids import overlap
 OVER = 0.015
 """What is carried over something passes this far above it [m]."""
 STRIDE = 0.03
-"""Between two configurations of an up-over-down path [m]."""
+"""Distance between two configurations of an up-over-down path [m]; by eye."""
 RESOLUTION = 0.05
 """Largest step of a joint between two mesh checks [rad]."""
 SAMPLES = 60
 """Samples of one search, as many as the published planner draws in its three tries."""
 HOME_POSE = ToolPose(0.306891, 0.0, 0.485302, 0.0)
-"""Where the tool is at the home configuration."""
+"""Pose of the tool at the home configuration."""
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,10 @@ class MotionPlanner:
         failure = end_collision(goal, carried, others)
         if failure is not None:
             raise failure
-        tops = max((other.block.top for other in others), default=0.0)
+        tops = max((obstacle.block.top for obstacle in others), default=0.0)
         height = _height_over(start, end, held, tops)
         if self._surely_free(start, end, height, tops, others):
-            return Motion(lambda: _known(self._over(start, end, height, held, tops, others))[0], end, False)
+            return Motion(lambda: _require_path(self._over(start, end, height, held, tops, others))[0], end, False)
         path = self._over(start, end, height, held, tops, others)
         if path is not None and path[1]:
             return Motion(lambda: path[0], end, False)
@@ -131,7 +131,7 @@ class MotionPlanner:
             return None
         free = not _near_base(others) and lowest_on_path(self.arm, points[:, 0], points[:, 2]) > tops
         free = free and all(
-            self._drawn_in_free(stance, way, held, others) for stance, way in ((start, rise), (end, fall))
+            self._is_free_drawn_in(stance, line, held, others) for stance, line in ((start, rise), (end, fall))
         )
         return joints, free
 
@@ -145,7 +145,7 @@ class MotionPlanner:
         radii = np.minimum(pose.radius, self.arm.reaches(heights) - 1e-6)
         return np.column_stack([radii, np.full(count + 1, azimuth), heights])
 
-    def _drawn_in_free(
+    def _is_free_drawn_in(
         self, stance: Stance, rise: np.ndarray, held: BoxState | None, others: tuple[Named, ...]
     ) -> bool:
         """Whether hand and held box are free on the way up: over a free end, straight up is; drawn in may be not."""
@@ -157,7 +157,7 @@ class MotionPlanner:
             blocks = list(hand_blocks(at))
             if held is not None:
                 blocks.append(held_block(at, held.width, held.length, held.height))
-            if any(overlap(block, other.block) > 0 for block in blocks for other in others):
+            if any(overlap(block, obstacle.block) > 0 for block in blocks for obstacle in others):
                 return False
         return True
 
@@ -179,12 +179,12 @@ class MotionPlanner:
         for candidate in (path, np.array([start.arm, end.arm])):
             if candidate is None:
                 continue
-            whole = np.concatenate([start.arm[None], candidate, end.arm[None]])
-            if first_collision(densify(whole, resolution), scene.check) is None:
-                return Motion(partial(np.copy, whole), end, False)
+            full_path = np.concatenate([start.arm[None], candidate, end.arm[None]])
+            if first_collision(densify(full_path, resolution), scene.check) is None:
+                return Motion(partial(np.copy, full_path), end, False)
         space = SearchSpace(self.arm.chain.lower, self.arm.chain.upper, resolution)
         if path is not None:
-            space = _narrowed(space, whole_range=np.concatenate([path, start.arm[None]]))
+            space = _narrow(space, whole_range=np.concatenate([path, start.arm[None]]))
         planned = rrt_connect(
             start.arm,
             end.arm,
@@ -206,12 +206,12 @@ def _height_over(start: Stance, end: Stance, held: BoxState | None, tops: float)
 def _near_base(others: tuple[Named, ...]) -> bool:
     """Whether something stands where the links below the third could touch it."""
     return any(
-        hypot(other.block.x, other.block.y) - other.block.half_width - other.block.half_length < BASE_RADIUS
-        for other in others
+        hypot(obstacle.block.x, obstacle.block.y) - obstacle.block.half_width - obstacle.block.half_length < BASE_RADIUS
+        for obstacle in others
     )
 
 
-def _known(path: tuple[np.ndarray, bool] | None) -> tuple[np.ndarray, bool]:
+def _require_path(path: tuple[np.ndarray, bool] | None) -> tuple[np.ndarray, bool]:
     if path is None:
         raise AssertionError("a path that is free everywhere in its range exists")
     return path
@@ -224,7 +224,7 @@ def _arc(first: np.ndarray, last: np.ndarray) -> np.ndarray:
     return first + (last - first) * (np.arange(1, count + 1) / count)[:, None]
 
 
-def _narrowed(space: SearchSpace, whole_range: np.ndarray) -> SearchSpace:
+def _narrow(space: SearchSpace, whole_range: np.ndarray) -> SearchSpace:
     """Keep joints 1 and 7, which could go round more than once, near where the motion needs them."""
     lower, upper = space.lower.copy(), space.upper.copy()
     for joint in (0, 6):

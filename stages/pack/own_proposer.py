@@ -21,6 +21,7 @@ from scenewright.stages.pack.records import Action, Attempt, BoxState, Observati
 from scenewright.stages.pack.sampling import pick_and_place
 
 QUARTER = pi / 2
+"""Quarter turn [rad]."""
 RESTARTS = (2, 2, 3, 6, 16, 16, 16)
 """Orders of boxes tried at each spacing: a roomy layout is found soon or not at all."""
 SPACING = ((0.02, 0.0), (0.012, 0.0), (0.007, 0.0), (0.004, 0.0), (0.0025, 0.0), (0.0025, 0.006), (0.0015, 0.012))
@@ -125,8 +126,8 @@ def solve_layout(
     boxes = {box.name: box for box in observation.boxes if box.name in order}
     kept = tuple(spot for spot in kept if spot.box in boxes)
     for count in range(len(kept), -1, -1):
-        held = kept[:count]
-        first = tuple(spot.box for spot in held)
+        fixed_spots = kept[:count]
+        first = tuple(spot.box for spot in fixed_spots)
         sequence = (*first, *(name for name in order if name not in first))
         if any(sequence.index(a) > sequence.index(b) for a, b in limits.before if a in sequence and b in sequence):
             continue
@@ -134,15 +135,17 @@ def solve_layout(
             continue
         problem_boxes = [boxes[name] for name in sequence]
         for (gap, out), restarts in zip(SPACING, RESTARTS, strict=True):
-            problem = _problem(observation, problem_boxes, limits, held, out - limits.inward)
+            problem = _problem(observation, problem_boxes, limits, fixed_spots, out - limits.inward)
             random = np.random.default_rng([seed, count])
-            layout = find_layout(problem, gap + limits.wider, random, restarts=min(restarts, 3) if held else restarts)
+            layout = find_layout(
+                problem, gap + limits.wider, random, restarts=min(restarts, 3) if fixed_spots else restarts
+            )
             if layout is not None:
                 spots = [
                     Spot(box.name, float(row[0]), float(row[1]), int(row[2]))
                     for box, row in zip(problem_boxes, layout, strict=True)
                 ]
-                return (*held, *_far_first(spots[count:], boxes, limits, reorder))
+                return (*fixed_spots, *_far_first(spots[count:], boxes, limits, reorder))
     return None
 
 

@@ -32,7 +32,9 @@ BOX_COLORS = {
 OTHER = "#9aa5ad"
 REFUSED = CUT
 MOST_REFUSED = 60
+"""Most refused placements that are drawn; by eye."""
 DOTS = 100
+"""Resolution of a picture [px/inch]."""
 
 
 def box_color(name: str) -> str:

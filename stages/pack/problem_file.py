@@ -15,6 +15,7 @@ from scenewright.stages.pack.records import BoxState, Rectangle
 from scenewright.stages.pack.solids import overlap
 
 LARGEST_FILE = 1_000_000
+"""Largest file that is read [bytes]; by eye."""
 FORM = "docs/LLM3.md shows the form"
 
 
@@ -71,11 +72,12 @@ def _check_starts(instance: Instance, path: Path, arm: FixedArm) -> None:
     blocks = [(box.name, upright_block(box, TABLE_TOP)) for box in instance.boxes]
     blocks += [(obstacle.rectangle.name, obstacle.block) for obstacle in instance.obstacles]
     for number, (name, block) in enumerate(blocks[: len(instance.boxes)]):
-        for other, other_block in blocks[number + 1 :]:
+        for other_name, other_block in blocks[number + 1 :]:
             depth = overlap(block, other_block)
             if depth > 1e-6:
                 raise BadInput(
-                    f"{path}: {name} and {other} start {1000 * depth:.1f} mm in each other", hint="move one of them"
+                    f"{path}: {name} and {other_name} start {1000 * depth:.1f} mm in each other",
+                    hint="move one of them",
                 )
     for box in instance.boxes:
         pose = ToolPose(box.x, box.y, TABLE_TOP + box.height / 2 + tool_over_centre(box.height), box.yaw)

@@ -9,6 +9,7 @@ import numpy as np
 from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation
 
 QUARTER_TURNS = (0.0, pi / 2)
+"""Turns of a box that are sampled [rad]."""
 
 
 def pick_and_place(box: str, x: float, y: float, yaw: float) -> tuple[Action, Action]:

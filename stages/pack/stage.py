@@ -40,7 +40,7 @@ def run(problem: Path | None, transcript: Path | None, *, parameters: PackParame
         with PackingWorld(instance, planner=planner) as world:
             with context.progress.step("propose and check"):
                 result = run_loop(world, _Guarded(proposer), Budget(parameters.iterations, parameters.motion_calls))
-            _write(context.output, _told(instance, proposer, result), instance, result)
+            _write(context.output, _packing_file(instance, proposer, result), instance, result)
             with context.progress.step("pictures"):
                 draw_layout(context.output / "layout.png", world, result, parameters.image_width)
                 draw_attempts(context.output / "attempts.png", result.attempts, parameters.image_width)
@@ -114,7 +114,7 @@ def _attempt(attempt: Attempt) -> PackingAttempt:
     return PackingAttempt(steps=tuple(steps), task=attempt.task)
 
 
-def _told(instance: Instance, proposer: Proposer, result: PackingRun) -> PackingFile:
+def _packing_file(instance: Instance, proposer: Proposer, result: PackingRun) -> PackingFile:
     return PackingFile(
         name=instance.name,
         proposer=proposer.name,

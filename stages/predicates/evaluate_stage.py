@@ -65,10 +65,10 @@ def _sets(
 
 def try_task(memory: Memory, domain: Domain, task: Task, world: World, replan: bool = True) -> Attempt:
     """Try a task with what a memory has learned; a goal that nobody explained is not tried."""
-    wanted, unknown = memory.goal_atoms(goal_phrases(task.sentence, task.objects))
+    goal, unknown = memory.goal_atoms(goal_phrases(task.sentence, task.objects))
     if unknown:
         return Attempt(unplanned=f"nobody has said what {unknown[0]!r} means")
-    return attempt(task, task.name.split("/")[0], domain, memory.see, wanted, replan=replan, world=world)
+    return attempt(task, task.name.split("/")[0], domain, memory.see, goal, replan=replan, world=world)
 
 
 def as_markdown(file: KitchenEvaluationFile) -> str:

@@ -19,6 +19,7 @@ from scenewright.stages.predicates.world.actions import act
 from scenewright.stages.predicates.world.kitchen import Kitchen
 
 MOST_STEPS, MOST_FAILURES = 20, 5
+"""Most actions of a task, and most failures; by eye."""
 ARITY = {name: count for setting in SETTINGS.values() for name, count in setting.arity.items()}
 PLANNING_LIMIT, SHORTENING = 5_000, 300
 """Expanded states of one search, and of each that looks for a shorter plan: plans are wanted within moments."""
@@ -145,14 +146,14 @@ def attempt(
                 break
             if result.steps and not replan:
                 break
-            found, seconds = planner(domain, list(task.objects), atoms, goal, frozenset(avoided))
+            outcome, seconds = planner(domain, list(task.objects), atoms, goal, frozenset(avoided))
             result.planning.append(seconds)
-            if not found.actions:
-                result.unreachable = found.unreachable
-                lost = ", ".join(" ".join(atom) for atom in found.unreachable)
+            if not outcome.actions:
+                result.unreachable = outcome.unreachable
+                lost = ", ".join(" ".join(atom) for atom in outcome.unreachable)
                 result.unplanned = f"out of reach: {lost}" if lost else "no plan"
                 break
-            plan, expected = found.actions, atoms
+            plan, expected = outcome.actions, atoms
         operator = plan[0]
         reason = kitchen.do(action_atom(operator))
         result.steps.append((action_atom(operator), reason))
@@ -179,8 +180,8 @@ def timed_plan(
 ) -> tuple[TaskPlan, float]:
     """Return `plan_without`, and the processor's seconds that it took (a loaded machine makes no difference)."""
     start = time.thread_time()
-    found = plan_without(domain, objects, atoms, goal, avoided)
-    return found, time.thread_time() - start
+    outcome = plan_without(domain, objects, atoms, goal, avoided)
+    return outcome, time.thread_time() - start
 
 
 def plan_without(
@@ -190,11 +191,11 @@ def plan_without(
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
     actions = ground(domain, problem)
     if avoided:
-        other = plan_task(
+        without_avoided = plan_task(
             problem, [a for a in actions if action_atom(a) not in avoided], limit=PLANNING_LIMIT, improvement=SHORTENING
         )
-        if other.actions:
-            return other
+        if without_avoided.actions:
+            return without_avoided
     return plan_task(problem, actions, limit=PLANNING_LIMIT, improvement=SHORTENING)
 
 
@@ -206,13 +207,13 @@ def fast_downward_plan(
     start = time.thread_time()
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
     actions = ground(domain, problem)
-    other = [action for action in actions if action_atom(action) not in avoided]
-    found = plan_with_fast_downward(domain, problem, other)
-    if not found.actions and avoided:
-        found = plan_with_fast_downward(domain, problem, actions)
-    if not found.actions:
-        found = plan_task(problem, actions, limit=0)
-    return found, time.thread_time() - start
+    allowed_actions = [action for action in actions if action_atom(action) not in avoided]
+    outcome = plan_with_fast_downward(domain, problem, allowed_actions)
+    if not outcome.actions and avoided:
+        outcome = plan_with_fast_downward(domain, problem, actions)
+    if not outcome.actions:
+        outcome = plan_task(problem, actions, limit=0)
+    return outcome, time.thread_time() - start
 
 
 PLANNERS: dict[str, Planner] = {"builtin": timed_plan, "fast-downward": fast_downward_plan}

@@ -53,23 +53,23 @@ def inner_monologue(
 ) -> Attempt:
     """Try a task by asking for one action after the other, and telling what came of each."""
     result = Attempt()
-    told: list[str] = []
+    history: list[str] = []
     failures = 0
     domain = memory.domain("learned") if kind == "preconditions" else None
     while len(result.steps) < MOST_STEPS and failures < MOST_FAILURES:
-        step = _asked_step(task, world, chat, actions, kind, memory, told, domain)
+        step = _ask_step(task, world, chat, actions, kind, memory, history, domain)
         if step is None or step[0] == "done":
             result.unplanned = "" if step else "no action was named that there is"
             break
         reason = world.do(step)
         result.steps.append((step, reason))
-        told.append(f"{' '.join(step)}: {reason or 'done'}")
+        history.append(f"{' '.join(step)}: {reason or 'done'}")
         failures = failures + 1 if reason else 0
     result.success = set(task.goal) <= truth_of(task.name.split("/")[0]).atoms(world.state())
     return result
 
 
-def _asked_step(
+def _ask_step(
     task: Task,
     world: World,
     chat: Chat,
@@ -80,28 +80,28 @@ def _asked_step(
     domain: Domain | None,
 ) -> Atom | None:
     state = world.state()
-    given = {"goal": task.sentence, "objects": list(state.names), "actions": actions, "so far": list(told)}
-    held = memory.see(state) if kind != "objects" else frozenset()
+    facts = {"goal": task.sentence, "objects": list(state.names), "actions": actions, "so far": list(told)}
+    atoms = memory.see(state) if kind != "objects" else frozenset()
     if kind != "objects":
-        given["holds"] = sorted(" ".join(atom) for atom in held)
+        facts["holds"] = sorted(" ".join(atom) for atom in atoms)
     for _ in range(REPLANS + 1):
         try:
-            reply = chat.ask((say("system", STEP), say("user", json.dumps(given, sort_keys=True))), schema_of(NextStep))
+            reply = chat.ask((say("system", STEP), say("user", json.dumps(facts, sort_keys=True))), schema_of(NextStep))
         except LanguageFailed:
             return None
         step = (reply.action, *reply.objects)
         if reply.action == "done":
             return ("done",)
-        known = actions.get(reply.action) == len(reply.objects) and set(reply.objects) <= set(state.names)
-        if known and (domain is None or _allowed(domain, step, state.names, held)):
+        is_action = actions.get(reply.action) == len(reply.objects) and set(reply.objects) <= set(state.names)
+        if is_action and (domain is None or _is_allowed(domain, step, state.names, atoms)):
             return step
-        given["refused"] = (
-            f"{' '.join(step)}: {'its preconditions do not hold' if known else 'there is no such action'}"
+        facts["refused"] = (
+            f"{' '.join(step)}: {'its preconditions do not hold' if is_action else 'there is no such action'}"
         )
     return None
 
 
-def _allowed(domain: Domain, step: Atom, names: tuple[str, ...], held: frozenset[Atom]) -> bool:
+def _is_allowed(domain: Domain, step: Atom, names: tuple[str, ...], held: frozenset[Atom]) -> bool:
     problem = Problem("now", dict.fromkeys(names, ""), held, frozenset())
     return any(action_atom(each) == step and each.preconditions <= held for each in ground(domain, problem))
 
@@ -111,14 +111,14 @@ def code_as_policies(task: Task, world: World, chat: Chat, actions: dict[str, in
     result = Attempt()
     state = world.state()
     predicates = memory.used()
-    given = {"goal": task.sentence, "objects": list(state.names), "actions": actions, "predicates": predicates}
+    facts = {"goal": task.sentence, "objects": list(state.names), "actions": actions, "predicates": predicates}
     try:
-        program = chat.ask((say("system", CODE), say("user", json.dumps(given, sort_keys=True))), schema_of(Program))
+        program = chat.ask((say("system", CODE), say("user", json.dumps(facts, sort_keys=True))), schema_of(Program))
     except LanguageFailed as error:
         return Attempt(unplanned=str(error))
     for line in program.statements[:MOST_STEPS]:
-        known = (actions if line.do == "action" else predicates).get(line.name) == len(line.objects)
-        if not known or not set(line.objects) <= set(state.names):
+        takes_objects = (actions if line.do == "action" else predicates).get(line.name) == len(line.objects)
+        if not takes_objects or not set(line.objects) <= set(state.names):
             result.unplanned = f"the program names {line.name} {' '.join(line.objects)}, which there is not"
             break
         if line.do == "assert":

@@ -17,6 +17,7 @@ from scenewright.stages.predicates.world.kitchen import FAUCET_HEIGHT, SINK_DEPT
 
 Polygons = Sequence[tuple[str, Sequence[tuple[float, float]]]]
 LEFT, RIGHT, BOTTOM, TOP = -42.0, 40.0, -12.0, 30.0
+"""Part of the kitchen that is drawn [units]."""
 COLORS = {
     "gripper": (70, 70, 80),
     "water": (60, 130, 220),
@@ -28,7 +29,9 @@ COLORS = {
     "tallcup": (140, 90, 160),
     "coaster": (190, 160, 90),
 }
+"""Name -> colour (RGB)."""
 USUAL = (205, 110, 80)
+"""Colour (RGB) of everything else."""
 ROOM_HALF = 3.0
 """Half the width of the plots of a room [m]; their height is 2 m."""
 GRID = 60
@@ -69,11 +72,13 @@ def draw_predicates(predicates: Sequence[Predicate], state: Perceived, vocabular
     sheet = Image.new("RGB", (columns * (size + 8), max(1, rows) * (size + line + 8)), (255, 255, 255))
     draw = ImageDraw.Draw(sheet)
     for number, predicate in enumerate(predicates):
-        held = _held(predicate, state, vocabulary)
-        colors = np.where(held[:, :, None], (130, 190, 130), (232, 232, 232)).astype(np.uint8)
-        place = (number % columns * (size + 8), number // columns * (size + line + 8))
-        sheet.paste(Image.fromarray(colors).resize((size, size), Image.Resampling.NEAREST), (place[0], place[1] + line))
-        draw.text(place, predicate.name[:30], fill=(30, 30, 30))
+        holds = _holding_grid(predicate, state, vocabulary)
+        colors = np.where(holds[:, :, None], (130, 190, 130), (232, 232, 232)).astype(np.uint8)
+        corner = (number % columns * (size + 8), number // columns * (size + line + 8))
+        sheet.paste(
+            Image.fromarray(colors).resize((size, size), Image.Resampling.NEAREST), (corner[0], corner[1] + line)
+        )
+        draw.text(corner, predicate.name[:30], fill=(30, 30, 30))
     return sheet
 
 
@@ -90,16 +95,16 @@ def draw_learning(course: Sequence[tuple[int, int, int]]) -> Image.Image:
         return height - edge - value / most * (height - 2 * edge)
 
     before = 0
-    for place, (_, _, sentences) in enumerate(course):
+    for number, (_, _, sentences) in enumerate(course):
         if sentences > before:
-            left = edge + place * across
-            draw.rectangle((left, edge, left + max(1.0, across - 1), height - edge), fill=(205, 232, 205))
+            band_start = edge + number * across
+            draw.rectangle((band_start, edge, band_start + max(1.0, across - 1), height - edge), fill=(205, 232, 205))
         before = sentences
     for value in range(0, most + 1, max(1, most // 6)):
         draw.line((edge, y(value), width - edge, y(value)), fill=(225, 225, 225))
         draw.text((8, y(value) - 6), str(value), fill=(60, 60, 60))
     for which, color, name in ((0, (190, 60, 50), "predicates"), (1, (50, 90, 180), "operators")):
-        points = [(edge + (place + 0.5) * across, y(step[which])) for place, step in enumerate(course)]
+        points = [(edge + (number + 0.5) * across, y(step[which])) for number, step in enumerate(course)]
         if len(points) > 1:
             draw.line(points, fill=color, width=2)
         draw.text((edge + 110 * which, 10), name, fill=color)
@@ -108,21 +113,23 @@ def draw_learning(course: Sequence[tuple[int, int, int]]) -> Image.Image:
     return image
 
 
-def _held(predicate: Predicate, state: Perceived, vocabulary: dict[str, Predicate]) -> np.ndarray:
+def _holding_grid(predicate: Predicate, state: Perceived, vocabulary: dict[str, Predicate]) -> np.ndarray:
     """Return (GRID, GRID) where the predicate holds, rows from above."""
     names = list(state.names)[: max(1, predicate.arguments)]
-    held = np.zeros((GRID, GRID), dtype=bool)
+    holds = np.zeros((GRID, GRID), dtype=bool)
     kitchen = isinstance(state, State)
     heights = np.linspace(TOP - 10, -4.0, GRID) if kitchen else np.linspace(2.0, 0.0, GRID)
     places = np.linspace(LEFT, RIGHT, GRID) if kitchen else np.linspace(-ROOM_HALF, ROOM_HALF, GRID)
     for row, height in enumerate(heights.tolist()):
         for column, x in enumerate(places.tolist()):
-            there = _moved(state, names[0], x, height)
-            held[row, column] = Evaluator(there, vocabulary).holds((predicate.name, *names[: predicate.arguments]))
-    return held
+            moved_state = _move_object(state, names[0], x, height)
+            holds[row, column] = Evaluator(moved_state, vocabulary).holds(
+                (predicate.name, *names[: predicate.arguments])
+            )
+    return holds
 
 
-def _moved(state: Perceived, name: str, x: float, height: float) -> Perceived:
+def _move_object(state: Perceived, name: str, x: float, height: float) -> Perceived:
     """Return a state with the middle of an object elsewhere."""
     if isinstance(state, RoomState):
         body = state.bodies[name]

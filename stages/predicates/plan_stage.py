@@ -25,8 +25,8 @@ def run(learned: LearnedDomain, *, parameters: PlanParameters, context: Context)
     memory = memory_of(learned.info, str(learned.root))
     task = tasks_of(name, parameters.which, parameters.task, context.seed)[-1]
     sentence = parameters.goal or task.sentence
-    parts = goal_phrases(sentence, task.objects)
-    wanted, unknown = memory.goal_atoms(parts)
+    phrases = goal_phrases(sentence, task.objects)
+    goal, unknown = memory.goal_atoms(phrases)
     kitchen = open_kitchen(task)
     before = kitchen.polygons()
     kitchen.frames = [before]
@@ -35,16 +35,16 @@ def run(learned: LearnedDomain, *, parameters: PlanParameters, context: Context)
     if not missing:
         domain = memory.domain(name)
         planner = PLANNERS[parameters.planner]
-        result = attempt(task, name, domain, memory.see, wanted, replan=True, world=Live(kitchen), planner=planner)
+        result = attempt(task, name, domain, memory.see, goal, replan=True, world=Live(kitchen), planner=planner)
         missing = missing_of(memory, result)
-    reached = not missing and wanted <= memory.see(kitchen.state())
+    reached = not missing and goal <= memory.see(kitchen.state())
     if not parameters.goal:
         reached = reached and result.success
     statement = _statement(task, sentence, result, reached, missing)
     KitchenPlanFile(
         domain=name,
         goal=sentence,
-        wanted=tuple(sorted(wanted)),
+        wanted=tuple(sorted(goal)),
         success=reached,
         steps=tuple(KitchenStep(action=action, failed=reason) for action, reason in result.steps),
         missing=missing,
@@ -53,10 +53,10 @@ def run(learned: LearnedDomain, *, parameters: PlanParameters, context: Context)
     width = parameters.image_width
     after = kitchen.polygons()
     sheet = draw_kitchen(before, width, "before")
-    both = sheet.resize((sheet.width, 2 * sheet.height))
-    both.paste(sheet, (0, 0))
-    both.paste(draw_kitchen(after, width, sentence[:100]), (0, sheet.height))
-    both.save(context.output / "kitchen.png")
+    picture = sheet.resize((sheet.width, 2 * sheet.height))
+    picture.paste(sheet, (0, 0))
+    picture.paste(draw_kitchen(after, width, sentence[:100]), (0, sheet.height))
+    picture.save(context.output / "kitchen.png")
     animate(context.output / "kitchen.gif", kitchen.frames[:: max(1, len(kitchen.frames) // 60)], width // 2)
     context.logger.info(statement)
     return KitchenPlan(
@@ -75,8 +75,8 @@ def missing_of(memory: Memory, result: Attempt) -> str:
     never = [name for name in names if name not in added]
     if never:
         return "; ".join(f"no operator was learned that makes {name} true" for name in never)
-    said = ", ".join(" ".join(atom) for atom in result.unreachable)
-    return f"no operator that was learned can make this true here: {said}"
+    atoms_text = ", ".join(" ".join(atom) for atom in result.unreachable)
+    return f"no operator that was learned can make this true here: {atoms_text}"
 
 
 def _statement(task: Task, sentence: str, result: Attempt, reached: bool, missing: str) -> str:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from scenewright.stages.kit.predicates.vocabulary import Vocabulary
 
 TABLE_HEIGHT, TABLE_LEFT, TABLE_RIGHT = 0.0, -40.0, 25.0
+"""Height of the table and its ends [units]."""
 FINGER_HEIGHT, LARGEST_OPENING = 2.0, 5.0
+"""Height of the fingers and largest gap between them [units]."""
 TOLERANCE = 0.2
 """What `near` allows; it is that of the example which every learner is given."""
 KITCHEN_WORDS = Vocabulary(
@@ -73,16 +75,16 @@ class State:
 
     def number(self, name: str, call: str) -> float:
         """Return what a perception call says of an object."""
-        seen = self.objects[name]
+        seen_object = self.objects[name]
         if call == "left":
-            return seen.x - seen.width / 2
+            return seen_object.x - seen_object.width / 2
         if call == "right":
-            return seen.x + seen.width / 2
+            return seen_object.x + seen_object.width / 2
         if call == "bottom":
-            return seen.y
+            return seen_object.y
         if call == "top":
-            return seen.y + seen.height
-        return float(getattr(seen, call))
+            return seen_object.y + seen_object.height
+        return float(getattr(seen_object, call))
 
     def of_scene(self, call: str) -> float:
         """Return what a perception call says of the table or the gripper."""

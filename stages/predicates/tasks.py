@@ -15,9 +15,11 @@ from scenewright.stages.predicates.world.kitchen import Kitchen
 
 SETS = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
 LAYOUTS = 20
+"""Most tries to draw a layout in which nothing overlaps; by eye."""
 LONGEST_WALK = 14
 """Actions of the walk whose end a generated goal is taken from."""
 MOST_LITERALS = 6
+"""Most literals of a generated goal; by eye."""
 FRUITLESS = 40
 """Walks, for each goal that is asked for, after which there are taken to be no more."""
 
@@ -56,7 +58,7 @@ def tasks_of(domain: str, which: str, count: int, seed: int) -> list[Task]:
     """
     setup = kitchen_file().domains[domain]
     if which == "hundred_goals":
-        return _generated(domain, setup, count, seed)
+        return _generate_tasks(domain, setup, count, seed)
     names = setup.objects if which in ("train", "canonical", "novel_goals") else (*setup.objects, *setup.more)
     stream = ("train", *SETS).index(which)
     tasks = []
@@ -90,22 +92,20 @@ def layout(names: tuple[str, ...], random: np.random.Generator, stacked: float) 
     """Return where objects stand, drawn up to LAYOUTS times until they fit. Raises BadInput when they never do."""
     for _ in range(LAYOUTS):
         try:
-            return _drawn_layout(names, random, stacked)
+            return _draw_layout(names, random, stacked)
         except ValueError as error:
             reason = str(error)
     raise BadInput(f"{', '.join(names)}: {reason}", hint="fewer or smaller objects (data/kitchen/kitchen.toml)")
 
 
-def _drawn_layout(
-    names: tuple[str, ...], random: np.random.Generator, stacked: float
-) -> dict[str, tuple[float, float]]:
+def _draw_layout(names: tuple[str, ...], random: np.random.Generator, stacked: float) -> dict[str, tuple[float, float]]:
     """Return where objects stand: the anchored ones at their place, the plate beside the placemat, others on free
     places of the table or, a share `stacked` of them, on a thing that carries them.
 
     Raises ValueError when they don't fit."""
     kinds = kitchen_file().objects
     places: dict[str, tuple[float, float]] = {}
-    taken: list[tuple[float, float]] = []
+    occupied: list[tuple[float, float]] = []
     free: list[str] = []
     """What may still be stood on."""
     for name in sorted(names, key=lambda name: (kinds[name].at is None, kinds[name].shape != "plate")):
@@ -120,15 +120,15 @@ def _drawn_layout(
             free.remove(under)
             x, y = places[under][0], places[under][1] + kinds[under].height
         else:
-            x, y = free_place(random, kind.width / 2, taken), 0.0
+            x, y = free_place(random, kind.width / 2, occupied), 0.0
         places[name] = (x, y)
-        taken.append((x - kind.width / 2, x + kind.width / 2))
+        occupied.append((x - kind.width / 2, x + kind.width / 2))
         if kind.shape != "container":
             free.append(name)
     return places
 
 
-def _generated(domain: str, setup: DomainSetup, count: int, seed: int) -> list[Task]:
+def _generate_tasks(domain: str, setup: DomainSetup, count: int, seed: int) -> list[Task]:
     """Return tasks with goals that differ from each other: what holds at the end of a random walk with the teacher's
     operators, and did not at its beginning; so a plan exists. Fewer where no more were found."""
     names = (*setup.objects, *setup.more)
@@ -143,14 +143,14 @@ def _generated(domain: str, setup: DomainSetup, count: int, seed: int) -> list[T
         chosen = tuple(name for name in names if kitchen_file().objects[name].at is not None or random.random() < 0.85)
         places, chance = layout(chosen, random, setup.stacked), int(random.integers(2**31))
         task = Task(f"{domain}/hundred_goals/{len(tasks) + 1}", places, (), chance)
-        goal = _walked_goal(domain, task, random)
+        goal = _walk_goal(domain, task, random)
         if goal and frozenset(goal) not in goals:
             goals.add(frozenset(goal))
             tasks.append(Task(task.name, places, goal, chance))
     return tasks
 
 
-def _walked_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[Atom, ...]:
+def _walk_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[Atom, ...]:
     start = true_atoms(open_kitchen(task).state(), domain)
     problem = Problem("walk", dict.fromkeys(task.objects, ""), start, frozenset())
     actions = ground(true_domain(domain), problem)
@@ -162,9 +162,9 @@ def _walked_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[
         state = apply_action(state, possible[int(random.integers(len(possible)))])
     if any(atom[0] == "in_gripper" for atom in state):
         return ()
-    said = truth_of(domain).file.goals
-    new = sorted(atom for atom in state - start if atom[0] in said)
-    if not new:
+    goal_names = truth_of(domain).file.goals
+    new_atoms = sorted(atom for atom in state - start if atom[0] in goal_names)
+    if not new_atoms:
         return ()
-    kept = random.permutation(len(new))[: int(random.integers(1, MOST_LITERALS + 1))]
-    return tuple(new[place] for place in sorted(kept.tolist()))
+    drawn = random.permutation(len(new_atoms))[: int(random.integers(1, MOST_LITERALS + 1))]
+    return tuple(new_atoms[index] for index in sorted(drawn.tolist()))

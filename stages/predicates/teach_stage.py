@@ -74,10 +74,10 @@ def run(
     )
     with context.progress.step("teach"):
         training = train(learner, course.domain, course.tasks, course.opened)
-    heard = memory.sentences - before
+    sentences_heard = memory.sentences - before
     domain = memory.domain(course.domain)
     statement = (
-        f"{len(memory.meanings)} phrases and {len(domain.schemas)} operators out of {heard} sentences and "
+        f"{len(memory.meanings)} phrases and {len(domain.schemas)} operators out of {sentences_heard} sentences and "
         f"{training.actions} actions ({training.refused} refused); "
         f"{training.reached} of {training.episodes} goals reached"
     )
@@ -93,13 +93,13 @@ def run(
     (context.output / "domain.pddl").write_text(domain_text(domain), encoding="utf-8")
     write_predicates(memory, context.output)
     operators = {done: len(memory.domain(course.domain, done).schemas) for _, done, _ in training.course}
-    draw_learning([(known, operators[done], said) for known, done, said in training.course]).save(
-        context.output / "learning.png"
-    )
+    draw_learning(
+        [(phrases_known, operators[done], sentences_said) for phrases_known, done, sentences_said in training.course]
+    ).save(context.output / "learning.png")
     summary = {
         "predicates": len(memory.predicates()),
         "operators": len(domain.schemas),
-        "sentences": heard,
+        "sentences": sentences_heard,
         "actions": training.actions,
         "reached": training.reached,
     }
@@ -114,6 +114,8 @@ def write_predicates(memory: Memory, output: Path) -> None:
         lines += ["", "No longer believed:", *(f"- {sentence}" for sentence in memory.disbelieved)]
     (output / "predicates.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
     if memory.states and memory.states[0].names:
-        given = memory.setting.given
-        learned = [each for name, each in predicates.items() if name not in given] or list(given.values())
+        given_predicates = memory.setting.given
+        learned = [each for name, each in predicates.items() if name not in given_predicates] or list(
+            given_predicates.values()
+        )
         draw_predicates(learned, memory.states[0], predicates).save(output / "predicates.png")

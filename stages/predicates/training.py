@@ -72,7 +72,7 @@ def train(learner: OursLearner, domain: str, tasks: Sequence[Task], opened: Open
 
 def _episode(learner: OursLearner, domain: str, task: Task, world: World, training: Training) -> None:
     memory = learner.memory
-    parts = goal_phrases(task.sentence, task.objects)
+    phrases = goal_phrases(task.sentence, task.objects)
     failures = 0
     learner.sought = None
     for step in range(MOST_STEPS):
@@ -81,16 +81,16 @@ def _episode(learner: OursLearner, domain: str, task: Task, world: World, traini
         if step:
             training.note(memory)
         state = world.state()
-        goal, _ = memory.goal_atoms(parts)
+        goal, _ = memory.goal_atoms(phrases)
         curious = step < MOST_STEPS - LEFT_FOR_THE_GOAL and learner.curious(state)
         if goal <= memory.see(state) and not (
             goal and curious
         ):  # also when nothing is known of the goal: then it is asked for
             if learner.teacher.satisfied(state, task.goal):
-                learner.reached(state, parts)
+                learner.reached(state, phrases)
                 training.reached += 1
                 return
-            learner.unmet(state, parts, learner.teacher.unmet(state, task.goal))
+            learner.unmet(state, phrases, learner.teacher.unmet(state, task.goal))
             continue
         action = _next_action(learner, domain, state, goal, curious)
         if action is None:
@@ -118,12 +118,12 @@ def _next_action(
     tried = learner.explore(state)
     if curious or not learner.plans:
         return tried
-    operators, held = learner.memory.domain(domain), learner.memory.see(state)
-    planned = first_action(operators, list(state.names), held, goal)
+    operators, atoms = learner.memory.domain(domain), learner.memory.see(state)
+    planned = first_action(operators, list(state.names), atoms, goal)
     if planned is not None:
         return planned
     fresh = tried if learner.little_tried(state, tried) else None
-    return _towards_unknown(learner, operators, state, held) or fresh or learner.doubtful(state) or tried
+    return _towards_unknown(learner, operators, state, atoms) or fresh or learner.doubtful(state) or tried
 
 
 def _towards_unknown(learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]) -> Atom | None:
@@ -133,11 +133,11 @@ def _towards_unknown(learner: OursLearner, operators: Domain, state: Perceived, 
         learner.sought = _best_sought(learner, operators, state, held)
     if learner.sought is None:
         return None
-    action, wanted = learner.sought
-    if wanted <= held:
+    action, sought_atoms = learner.sought
+    if sought_atoms <= held:
         learner.sought = None
         return action
-    plan = _plan(operators, list(state.names), held, wanted, improvement=0)
+    plan = _plan(operators, list(state.names), held, sought_atoms, improvement=0)
     if not plan:
         learner.sought = None
         return None
@@ -148,12 +148,12 @@ def _best_sought(
     learner: OursLearner, operators: Domain, state: Perceived, held: frozenset[Atom]
 ) -> tuple[Atom, frozenset[Atom]] | None:
     best: tuple[tuple[int, ...], Atom, frozenset[Atom]] | None = None
-    for order, action, wanted in sorted(learner.worth_trying(state), key=lambda entry: entry[:2]):
+    for order, action, sought_atoms in sorted(learner.worth_trying(state), key=lambda entry: entry[:2]):
         if best is not None and best[0][:-1] < order:
             break
-        far = 0 if wanted <= held else len(_plan(operators, list(state.names), held, wanted, improvement=0))
-        if (far or wanted <= held) and (best is None or (*order, far) < best[0]):
-            best = ((*order, far), action, wanted)
+        far = 0 if sought_atoms <= held else len(_plan(operators, list(state.names), held, sought_atoms, improvement=0))
+        if (far or sought_atoms <= held) and (best is None or (*order, far) < best[0]):
+            best = ((*order, far), action, sought_atoms)
     if best is None:
         return None
     learner.seeking[best[1:]] += 1
@@ -170,5 +170,5 @@ def _plan(
     domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom], improvement: int
 ) -> list[Atom]:
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
-    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=improvement)
-    return [action_atom(action) for action in found.actions or ()]
+    outcome = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=improvement)
+    return [action_atom(action) for action in outcome.actions or ()]

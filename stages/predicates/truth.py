@@ -67,8 +67,8 @@ class Truth:
     def goal_phrase(self, atom: Atom) -> str:
         """Return what she says of one literal that she wants."""
         text = self.file.goals[atom[0]]
-        for place, name in enumerate(atom[1:], start=1):
-            text = text.replace(f"<{place}>", name)
+        for number, name in enumerate(atom[1:], start=1):
+            text = text.replace(f"<{number}>", name)
         return text
 
 

@@ -20,9 +20,9 @@ from scenewright.stages.kit.registration.rigid_motion import adjoint, angle_of, 
 from scenewright.stages.splat.views import PosedView
 
 WIDTH, LEVELS, FARTHEST = 160, 3, 6.0
-"""Of the pictures that are aligned [px], resolutions, and the farthest depth [m]."""
+"""Width of the pictures that are aligned [px], their resolutions, and the farthest depth [m]; by eye."""
 LIMITS = Limits(overlap=0.3, agreement=0.75, residual=0.03, uncertainty=0.05, brightness=0.1)
-"""When an alignment is believed: those of `poses` (docs/POSES.md)."""
+"""Limits within which an alignment is believed: those of `poses` (docs/POSES.md)."""
 PER_VIEW = 2
 """Earlier views that a view is aligned with, beside the one before it, at most."""
 PLACED_BY = 4
@@ -32,8 +32,10 @@ GIVEN_STILL = np.array([0.01] * 3 + [0.01] * 3)
 GIVEN_SHARE = 0.05
 """... and what is added for its own length."""
 SWITCHES = (1e4, 1e2, SWITCH)
-"""From believing all alignments to dropping those that contradict the others: far drift is no reason to drop one."""
+"""Weights from believing all alignments to dropping those that contradict the others: far drift is no reason to drop
+one."""
 SPARSE = 200
+"""Points of a picture of which overlap is told; by eye."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class Adjustment:
         `views` are those of the last call and what has arrived since, `world_from_camera` (N, 4, 4) where they stand.
         """
         self._look_at(views)
-        given = [view.camera_from_world for view in views]
-        motions = [before @ inverse(after) for before, after in zip(given, given[1:], strict=False)]
+        given_poses = [view.camera_from_world for view in views]
+        motions = [before @ inverse(after) for before, after in zip(given_poses, given_poses[1:], strict=False)]
         chain = [Edge(k, k + 1, motion, given_information(motion)) for k, motion in enumerate(motions)]
         neighbours = [(k, k + 1) for k in range(len(motions)) if (k, k + 1) not in self.tried]
         self._align(neighbours, world_from_camera)
@@ -78,14 +80,14 @@ class Adjustment:
         """Return where a picture that takes no part (world_from_camera) stands among adjusted `views` that show the
         same, whose poses (N, 4, 4) stay; `guess` (4, 4) where it can be aligned with none."""
         self._look_at(views)
-        own = key_view(view)
-        order = np.argsort([abs(other.time - view.time) for other in views], kind="stable")
+        key = key_view(view)
+        order = np.argsort([abs(learned.time - view.time) for learned in views], kind="stable")
         edges = []
         for k in order[:PLACED_BY]:
-            there = between(world_from_camera[k], guess)
-            found = agreed(self._keys[k].pyramid, own.pyramid, there, LIMITS, use_color=True, coarsest=None)
-            if found is not None:
-                edge = edge_of(0, 1, found, switchable=True)
+            guess_between = between(world_from_camera[k], guess)
+            alignment = agreed(self._keys[k].pyramid, key.pyramid, guess_between, LIMITS, use_color=True, coarsest=None)
+            if alignment is not None:
+                edge = edge_of(0, 1, alignment, switchable=True)
                 turned = adjoint(inverse(world_from_camera[k]))
                 motion = world_from_camera[k] @ edge.target_from_source
                 edges.append(replace(edge, target_from_source=motion, information=turned.T @ edge.information @ turned))
@@ -100,9 +102,9 @@ class Adjustment:
             self.tried.add((target, source))
             first, second = self._keys[target].pyramid, self._keys[source].pyramid
             guess = between(poses[target], poses[source])
-            found = agreed(first, second, guess, LIMITS, use_color=True, coarsest=None)
-            if found is not None:
-                self.edges.append(edge_of(target, source, found, switchable=True))
+            alignment = agreed(first, second, guess, LIMITS, use_color=True, coarsest=None)
+            if alignment is not None:
+                self.edges.append(edge_of(target, source, alignment, switchable=True))
 
 
 def key_view(view: PosedView) -> KeyView:

@@ -7,6 +7,7 @@ import numpy as np
 REJECTED = 0.9
 """Share of absent texts that are rejected at the threshold where recall is looked at."""
 BINS = 10
+"""Bins of the calibration error."""
 
 
 def recall_at_rejection(present: np.ndarray, right: np.ndarray, absent: np.ndarray) -> float | None:

@@ -25,7 +25,7 @@ class There(Model):
     @field_validator("text")
     @classmethod
     def _asks(cls, text: str) -> str:
-        return _checked(text)
+        return _check_text(text)
 
 
 class Asked(Model):
@@ -38,10 +38,10 @@ class Asked(Model):
     @field_validator("absent")
     @classmethod
     def _ask(cls, texts: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(_checked(text) for text in texts)
+        return tuple(_check_text(text) for text in texts)
 
 
-def _checked(text: str) -> str:
+def _check_text(text: str) -> str:
     """Return a text that can be asked for. Raises ValueError."""
     try:
         return checked_text(text)
@@ -54,9 +54,9 @@ def read_asked(path: Path) -> Asked:
     is asked."""
     values = file_toml(path, LARGEST_SETTINGS, hint=HINT)
     try:
-        asked = Asked.model_validate_json(json.dumps(values, default=str))
+        questions = Asked.model_validate_json(json.dumps(values, default=str))
     except ValidationError as error:
         raise BadInput(f"{path}: {first_problem(error)}", hint=HINT) from None
-    if not asked.there and not asked.absent:
+    if not questions.there and not questions.absent:
         raise BadInput(f"{path}: nothing is asked", hint=HINT)
-    return asked
+    return questions

@@ -25,7 +25,7 @@ from scenewright.stages.splat.views import evenly, held_out, posed_frames, read_
 from scipy.spatial.transform import Rotation
 
 CHECKPOINT_EVERY = 60.0
-"""Of a training that may be killed [s]."""
+"""Time between two checkpoints of a training that may be killed [s]; by eye."""
 
 
 def run(
@@ -86,9 +86,11 @@ def run(
             raise BadInput(f"{sequence.root}: no Gaussian is left after {trainer.steps} steps", hint="--method ours")
         times = reader.times
         names = {frame: reader.read(frame, ()).camera_name for frame, _ in posed}
-        kept = [read_view(reader, frame, poses[frame], parameters.width) for frame in uses if uses[frame] == "held_out"]
+        held_out_views = [
+            read_view(reader, frame, poses[frame], parameters.width) for frame in uses if uses[frame] == "held_out"
+        ]
     final = carried_poses(trainer, posed)
-    aligned = dict(placed_poses(trainer, [view for view in kept if view is not None]))
+    aligned = dict(placed_poses(trainer, [view for view in held_out_views if view is not None]))
     final = [(frame, aligned.get(frame, pose)) for frame, pose in final]
     write_tum(context.output / "trajectory.tum", times[[frame for frame, _ in final]], np.array([p for _, p in final]))
     write_gaussians(context.output / "splat.ply", trainer.gaussians)
@@ -136,10 +138,10 @@ def _choose(posed: list[tuple[int, np.ndarray]], parameters: BuildParameters, us
     """Return the frames to learn from, and write what becomes of the others into `uses`."""
     frames = [frame for frame, _ in posed]
     chosen = evenly(frames, parameters.most_views)
-    kept = {chosen[k] for k in held_out(len(chosen), parameters.hold_out_every)}
-    learned = [frame for frame in chosen if frame not in kept]
+    held_out_frames = {chosen[k] for k in held_out(len(chosen), parameters.hold_out_every)}
+    learned = [frame for frame in chosen if frame not in held_out_frames]
     uses.update({frame: "left_out" for frame in frames})
-    uses.update({frame: "held_out" for frame in kept})
+    uses.update({frame: "held_out" for frame in held_out_frames})
     uses.update({frame: "learned" for frame in learned})
     return learned
 

@@ -55,8 +55,8 @@ def carried_poses(trainer: Trainer, given: Sequence[tuple[int, np.ndarray]]) -> 
         if len(frames) > 1:
             share = np.clip((frame - frames[before]) / (frames[after] - frames[before]), 0.0, 1.0)
             # The motion of the camera itself from where the change before it alone would have put it.
-            rest = inverse(change @ pose) @ changes[after] @ pose
-            result.append((frame, change @ pose @ fraction(rest, float(share))))
+            remaining_motion = inverse(change @ pose) @ changes[after] @ pose
+            result.append((frame, change @ pose @ fraction(remaining_motion, float(share))))
         else:
             result.append((frame, change @ pose))
     return result

@@ -62,20 +62,20 @@ def grown(
     gaussians: Gaussians, pull: np.ndarray, density: Density, random: np.random.Generator
 ) -> tuple[Gaussians, np.ndarray, np.ndarray]:
     """Return the Gaussians to add, the rows (M,) that they come from, and which (N,) make way for them."""
-    wanted = pull > density.gradient
+    pulled = pull > density.gradient
     room = max(0, density.most - len(gaussians))
-    if wanted.sum() > room:
-        rows = np.flatnonzero(wanted)
-        wanted[:] = False
-        wanted[rows[np.argsort(-pull[rows], kind="stable")[:room]]] = True
+    if pulled.sum() > room:
+        rows = np.flatnonzero(pulled)
+        pulled[:] = False
+        pulled[rows[np.argsort(-pull[rows], kind="stable")[:room]]] = True
     large = np.exp(gaussians.log_scales.max(axis=1)) > density.size
-    split, doubled = wanted & large, wanted & ~large
+    split, doubled = pulled & large, pulled & ~large
     halves = np.repeat(np.flatnonzero(split), SPLIT)
-    parts = gaussians.taken(halves)
-    offsets = random.standard_normal(parts.means.shape).astype(np.float32) * np.exp(parts.log_scales)
-    parts.means += np.einsum("nij,nj->ni", _turns(parts.quaternions), offsets).astype(np.float32)
-    parts.log_scales -= np.float32(np.log(SHRINK))
-    return parts.joined(gaussians.taken(doubled)), np.concatenate([halves, np.flatnonzero(doubled)]), split
+    halved = gaussians.taken(halves)
+    offsets = random.standard_normal(halved.means.shape).astype(np.float32) * np.exp(halved.log_scales)
+    halved.means += np.einsum("nij,nj->ni", _turns(halved.quaternions), offsets).astype(np.float32)
+    halved.log_scales -= np.float32(np.log(SHRINK))
+    return halved.joined(gaussians.taken(doubled)), np.concatenate([halves, np.flatnonzero(doubled)]), split
 
 
 def useless(gaussians: Gaussians, density: Density, was_reset: bool) -> np.ndarray:

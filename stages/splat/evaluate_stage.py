@@ -43,18 +43,18 @@ def run(
 
     Raises BadInput for a file that does not say it, or for an encoder other than that of the map.
     """
-    asked, info = read_asked(queries), language.info
+    questions, info = read_asked(queries), language.info
     encoder = open_encoder(parameters, weights, context.device)
     check_width(encoder, info.width, info.encoder, str(language.root))
     finder = Finder(language, encoder)
-    texts = [(each.text, each.boxes) for each in asked.there] + [(text, ()) for text in asked.absent]
+    texts = [(each.text, each.boxes) for each in questions.there] + [(text, ()) for text in questions.absent]
     firsts = []
     for number, (text, boxes) in enumerate(context.progress.track(texts, total=len(texts), description="queries")):
-        found = next(iter(finder.find(text)), None)
-        place = None if found is None else finder.place(found.region)
-        right = place is not None and any(points_in_box(box, place[None], MARGIN)[0] for box in boxes)
-        chance = 0.0 if found is None else round(found.probability, 6)
-        firsts.append(First(text, number < len(asked.there), chance, bool(right), place))
+        first_answer = next(iter(finder.find(text)), None)
+        position = None if first_answer is None else finder.place(first_answer.region)
+        right = position is not None and any(points_in_box(box, position[None], MARGIN)[0] for box in boxes)
+        chance = 0.0 if first_answer is None else round(first_answer.probability, 6)
+        firsts.append(First(text, number < len(questions.there), chance, bool(right), position))
     least = parameters.least_probability
     file = MetricsFile(label=encoder.label, metrics=figures(firsts, least), notes=_notes(finder, firsts))
     file.write(context.output / "metrics.json")
@@ -74,20 +74,22 @@ def run(
         limit=1.0,
         threshold=least,
     )
-    shown = {name.split("/")[1]: round(value, 4) for name, value in file.metrics.items() if value is not None}
-    return Evaluation(context.output, outcome="ok", summary=shown)
+    rounded = {name.split("/")[1]: round(value, 4) for name, value in file.metrics.items() if value is not None}
+    return Evaluation(context.output, outcome="ok", summary=rounded)
 
 
 def figures(firsts: list[First], least: float) -> dict[str, float | None]:
     """Return the measures of first answers, of which those from probability `least` on count."""
-    there, absent = [f for f in firsts if f.there], [f for f in firsts if not f.there]
-    answered = [f for f in there if f.probability >= least]
-    chances = {kind: np.array([f.probability for f in group]) for kind, group in (("there", there), ("absent", absent))}
-    right = np.array([f.right for f in there], bool)
+    present, absent = [f for f in firsts if f.there], [f for f in firsts if not f.there]
+    answered = [f for f in present if f.probability >= least]
+    chances = {
+        kind: np.array([f.probability for f in group]) for kind, group in (("there", present), ("absent", absent))
+    }
+    right = np.array([f.right for f in present], bool)
     return {
-        "words/there": float(len(there)),
+        "words/there": float(len(present)),
         "words/absent": float(len(absent)),
-        "words/recall": sum(f.right for f in answered) / len(there) if there else None,
+        "words/recall": sum(f.right for f in answered) / len(present) if present else None,
         "words/precision": sum(f.right for f in answered) / len(answered) if answered else None,
         "words/absent_rejected": sum(f.probability < least for f in absent) / len(absent) if absent else None,
         "words/recall_at_rejection": recall_at_rejection(chances["there"], right, chances["absent"]),

@@ -46,10 +46,10 @@ def run(
         frames = evenly([frame for frame, _ in posed], parameters.most_views) if entities else []
         poses = dict(posed)
         for frame in context.progress.track(frames, total=len(frames), description="pictures"):
-            found = reader.read(frame, ("color", "depth"))
-            if found.color is not None and found.depth is not None:
-                camera = reader.cameras[found.camera_name]
-                sights.append(Sight(found.color, found.depth, camera, inverse(poses[frame])))
+            frame_read = reader.read(frame, ("color", "depth"))
+            if frame_read.color is not None and frame_read.depth is not None:
+                camera = reader.cameras[frame_read.camera_name]
+                sights.append(Sight(frame_read.color, frame_read.depth, camera, inverse(poses[frame])))
     with context.progress.step("look"):
         vectors, counts = looks(meshes, sights, encoder)
     write_vectors(context.output, of_regions(vectors))

@@ -36,9 +36,11 @@ from scenewright.stages.splat.strays import no_strays
 from scenewright.stages.splat.views import evenly, posed_frames
 
 SIZES = tuple(round(float(size), 4) for size in np.geomspace(0.08, 1.5, 8))
-"""At which every Gaussian is asked for, up to the thesis's largest [m]."""
+"""Sizes at which every Gaussian is asked for, up to the thesis's largest [m]."""
 LAST = 50
+"""Last steps whose mean loss is kept; by eye."""
 COVERED = 0.5
+"""Opacity from which on a pixel counts as covered."""
 
 
 def run(
@@ -67,34 +69,34 @@ def run(
                 raise BadInput(
                     f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence"
                 )
-            found = reader.read(frame, ("color", "depth"))
-            if found.color is None:
+            frame_read = reader.read(frame, ("color", "depth"))
+            if frame_read.color is None:
                 continue
-            camera, pose = reader.cameras[found.camera_name], inverse(poses[frame])
-            lessons.append(lesson_of(pyramid(found.color, encoder), gaussians, rasterizer, camera, pose))
-            depth = found.depth
+            camera, pose = reader.cameras[frame_read.camera_name], inverse(poses[frame])
+            lessons.append(lesson_of(pyramid(frame_read.color, encoder), gaussians, rasterizer, camera, pose))
+            depth = frame_read.depth
             if depth is None:
-                shown = rasterizer.draw(gaussians, View(camera, pose)).picture
-                depth = np.where(shown.alpha > COVERED, shown.depth / np.maximum(shown.alpha, 1e-6), 0).astype(
+                drawn = rasterizer.draw(gaussians, View(camera, pose)).picture
+                depth = np.where(drawn.alpha > COVERED, drawn.depth / np.maximum(drawn.alpha, 1e-6), 0).astype(
                     np.float32
                 )
-            sights.append(Sight(found.color, depth, camera, pose))
+            sights.append(Sight(frame_read.color, depth, camera, pose))
     field, losses = _field(gaussians.means, encoder.width, context.seed), deque[float](maxlen=LAST)
     if any(len(lesson.places) for lesson in lessons):
         taught = learn(field, lessons, parameters.steps, context.random(1))
         losses.extend(context.progress.track(taught, total=parameters.steps, description="steps"))
     with context.progress.step("pieces"):
-        numbered = _numbered(pieces(gaussians))
+        numbered = _number_rows(pieces(gaussians))
         order, starts = members_of(numbered, int(numbered.max(initial=-1)) + 1)
-        parts = np.split(order, starts[1:-1]) if len(order) else []
-        members = [gaussians.means[part].astype(float) for part in parts]
+        members_of_region = np.split(order, starts[1:-1]) if len(order) else []
+        members = [gaussians.means[part].astype(float) for part in members_of_region]
         vectors, counts = looks(members, sights, encoder)
     regions = [
         LanguageRegion(box=minimum_box(points[no_strays(points)]), looks=int(count))
         for points, count in zip(members, counts, strict=True)
     ]
     if panoptic_map is not None:
-        regions = _named(regions, parts, gaussians.means, panoptic_map)
+        regions = _name_regions(regions, members_of_region, gaussians.means, panoptic_map)
     at_sizes = [field.vectors(gaussians.means, size) for size in SIZES]
     opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
     every = np.stack(at_sizes, axis=1) if len(gaussians) else np.zeros((0, len(SIZES), encoder.width), np.float32)
@@ -120,7 +122,7 @@ def run(
     return LanguageMap(context.output, outcome="ok" if members else "empty", summary=summary)
 
 
-def _named(
+def _name_regions(
     regions: list[LanguageRegion], parts: list[np.ndarray], means: np.ndarray, panoptic_map: PanopticMap
 ) -> list[LanguageRegion]:
     """Return regions with the entities that their Gaussians (`parts`) belong to: instance, class and, of a thing, its
@@ -128,18 +130,18 @@ def _named(
     entities = [entity for entity in panoptic_map.info.entities if entity.vertices]
     surfaces = [np.asarray(load_entity_mesh(panoptic_map.path(entity.mesh)).vertices) for entity in entities]
     owners, classes, boxes = nearest_entities(means, surfaces), load_vocabulary(), dict[int, Box]()
-    named = []
+    named_regions = []
     for region, part in zip(regions, parts, strict=True):
         number = entity_of(owners[part])
         if number == NONE:
-            named.append(region)
+            named_regions.append(region)
             continue
         entity = entities[number]
-        told: dict[str, object] = {"instance": entity.instance, "class_name": entity.class_name}
+        fields: dict[str, object] = {"instance": entity.instance, "class_name": entity.class_name}
         if not classes.by_name(entity.class_name).is_layout:
-            told["box"] = boxes.setdefault(number, minimum_box(surfaces[number]))
-        named.append(region.model_copy(update=told))
-    return named
+            fields["box"] = boxes.setdefault(number, minimum_box(surfaces[number]))
+        named_regions.append(region.model_copy(update=fields))
+    return named_regions
 
 
 def _field(means: np.ndarray, width: int, seed: int) -> LanguageField:
@@ -147,7 +149,7 @@ def _field(means: np.ndarray, width: int, seed: int) -> LanguageField:
     return LanguageField(means if len(means) else np.zeros((1, 3)), width)
 
 
-def _numbered(found: np.ndarray) -> np.ndarray:
+def _number_rows(found: np.ndarray) -> np.ndarray:
     """Return pieces (granularities, N) with numbers of their own in every row."""
     result, first = found.copy(), 0
     for row in result:

@@ -9,8 +9,9 @@ import numpy as np
 from scenewright.stages.kit.rendering.splatting.rasterizer import Picture
 
 WINDOW, SIGMA = 11, 1.5
-"""Of the structural similarity (Wang et al. 2004)."""
+"""Side [px] and standard deviation [px] of the window of the structural similarity (Wang et al. 2004)."""
 C1, C2 = 0.01**2, 0.03**2
+"""Constants of the structural similarity, of colours from 0 to 1 (Wang et al. 2004)."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,9 @@ def loss_of(
     by_color = ((1 - share) / difference.size) * np.sign(difference) - share * by_similarity
     by_depth, by_alpha = np.zeros_like(picture.depth), np.zeros_like(picture.alpha)
     if weights.depth and depth is not None:
-        known = depth > 0
-        measured = np.where(known, depth, 1.0)
-        relative = np.where(known, (picture.depth - picture.alpha * measured) / measured, 0.0)
+        has_depth = depth > 0
+        measured = np.where(has_depth, depth, 1.0)
+        relative = np.where(has_depth, (picture.depth - picture.alpha * measured) / measured, 0.0)
         loss += weights.depth * float(np.abs(relative).sum()) / pixels
         signs = (weights.depth / pixels) * np.sign(relative)
         by_depth, by_alpha = signs / measured, -signs

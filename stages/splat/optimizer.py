@@ -23,8 +23,8 @@ class RowAdam:
         """Make room for Gaussians, and for coefficients of their colours, that were added at the end."""
         for name, array in gaussians.arrays().items():
             moments = np.zeros((len(array), 2, int(np.prod(array.shape[1:]))), np.float32)
-            old = self.moments.get(name, moments[:0])
-            moments[: len(old), :, : old.shape[2]] = old
+            earlier_moments = self.moments.get(name, moments[:0])
+            moments[: len(earlier_moments), :, : earlier_moments.shape[2]] = earlier_moments
             self.moments[name] = moments
         self.steps = np.concatenate([self.steps, np.zeros(len(gaussians) - len(self.steps), np.int64)])
 

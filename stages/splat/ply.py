@@ -19,8 +19,11 @@ COLUMNS = (
     *(f"scale_{k}" for k in range(3)),
     *(f"rot_{k}" for k in range(4)),
 )
+"""Names of a Gaussian's numbers, in order."""
 LARGEST_FILE = 4 * 2**30
+"""Largest file that is read [bytes]; by eye."""
 LARGEST_HEADER = 4000
+"""Longest header [bytes]; by eye."""
 
 
 def write_gaussians(path: Path, gaussians: Gaussians) -> None:
@@ -28,7 +31,7 @@ def write_gaussians(path: Path, gaussians: Gaussians) -> None:
     count = len(gaussians)
     higher = np.zeros((count, 3, HIGHER), np.float32)
     higher[:, :, : gaussians.harmonics.shape[1] - 1] = gaussians.harmonics[:, 1:].transpose(0, 2, 1)
-    parts = (
+    columns = (
         gaussians.means,
         np.zeros((count, 3)),
         gaussians.harmonics[:, 0],
@@ -37,7 +40,7 @@ def write_gaussians(path: Path, gaussians: Gaussians) -> None:
         gaussians.log_scales,
         gaussians.quaternions / np.linalg.norm(gaussians.quaternions, axis=1, keepdims=True),
     )
-    table = np.concatenate(parts, axis=1).astype("<f4")
+    table = np.concatenate(columns, axis=1).astype("<f4")
     Path(path).write_bytes(_header(count) + table.tobytes())
 
 

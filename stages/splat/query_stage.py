@@ -42,9 +42,9 @@ def run(
         ranking = finder.find(text)
     nodes = {node.instance: node.id for node in graph.nodes if node.instance} if graph is not None else {}
     least = parameters.least_probability
-    kept = [found for found in ranking if found.probability >= least][: parameters.most]
-    below = next((found for found in ranking if found.probability < least), None)
-    masks = [finder.index.members(found.region) for found in kept]
+    likely = [answer for answer in ranking if answer.probability >= least][: parameters.most]
+    below = next((answer for answer in ranking if answer.probability < least), None)
+    masks = [finder.index.members(answer.region) for answer in likely]
     unread = encoder.unread(text)
     AnswersFile(
         text=text,
@@ -55,16 +55,16 @@ def run(
         least_probability=least,
         unread=unread,
         relation=" ".join(relation) if relation is not None else "",
-        answers=tuple(_answer(finder, found, nodes) for found in kept),
+        answers=tuple(_answer(finder, answer, nodes) for answer in likely),
         next_best=None if below is None else _answer(finder, below, nodes),
     ).write(context.output / "answers.json")
     starts = np.concatenate([[0], np.cumsum([len(mask) for mask in masks])]).astype(np.int64)
     gaussians = np.concatenate([*masks, np.zeros(0, int)]).astype(np.int32)
     write_arrays(context.output / "masks.npz", {"gaussians": gaussians, "starts": starts})
-    summary: dict[str, object] = {"answers": len(kept)}
-    if kept:
-        summary["best"] = round(kept[0].probability, 3)
-        summary["place"] = [round(float(v), 3) for v in finder.place(kept[0].region)]
+    summary: dict[str, object] = {"answers": len(likely)}
+    if likely:
+        summary["best"] = round(likely[0].probability, 3)
+        summary["place"] = [round(float(v), 3) for v in finder.place(likely[0].region)]
     if finder.is_strange:
         context.logger.warning(
             "its pictures are near nothing that the encoder has learned (%.2f, from %.2f on they count as known): "
@@ -76,13 +76,13 @@ def run(
     if unread:
         context.logger.warning("the encoder has never read %s: what is found for it is a guess", ", ".join(unread))
         summary["unread"] = " ".join(unread)
-    return Answers(context.output, outcome="ok" if kept else "absent", summary=summary)
+    return Answers(context.output, outcome="ok" if likely else "absent", summary=summary)
 
 
 def _check_same_map(language: LanguageMap, graph: ContactGraphFile) -> None:
-    known = {node.instance for node in graph.nodes}
-    there = {region.instance for region in language.info.regions}
-    if language.info.source != "panoptic_map" or not known & there - {0}:
+    in_graph = {node.instance for node in graph.nodes}
+    in_map = {region.instance for region in language.info.regions}
+    if language.info.source != "panoptic_map" or not in_graph & in_map - {0}:
         raise BadInput(
             f"{language.root}: its places are no nodes of the contact graph",
             hint="label the map that the graph was made of: scenewright splat label",

@@ -27,8 +27,8 @@ def run(splat: Splat, sequence: Sequence, *, parameters: RenderParameters, conte
     The outcome is `empty` where no view is of the kind asked for. Raises BadInput for another sequence.
     """
     info = splat.built
-    wanted = ("held_out", "learned") if parameters.views == "all" else (parameters.views,)
-    uses = {view.frame: view.use for view in info.views if view.use in wanted}
+    uses_wanted = ("held_out", "learned") if parameters.views == "all" else (parameters.views,)
+    uses = {view.frame: view.use for view in info.views if view.use in uses_wanted}
     width = max(camera.width for camera in info.cameras.values())
     gaussians, rasterizer = read_gaussians(splat.path("splat.ply")), rasterizer_of(context.device)
     drawn_frames = set(evenly(sorted(uses), parameters.pictures) if parameters.pictures else [])
@@ -71,7 +71,7 @@ def run(splat: Splat, sequence: Sequence, *, parameters: RenderParameters, conte
 
 def figures_of(view: PosedView, picture: Picture, use: str) -> ViewFigures:
     """Return how well a view is shown."""
-    shown = np.clip(picture.color, 0, 1)
+    clipped = np.clip(picture.color, 0, 1)
     error = None
     if view.depth is not None and (view.depth > 0).any():
         error = float(np.median(np.abs(expected_depth(picture) - view.depth)[view.depth > 0]))
@@ -79,8 +79,8 @@ def figures_of(view: PosedView, picture: Picture, use: str) -> ViewFigures:
         {
             "frame": view.frame,
             "use": use,
-            "psnr": signal_to_noise(shown, view.color),
-            "ssim": structural_similarity(shown, view.color)[0],
+            "psnr": signal_to_noise(clipped, view.color),
+            "ssim": structural_similarity(clipped, view.color)[0],
             "depth_error": error,
             "cover": float(picture.alpha.mean()),
         }
@@ -95,11 +95,11 @@ def expected_depth(picture: Picture) -> np.ndarray:
 def beside(view: PosedView, picture: Picture) -> np.ndarray:
     """Return (H, 3 W, 3) uint8: what the camera saw, what the splat shows, and how depths differ: red behind what was
     measured, blue in front of it, grey where nothing was measured."""
-    shown = np.clip(picture.color, 0, 1)
+    clipped = np.clip(picture.color, 0, 1)
     difference = np.full(view.color.shape, 0.5)
     if view.depth is not None:
-        known = view.depth > 0
+        has_depth = view.depth > 0
         error = np.clip((expected_depth(picture) - view.depth) / FULL_RED, -1, 1)
         painted = np.stack([1 - np.maximum(-error, 0), 1 - np.abs(error), 1 - np.maximum(error, 0)], axis=-1)
-        difference[known] = painted[known]
-    return np.round(255 * np.concatenate([view.color, shown, difference], axis=1)).astype(np.uint8)
+        difference[has_depth] = painted[has_depth]
+    return np.round(255 * np.concatenate([view.color, clipped, difference], axis=1)).astype(np.uint8)

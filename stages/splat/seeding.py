@@ -13,7 +13,7 @@ from scenewright.stages.splat.views import PosedView
 from scipy.ndimage import distance_transform_edt
 
 DEPTH_ERROR = 0.08
-"""Farther apart, over the depth, what is shown and what was measured are two things."""
+"""Difference, over the depth, from which on what is shown and what was measured are two things; by eye."""
 
 DENSE = 0.1
 """Share of a picture with depth from which on it sees through what lies before: a depth camera's. Triangulated points

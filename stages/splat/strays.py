@@ -16,5 +16,5 @@ def no_strays(points: np.ndarray) -> np.ndarray:
     if len(points) <= FEW:
         return every
     low, high = (np.percentile(points, share, axis=0) for share in MIDDLE)
-    kept = ((points >= low) & (points <= high)).all(axis=1)
-    return kept if kept.any() else every
+    within = ((points >= low) & (points <= high)).all(axis=1)
+    return within if within.any() else every

@@ -21,6 +21,7 @@ from scenewright.stages.splat.views import PosedView
 from scipy.spatial.transform import Rotation
 
 MOMENTS = (0.9, 0.999)
+"""Decay of the moments of Adam, for poses (Kingma and Ba 2015)."""
 
 
 @dataclass(frozen=True)
@@ -128,17 +129,17 @@ class Trainer:
             self._adjust()
         learned = self.views[-1]
         guesses = np.flatnonzero(self._guessed)
-        kept = np.ones(len(self.gaussians), bool)
-        kept[guesses] = ~seen_through(self.gaussians.means[guesses], view, learned.camera_from_world)
-        if not kept.all():
-            self._keep(kept)
-        shown = self.draw(learned).picture
-        more, guessed = self.method.seed(view, shown, learned.camera_from_world, self.random)
+        remaining = np.ones(len(self.gaussians), bool)
+        remaining[guesses] = ~seen_through(self.gaussians.means[guesses], view, learned.camera_from_world)
+        if not remaining.all():
+            self._keep(remaining)
+        drawn = self.draw(learned).picture
+        seeded, guessed = self.method.seed(view, drawn, learned.camera_from_world, self.random)
         room = max(0, self.most - len(self.gaussians))
-        if len(more) > room:
-            rows = np.sort(self.random.permutation(len(more))[:room])
-            more, guessed = more.taken(rows), guessed[rows]
-        self._add(Seeds(more, guessed), np.full(len(more), len(self.views) - 1))
+        if len(seeded) > room:
+            rows = np.sort(self.random.permutation(len(seeded))[:room])
+            seeded, guessed = seeded.taken(rows), guessed[rows]
+        self._add(Seeds(seeded, guessed), np.full(len(seeded), len(self.views) - 1))
 
     def _adjust(self) -> None:
         before = inverses(np.array([each.camera_from_world for each in self.views]))
@@ -203,8 +204,8 @@ class Trainer:
     def _change_density(self) -> None:
         density = self.method.density
         self._rounds += 1
-        more, parents, gone = grown(self.gaussians, self._pull.means(), density, self.random)
-        seeds, origins = Seeds(more, self._guessed[parents]), self._origins[parents]
+        added, parents, gone = grown(self.gaussians, self._pull.means(), density, self.random)
+        seeds, origins = Seeds(added, self._guessed[parents]), self._origins[parents]
         gone |= useless(self.gaussians, density, self._was_reset)
         self._keep(~gone)
         self._pull = Pull(len(self.gaussians))

@@ -16,20 +16,21 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.splat.views import PosedView
 
 FEATURES = 2000
-"""Of a picture, at most."""
+"""Most features of a picture; by eye."""
 LONGEST_EXHAUSTIVE = 60
-"""So many pictures are matched each with each; of more, each with the NEIGHBOURS that follow."""
+"""Most pictures that are matched each with each; of more, each is matched with the NEIGHBOURS that follow. By eye."""
 NEIGHBOURS = 12
+"""Pictures that follow one with which it is matched; by eye."""
 LARGEST_ERROR = 2.0
-"""Of a point in the pictures that show it [px]."""
+"""Largest error of a point in the pictures that show it [px]; by eye."""
 LEAST_ANGLE = 2.0
-"""Between the rays of a point [degrees]."""
+"""Least angle between the rays of a point [degrees]; by eye."""
 
 
 def with_points(views: Sequence[PosedView], seed: int) -> list[PosedView]:
     """Return the views with the z-depth [m] of the triangulated points that each shows, 0 everywhere else."""
     points = _points(views, seed)
-    found = []
+    with_depth = []
     for number, view in enumerate(views):
         height, width = view.color.shape[:2]
         depth = np.zeros((height, width), np.float32)
@@ -38,8 +39,8 @@ def with_points(views: Sequence[PosedView], seed: int) -> list[PosedView]:
             columns = np.clip(np.rint(pixels[:, 0]).astype(int), 0, width - 1)
             rows = np.clip(np.rint(pixels[:, 1]).astype(int), 0, height - 1)
             depth[rows, columns] = np.maximum(apply(view.camera_from_world, places)[:, 2], 0.0)
-        found.append(replace(view, depth=depth))
-    return found
+        with_depth.append(replace(view, depth=depth))
+    return with_depth
 
 
 def _points(views: Sequence[PosedView], seed: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
@@ -56,8 +57,8 @@ def _points(views: Sequence[PosedView], seed: int) -> dict[int, tuple[np.ndarray
             camera = next(view.camera for view in views if view.camera_name == name)
             # Its pixel centres are at halves.
             parameters = [camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]
-            own = [k for k, view in enumerate(views) if view.camera_name == name]
-            for k in own:
+            views_of_camera = [k for k, view in enumerate(views) if view.camera_name == name]
+            for k in views_of_camera:
                 path = folder / "images" / f"{k:06d}.png"
                 path.parent.mkdir(exist_ok=True)
                 cv2.imwrite(str(path), np.round(255 * views[k].color[..., ::-1]).astype(np.uint8))
@@ -69,7 +70,7 @@ def _points(views: Sequence[PosedView], seed: int) -> dict[int, tuple[np.ndarray
             pycolmap.extract_features(
                 folder / "database.db",
                 folder / "images",
-                [f"{k:06d}.png" for k in own],
+                [f"{k:06d}.png" for k in views_of_camera],
                 pycolmap.CameraMode.SINGLE,
                 reading,
                 extraction,
@@ -101,14 +102,14 @@ def _points(views: Sequence[PosedView], seed: int) -> dict[int, tuple[np.ndarray
             options=options,
             refine_intrinsics=False,
         )
-        found = {}
+        points_of_view = {}
         for image in model.images.values():
-            seen = [(p.xy, model.points3D[p.point3D_id]) for p in image.points2D if p.has_point3D()]
-            good = [(xy, point.xyz) for xy, point in seen if point.error <= LARGEST_ERROR]
+            observations = [(p.xy, model.points3D[p.point3D_id]) for p in image.points2D if p.has_point3D()]
+            good = [(xy, point.xyz) for xy, point in observations if point.error <= LARGEST_ERROR]
             if good:
                 pixels, places = (np.array(part) for part in zip(*good, strict=True))
-                found[int(image.name.removesuffix(".png"))] = (pixels - 0.5, places)
-        return found
+                points_of_view[int(image.name.removesuffix(".png"))] = (pixels - 0.5, places)
+        return points_of_view
 
 
 def _match(database: Path, count: int, seed: int) -> None:

@@ -14,16 +14,17 @@ from scenewright.stages.kit.rendering.splatting.rasterizer import Rasterizer, Vi
 from scenewright.stages.splat.strays import no_strays
 
 SIZE = (480, 360)
-"""Of a picture [px]."""
+"""Width and height of a picture [px]."""
 FIELD_OF_VIEW = np.deg2rad(45.0)
+"""Vertical field of view [rad]."""
 ELEVATION = np.deg2rad(55.0)
 """Steep enough to look into a room over its walls."""
 LEAST_RADIUS = 0.05
-"""Of what is shown [m]: a single Gaussian has none."""
+"""Least radius of what is shown [m]: a single Gaussian has none."""
 SHEET = 4
 """Pictures of the sheet that stands for the turn, two in a row."""
 SECONDS = 6.0
-"""Of a turn."""
+"""Time of a turn [s]."""
 
 
 def opened(gaussians: Gaussians, camera_centers: np.ndarray) -> Gaussians:

@@ -49,42 +49,42 @@ def posed_frames(
         raise BadInput(f"{sequence.root}: its frames have no colour", hint="splats are learned from pictures")
     if trajectory is None:
         frames, poses = reader.poses()
-        found = list(zip(frames.tolist(), poses, strict=True))
+        posed = list(zip(frames.tolist(), poses, strict=True))
         hint = "estimate poses: scenewright poses"
     else:
-        found, hint = _of_trajectory(reader, trajectory), "the trajectory belongs to another sequence"
-    if len(found) < 2:
-        raise BadInput(f"{sequence.root}: {len(found)} frames have a pose, two are needed", hint=hint)
-    return found
+        posed, hint = _of_trajectory(reader, trajectory), "the trajectory belongs to another sequence"
+    if len(posed) < 2:
+        raise BadInput(f"{sequence.root}: {len(posed)} frames have a pose, two are needed", hint=hint)
+    return posed
 
 
 def _of_trajectory(reader: FrameReader, trajectory: Trajectory) -> list[tuple[int, np.ndarray]]:
     times, poses = read_tum(trajectory.path("trajectory.tum"))
-    found = []
+    posed = []
     for frame, time in enumerate(reader.times):
         if len(times):
             nearest = int(np.abs(times - time).argmin())
             if abs(times[nearest] - time) <= TIME_TOLERANCE:
-                found.append((frame, poses[nearest]))
-    return found
+                posed.append((frame, poses[nearest]))
+    return posed
 
 
 def read_view(reader: FrameReader, frame: int, world_from_camera: np.ndarray, width: int) -> PosedView | None:
     """Return a frame at most `width` pixels wide; None without colour, or where it is dark."""
-    found: Frame = reader.read(frame, ("color", "depth"))
-    if found.color is None or float(found.color.mean()) < 255 * DARK:
+    frame_read: Frame = reader.read(frame, ("color", "depth"))
+    if frame_read.color is None or float(frame_read.color.mean()) < 255 * DARK:
         return None
-    camera = reader.cameras[found.camera_name]
+    camera = reader.cameras[frame_read.camera_name]
     factor = min(1.0, width / camera.width)
     small = scaled(camera, factor) if factor < 1 else camera
     size = (small.width, small.height)
-    color = found.color if factor == 1 else cv2.resize(found.color, size, interpolation=cv2.INTER_AREA)
-    depth = found.depth
+    color = frame_read.color if factor == 1 else cv2.resize(frame_read.color, size, interpolation=cv2.INTER_AREA)
+    depth = frame_read.depth
     if depth is not None and factor < 1:
         depth = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)
     pose = inverse(world_from_camera)
     return PosedView(
-        frame, found.time, found.camera_name, small, color.astype(np.float32) / np.float32(255), depth, pose
+        frame, frame_read.time, frame_read.camera_name, small, color.astype(np.float32) / np.float32(255), depth, pose
     )
 
 

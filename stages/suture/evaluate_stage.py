@@ -18,7 +18,7 @@ from scenewright.stages.suture.parameters import EvaluateParameters
 from scenewright.stages.suture.rig import NeedlePose
 
 ROUNDING = 1e-9
-"""Of a baseline [m]."""
+"""Baselines that differ by less than this are the same [m]."""
 
 
 def run(
@@ -35,13 +35,13 @@ def run(
     from scenewright.stages.suture.evaluation import plots
 
     figures: dict[str, float | None] = {}
-    parts: list[str] = []
+    sections: list[str] = []
     notes: list[str] = []
     (context.output / "plots").mkdir()
     if trials is not None:
         file = trials.info
         figures.update(trial_figures.metrics(file.runs))
-        parts.append(trial_figures.table(file.runs).rstrip())
+        sections.append(trial_figures.table(file.runs).rstrip())
         notes += [
             f"{sight.arm} sees by {sight.model}: ASSUMED figures" for sight in file.perception if not sight.measured
         ]
@@ -53,22 +53,22 @@ def run(
         groups = _groups([record for estimated in poses for record in judge(estimated, truth)])
         if groups:
             figures.update(needle_figures.metrics(groups))
-            parts.append("\n".join(["# The needle's pose", "", *needle_figures.rows("case", groups)]))
+            sections.append("\n".join(["# The needle's pose", "", *needle_figures.rows("case", groups)]))
             notes += [f"needle: masks are {estimated.info.masks_from}" for estimated in poses[:1]]
             with context.progress.step("errors"):
                 plots.pose_errors(context.output / "plots" / "needle.png", groups)
         if thread is not None:
             errors = thread_errors(thread, scene)
             figures.update(thread_metrics(errors))
-            parts.append("\n".join(["# The thread", "", *thread_rows(errors)]))
+            sections.append("\n".join(["# The thread", "", *thread_rows(errors)]))
             notes.append(f"thread: masks are {thread.info.masks_from}")
     label = parameters.label or "simulated and rendered; nothing here is about real tissue"
     MetricsFile(label=label, metrics=dict(sorted(figures.items())), notes=tuple(notes)).write(
         context.output / "metrics.json"
     )
     remarks = [f"{label}.", *(f"{note}." for note in notes)]
-    context.output.joinpath("table.md").write_text("\n\n".join([*parts, *remarks]) + "\n", encoding="utf-8")
-    return SutureEvaluation(root=context.output, summary={"figures": len(figures), "tables": len(parts)})
+    context.output.joinpath("table.md").write_text("\n\n".join([*sections, *remarks]) + "\n", encoding="utf-8")
+    return SutureEvaluation(root=context.output, summary={"figures": len(figures), "tables": len(sections)})
 
 
 def same_rig(rig: StereoRigRecord, other: StereoRigRecord) -> bool:
@@ -111,13 +111,13 @@ def _groups(records: list[Estimate]) -> dict[str, list[Estimate]]:
     """Return the issue's cases that the records fill."""
     frames = [record for record in records if record.case == "frames"]
     fused = [record for record in records if record.case == "filtered"]
-    named = {
+    by_name = {
         "needle_visible": [record for record in frames if record.visible],
         "needle_all": frames,
         "needle_visible_filtered": [record for record in fused if record.visible],
         "needle_all_filtered": fused,
     }
-    return {name: of_case for name, of_case in named.items() if of_case}
+    return {name: of_case for name, of_case in by_name.items() if of_case}
 
 
 def thread_errors(thread: SutureThread, scene: SutureScene) -> list[ThreadError]:

@@ -30,6 +30,7 @@ from scenewright.stages.suture.pairs import SQUARE, Pair
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 LARGEST_PICTURE = 64 * 2**20
+"""Largest file that is read [bytes]; by eye."""
 RIG_HINT = (
     'a rig is {"camera": {"width", "height", "fx", "fy", "cx", "cy"}, "baseline": metres}; docs/STITCH.md shows one'
 )
@@ -39,7 +40,9 @@ AROUND, RIM = NEEDLE_RADIUS / 2, 48
 in another outline of the same masks), and how far a window reaches beyond that [px], so that what lies at its edge is
 judged with what is around it."""
 ARC = np.linspace(0.0, np.pi, 33)
+"""Angles [rad] along the needle at which its window is measured."""
 UNKNOWN = {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5}
+"""What the line of a pair says where no pose is answered."""
 
 
 @dataclass(frozen=True)
@@ -103,15 +106,15 @@ def growing_pairs(folder: Path, *, latest: bool, idle: float, poll: float = 0.02
     while True:
         pairs = {name: pair for name, pair in _pairs_in(folder).items() if name not in done}
         stamps = {name: _stamp(pair) for name, pair in pairs.items()}
-        whole = sorted(name for name in pairs if stamps[name] and (idle == 0.0 or sizes.get(name) == stamps[name]))
+        complete = sorted(name for name in pairs if stamps[name] and (idle == 0.0 or sizes.get(name) == stamps[name]))
         sizes = stamps
-        for name in whole[-1:] if latest else whole[:1]:
-            skipped = len(whole) - 1 if latest else 0
-            done.update(whole if latest else (name,))
+        for name in complete[-1:] if latest else complete[:1]:
+            skipped = len(complete) - 1 if latest else 0
+            done.update(complete if latest else (name,))
             left, right = pairs[name]
             yield PairFiles(name, left, right, skipped)
             last = time.monotonic()
-        if not whole:
+        if not complete:
             if time.monotonic() - last >= idle:
                 return
             time.sleep(poll)
@@ -119,13 +122,13 @@ def growing_pairs(folder: Path, *, latest: bool, idle: float, poll: float = 0.02
 
 def _pairs_in(folder: Path) -> dict[str, tuple[Path, Path]]:
     names = {path.name for path in folder.iterdir()}
-    found = {}
+    pairs = {}
     for name in names:
         for ending in ENDINGS:
             stem = name.removesuffix(f"_left{ending}")
             if stem != name and f"{stem}_right{ending}" in names:
-                found[stem] = (folder / name, folder / f"{stem}_right{ending}")
-    return found
+                pairs[stem] = (folder / name, folder / f"{stem}_right{ending}")
+    return pairs
 
 
 def _stamp(pair: tuple[Path, Path]) -> tuple[int, ...]:
@@ -158,16 +161,16 @@ def _box(pixels: np.ndarray, reach: float, rig: StereoRig) -> Window:
 def masks_within(make: MaskMaker, pair: Pair, windows: tuple[Window, Window]) -> EyeMasks:
     """Return the masks of what these windows show, in masks of the whole pictures."""
     cut = replace(pair, left=pair.left[windows[0]], right=pair.right[windows[1]])
-    made, size = make(cut), pair.left.shape[:2]
+    eye_masks, size = make(cut), pair.left.shape[:2]
 
     def whole(masks: tuple[Any, Any]) -> Any:
-        return tuple(_pasted(mask, window, size) for mask, window in zip(masks, windows, strict=True))
+        return tuple(_paste(mask, window, size) for mask, window in zip(masks, windows, strict=True))
 
-    hidden = made.hidden if made.hidden[0] is None else whole(made.hidden)
-    return EyeMasks(whole(made.needle), whole(made.thread), hidden)
+    hidden = eye_masks.hidden if eye_masks.hidden[0] is None else whole(eye_masks.hidden)
+    return EyeMasks(whole(eye_masks.needle), whole(eye_masks.thread), hidden)
 
 
-def _pasted(mask: np.ndarray, window: Window, size: tuple[int, ...]) -> np.ndarray:
+def _paste(mask: np.ndarray, window: Window, size: tuple[int, ...]) -> np.ndarray:
     picture = np.zeros(size, dtype=bool)
     picture[window] = mask
     return picture
@@ -203,27 +206,27 @@ class Follower:
         `tip_probability`, `abstained`, `whole` (whether all of both pictures was looked at), and what it took. A
         picture that cannot be used is an abstention; with one comes no pose, as a robot may act on these lines."""
         began = time.monotonic()
-        said: dict[str, Any] = {"name": files.name, "frame": self._count, "whole": True}
+        record: dict[str, Any] = {"name": files.name, "frame": self._count, "whole": True}
         try:
             pictures = self._picture(files.left), self._picture(files.right)
             pair = NamedPair(self._count, 0.0, 0, *pictures, name=files.name)
-            said["taken"] = files.left.stat().st_mtime
+            record["taken"] = files.left.stat().st_mtime
             masks = None if self._cuts else self._make(pair)
             answer = self._near(pair, masks)
-            said["whole"] = answer is None
+            record["whole"] = answer is None
             if answer is None:
-                seen = masks or self._make(pair)
-                answer = estimate(seen.observation(self._rig, None), self._seed, self._guess)
+                eye_masks = masks or self._make(pair)
+                answer = estimate(eye_masks.observation(self._rig, None), self._seed, self._guess)
         except BadInput as error:
             self._guess = None
-            said |= UNKNOWN | {"abstained": str(error)}
+            record |= UNKNOWN | {"abstained": str(error)}
         else:
             self._guess = None if answer.abstained else answer.pose
-            said |= as_estimate_record(in_metres(answer, self._radius)).model_dump(mode="json")
+            record |= as_estimate_record(in_metres(answer, self._radius)).model_dump(mode="json")
             if answer.abstained:
-                said |= UNKNOWN
+                record |= UNKNOWN
         self._count += 1
-        return said | {"skipped": files.skipped, "seconds": round(time.monotonic() - began, 4)}
+        return record | {"skipped": files.skipped, "seconds": round(time.monotonic() - began, 4)}
 
     def _near(self, pair: Pair, masks: EyeMasks | None) -> NeedleEstimate | None:
         """Return the needle near where it was, in the pair's masks or those of the windows alone; None where it is not
@@ -240,11 +243,11 @@ class Follower:
             return None
         if np.linalg.norm(answer.pose.centre - self._guess.centre) > AROUND:
             return None
-        found = windows_about(self._rig, answer.pose, 0.0)
+        around_needle = windows_about(self._rig, answer.pose, 0.0)
         inside = all(
             window.start <= side.start and side.stop <= window.stop
-            for eye, other in zip(windows, found, strict=True)
-            for window, side in zip(eye, other, strict=True)
+            for eye, needle_windows in zip(windows, around_needle, strict=True)
+            for window, side in zip(eye, needle_windows, strict=True)
         )
         return answer if inside else None
 
@@ -254,17 +257,17 @@ class Follower:
     def _picture(self, path: Path) -> np.ndarray:
         """Return a picture (H, W, 3); without its pixels (H, W, 0) where masks are not made of it."""
         content = file_content(path, LARGEST_PICTURE, hint="give the pictures of both eyes")
-        picture = _decoded(content) if self._cuts else _size_alone(content)
+        picture = _decode(content) if self._cuts else _size_alone(content)
         size = (self._rig.height, self._rig.width)
         if picture is None or picture.shape[:2] != size:
-            what = "no picture" if picture is None else f"{picture.shape[1]} x {picture.shape[0]} pixels"
+            shape_text = "no picture" if picture is None else f"{picture.shape[1]} x {picture.shape[0]} pixels"
             raise BadInput(
-                f"{path}: {what}, the rig's are {size[1]} x {size[0]}", hint="rectified pictures of that size"
+                f"{path}: {shape_text}, the rig's are {size[1]} x {size[0]}", hint="rectified pictures of that size"
             )
         return picture
 
 
-def _decoded(content: bytes) -> np.ndarray | None:
+def _decode(content: bytes) -> np.ndarray | None:
     picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
     return None if picture is None else picture[..., ::-1]
 

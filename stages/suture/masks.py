@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from scenewright.stages.suture.segmentation.infer import Masks
 
 SEED_OF_MASKS = 5
+"""First number of the seed from which masks are spoiled."""
 BUNDLED = Path(__file__).resolve().parents[2] / "data" / CHECKPOINT
 OTHER_MASKS = "--segmentation spoiled, or --masks FOLDER"
 DRIVER_GROWTH = 5
@@ -135,9 +136,9 @@ def _from_spoiled(sequence: Sequence, masks: Path | None, segmenter: Path | None
 
     def make(pair: Pair) -> EyeMasks:
         left, right, seed = true_eyes(pair)
-        shown = Eye(pair.left, left.bodies, left.depth, left.sees)
-        other = Eye(pair.right, right.bodies, right.depth, right.sees)
-        return spoiled_masks(shown, other, seed)[0]
+        left_eye = Eye(pair.left, left.bodies, left.depth, left.sees)
+        right_eye = Eye(pair.right, right.bodies, right.depth, right.sees)
+        return spoiled_masks(left_eye, right_eye, seed)[0]
 
     return make
 

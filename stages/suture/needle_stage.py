@@ -29,7 +29,7 @@ from scenewright.stages.suture.parameters import NeedleParameters
 from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 RADIUS_FRAMES = 20
-"""From so many frames a radius is fitted."""
+"""Number of first frames from which a radius is fitted; by eye."""
 
 
 def run(
@@ -47,7 +47,7 @@ def run(
         size = (pairs.camera.height, pairs.camera.width)
         make, source, masks_from = open_masks(sequence, masks, segmenter, parameters, size)
         motion = _motion(sequence, parameters, len(pairs))
-        fitted = _fitted_radius(pairs, make, context) if parameters.fit_radius else None
+        fitted = _fit_radius(pairs, make, context) if parameters.fit_radius else None
         maps = _disparity_maps(disparity)
         try:
             looked = Looked(fitted or Radius(parameters.needle_radius, 0.0), motion != "none")
@@ -58,7 +58,7 @@ def run(
         record = pairs.record
     if not frames:
         raise BadInput(f"{sequence.root}: no frame has both eyes", hint="ingest both eyes")
-    fused = _filtered(answers, motion, views, parameters.estimator)
+    fused = _filter_frames(answers, motion, views, parameters.estimator)
     statement = _statement(answers, fused)
     if parameters.fit_radius:
         statement += (
@@ -96,12 +96,12 @@ class Looked:
     follows: bool
 
 
-def _fitted_radius(pairs: StereoPairs, make: MaskMaker, context: Context) -> Radius | None:
+def _fit_radius(pairs: StereoPairs, make: MaskMaker, context: Context) -> Radius | None:
     """Return the radius that the first frames say together; None where none of them says any."""
     first = islice(pairs, RADIUS_FRAMES)
-    seen = context.progress.track(first, total=min(RADIUS_FRAMES, len(pairs)), description="radius")
-    said = (fitted_radius(make(pair).observation(pairs.rig, None), context.seed) for pair in seen)
-    radii = [radius for radius in said if radius is not None]
+    tracked = context.progress.track(first, total=min(RADIUS_FRAMES, len(pairs)), description="radius")
+    fitted = (fitted_radius(make(pair).observation(pairs.rig, None), context.seed) for pair in tracked)
+    radii = [radius for radius in fitted if radius is not None]
     return together(radii) if radii else None
 
 
@@ -170,20 +170,22 @@ def _estimates(
     for pair in context.progress.track(pairs, total=len(pairs), description="needles"):
         disparity = None if maps is None else maps.of(pair)
         matched += disparity is not None
-        seen = make(pair)
-        observation = seen.observation(rig, disparity)
+        eye_masks = make(pair)
+        observation = eye_masks.observation(rig, disparity)
         answer = of_view(observation, context.seed, guess if looked.follows else None)
         guess = answer.pose if not answer.abstained else None
-        told = in_metres(answer, radius)
+        estimate_in_metres = in_metres(answer, radius)
         if looked.radius.deviation > 0.0:
-            told = with_radius_unknown(told, answer, observation, looked.radius)
-        answers.append(told)
-        pixels = (int(seen.needle[0].sum()), int(seen.needle[1].sum()))
+            estimate_in_metres = with_radius_unknown(estimate_in_metres, answer, observation, looked.radius)
+        answers.append(estimate_in_metres)
+        pixels = (int(eye_masks.needle[0].sum()), int(eye_masks.needle[1].sum()))
         frames.append(
-            NeedleFrame(frame=pair.index, time=pair.time, estimate=as_estimate_record(told), mask_pixels=pixels)
+            NeedleFrame(
+                frame=pair.index, time=pair.time, estimate=as_estimate_record(estimate_in_metres), mask_pixels=pixels
+            )
         )
         if len(frames) <= parameters.pictures:
-            _draw(context.output / "pictures", pair, seen, rig, answer, views)
+            _draw(context.output / "pictures", pair, eye_masks, rig, answer, views)
     if maps is not None and frames and not matched:
         raise BadInput("the disparity has none of the sequence's frames", hint="make the disparity of this sequence")
     return frames, answers
@@ -200,7 +202,7 @@ def _draw(
         raise OSError(f"{path} could not be written")
 
 
-def _filtered(
+def _filter_frames(
     answers: list[NeedleEstimate], motion: str, views: tuple[SutureView, ...], estimator: str
 ) -> NeedleEstimate | None:
     """Return one estimate in the last frame from all frames, None where they are not filtered."""

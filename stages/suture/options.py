@@ -8,7 +8,7 @@ from pydantic import Field
 from scenewright.stages.kit.stage import Parameters
 
 CHECKPOINT = "stitch/segmentation.safetensors"
-"""Of the segmenter that is shipped, below data/."""
+"""File of the segmenter that is shipped, below data/."""
 ArmName = Literal["sensing_only", "thread_handling", "thesis", "thesis_supervised", "ours", "ours_supervised"]
 HolderName = Literal["any", "air", "left", "right", "both", "tissue"]
 PlaceName = Literal["any", "wound", "left", "right", "high", "corner"]

@@ -86,8 +86,8 @@ class EvaluateParameters(Parameters):
 
 def check_masks(parameters: MaskOptions, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for masks that are asked for and not given."""
-    wanted = {"files": "masks", "network": "segmenter"}.get(parameters.segmentation)
-    if wanted == "masks" and inputs.get("masks") is None:
+    needed_input = {"files": "masks", "network": "segmenter"}.get(parameters.segmentation)
+    if needed_input == "masks" and inputs.get("masks") is None:
         raise UsageError("--segmentation files needs --masks", hint="a folder of <frame:06d>_left.png and _right.png")
     for source, role in (("files", "masks"), ("network", "segmenter")):
         if inputs.get(role) is not None and parameters.segmentation not in ("auto", source):
@@ -125,10 +125,12 @@ def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) ->
     """Raise UsageError unless there is something to evaluate, and a truth for what needs one."""
     if not set(inputs) & {"trials", "needle", "needle_thesis", "thread"}:
         raise UsageError("suture evaluate: nothing to evaluate", hint="give --trials, or --needle with --scene")
-    seen = sorted(set(inputs) & {"needle", "needle_thesis", "thread"})
-    if seen and "scene" not in inputs:
-        raise UsageError(f"--{seen[0].replace('_', '-')} is judged by a scene's truth", hint="give --scene too")
-    if not seen and "scene" in inputs:
+    judged_inputs = sorted(set(inputs) & {"needle", "needle_thesis", "thread"})
+    if judged_inputs and "scene" not in inputs:
+        raise UsageError(
+            f"--{judged_inputs[0].replace('_', '-')} is judged by a scene's truth", hint="give --scene too"
+        )
+    if not judged_inputs and "scene" in inputs:
         raise UsageError("--scene is the truth of --needle or --thread", hint="give one of them, or leave it out")
 
 

@@ -24,6 +24,7 @@ from scenewright.stages.suture.world.scene import NeedleScene, moved_scene, rand
 
 RIGS: dict[str, StereoRig] = {"two_cameras": TWO_CAMERAS, "endoscope": ENDOSCOPE}
 SEED_OF_MOTION = 6
+"""First number of the seed from which motions of the needle are drawn."""
 RATE = 10.0
 """Frames a second."""
 CAMERA_NAME = "camera"
@@ -78,12 +79,12 @@ def camera_of(rig: StereoRig) -> Camera:
 def _frames(parameters: SceneParameters, rig: StereoRig, seed: int) -> Iterator[tuple[NeedleScene, np.ndarray | None]]:
     """Yield every frame's scene, and how the needle moved since the frame before as kinematics report it."""
     holder = None if parameters.holder == "any" else parameters.holder
-    place = None if parameters.place == "any" else parameters.place
+    needle_place = None if parameters.place == "any" else parameters.place
     if parameters.arrangement == "views":
         for index in range(parameters.frames):
-            yield seen_scene(seed + index, rig, holder, place, parameters.calibration_error)[0], None
+            yield seen_scene(seed + index, rig, holder, needle_place, parameters.calibration_error)[0], None
         return
-    first, _ = seen_scene(seed, rig, holder, place, parameters.calibration_error)
+    first, _ = seen_scene(seed, rig, holder, needle_place, parameters.calibration_error)
     random = np.random.default_rng([SEED_OF_MOTION, seed])
     motions = random_motions(first, parameters.frames)
     for index, motion in enumerate(motions):

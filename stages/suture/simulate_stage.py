@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from scenewright.stages.suture.trials.sight import LookingEyes
 
 PANELS_SHOWN = 18
+"""Most pictures of the strip; by eye."""
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
 
 
@@ -35,9 +36,9 @@ def run(perception: Path | None, *, parameters: SimulateParameters, context: Con
     recorded = (context.seed, parameters.record or parameters.arms[0])
     pairs = [(seed, arm) for seed in range(context.seed, context.seed + parameters.trials) for arm in parameters.arms]
     for seed, arm in context.progress.track(pairs, total=len(pairs), description="trials"):
-        kept = recorder if (seed, arm) == recorded else None
+        recorder_of_trial = recorder if (seed, arm) == recorded else None
         eyes = _eyes(models[arm], seed, parameters.sight)
-        runs.append(run_of(arm, seed, run_trial(POLICIES[arm], seed, world, models[arm], kept, eyes)))
+        runs.append(run_of(arm, seed, run_trial(POLICIES[arm], seed, world, models[arm], recorder_of_trial, eyes)))
     statement = _statement(runs)
     SutureTrialFile(
         statement=statement,

@@ -22,7 +22,7 @@ from scenewright.stages.suture.parameters import ThreadParameters
 from scenewright.stages.suture.rig import StereoRig
 
 WIDTH = 720
-"""Of each eye's picture [px]."""
+"""Width of each eye's picture [px]."""
 
 
 def run(
@@ -48,12 +48,12 @@ def run(
             sequence, masks, segmenter, parameters, (pairs.camera.height, pairs.camera.width)
         )
         for pair in context.progress.track(pairs, total=len(pairs), description="threads"):
-            seen = make(pair)
+            eye_masks = make(pair)
             start = starts.get(pair.index)
-            curve = reconstruct(*seen.thread, pairs.rig, start=start)
+            curve = reconstruct(*eye_masks.thread, pairs.rig, start=start)
             remarks = tuple(str(remark) for remark in curve.remarks)
             if start is not None and not len(curve.points):
-                curve = reconstruct(*seen.thread, pairs.rig, start=None)
+                curve = reconstruct(*eye_masks.thread, pairs.rig, start=None)
                 remarks = (*remarks, *(str(remark) for remark in curve.remarks))
             points = np.asarray(curve.points, dtype=float).reshape(-1, 3)
             if len(points):
@@ -69,11 +69,11 @@ def run(
                     length=float(curve.length_m) if len(points) else 0.0,
                     status=str(curve.status),
                     remarks=remarks,
-                    mask_pixels=(int(seen.thread[0].sum()), int(seen.thread[1].sum())),
+                    mask_pixels=(int(eye_masks.thread[0].sum()), int(eye_masks.thread[1].sum())),
                 )
             )
             if len(frames) <= parameters.pictures:
-                _draw(context.output / "pictures", pair, seen, pairs.rig, points, frames[-1])
+                _draw(context.output / "pictures", pair, eye_masks, pairs.rig, points, frames[-1])
         record = pairs.record
     if not frames:
         raise BadInput(f"{sequence.root}: no frame has both eyes", hint="ingest both eyes")
@@ -137,8 +137,8 @@ def _draw(folder: Path, pair: Pair, seen: EyeMasks, rig: StereoRig, points: np.n
             cv2.polylines(panel, [line], False, WHITE, 2, cv2.LINE_AA)
         scale = WIDTH / panel.shape[1]
         panels.append(cv2.resize(panel, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))
-    shown = np.hstack(panels)
-    foot = np.full((40, shown.shape[1], 3), 25, np.uint8)
+    row = np.hstack(panels)
+    foot = np.full((40, row.shape[1], 3), 25, np.uint8)
     text = " ".join([f"{1000 * frame.length:.0f} mm; {frame.status}." if frame.points else "", *frame.remarks]).strip()
     cv2.putText(
         foot,
@@ -151,5 +151,5 @@ def _draw(folder: Path, pair: Pair, seen: EyeMasks, rig: StereoRig, points: np.n
         cv2.LINE_AA,
     )
     path = folder / f"{frame.frame:06d}.png"
-    if not cv2.imwrite(str(path), np.vstack([shown, foot])[..., ::-1]):
+    if not cv2.imwrite(str(path), np.vstack([row, foot])[..., ::-1]):
         raise OSError(f"{path} could not be written")

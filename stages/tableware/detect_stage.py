@@ -33,21 +33,23 @@ def run(
 ) -> TablewareDetections:
     """Detect tableware in the user's image, or in that of a scene's folder."""
     with context.progress.step("read"):
-        read = read_image(image, depth, camera, parameters.depth_scale)
-        told = read.dishes if dishes is None else read_dishes(dishes)
-    setting = setting_of(told)
+        image_read = read_image(image, depth, camera, parameters.depth_scale)
+        dish_sizes = image_read.dishes if dishes is None else read_dishes(dishes)
+    setting = setting_of(dish_sizes)
     if parameters.photograph:
-        return _photograph(read, setting.sizes, parameters, context)
-    sizes = _sizes(parameters, read.scene, dishes, told)
+        return _photograph(image_read, setting.sizes, parameters, context)
+    sizes = _sizes(parameters, image_read.scene, dishes, dish_sizes)
     with context.progress.step("see"):
-        view, sides = _view(read, parameters)
-        sight = see(read.color, read.depth, view, sides, sizes=sizes, dishes=setting.sizes, seed=context.seed)
+        view, sides = _view(image_read, parameters)
+        sight = see(
+            image_read.color, image_read.depth, view, sides, sizes=sizes, dishes=setting.sizes, seed=context.seed
+        )
     for note in sight.notes:
         context.logger.warning("%s", note)
-    payload = to_file(sight, sizes, told)
+    payload = to_file(sight, sizes, dish_sizes)
     payload.write(context.output / "detections.json")
     with context.progress.step("pictures"):
-        _save(context.output / "overlay.png", draw_sight(read.color, sight))
+        _save(context.output / "overlay.png", draw_sight(image_read.color, sight))
         if sight.rectified:
             _save(context.output / "above.png", sight.heights.color)
     kinds = [detection.kind for detection in sight.detections]

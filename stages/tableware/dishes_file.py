@@ -34,8 +34,8 @@ def setting_of(dishes: TablewareDishes | None) -> Setting:
         return Setting()
     gripper = Gripper()
     if dishes.gripper is not None:
-        given = dishes.gripper
-        gripper = Gripper(given.opening, given.jaw_height, given.finger_width / 2)
+        gripper_file = dishes.gripper
+        gripper = Gripper(gripper_file.opening, gripper_file.jaw_height, gripper_file.finger_width / 2)
     if not dishes.has_sizes:
         return Setting(gripper=gripper)
     round_things = {kind: getattr(dishes, kind) for kind in DISHES}
@@ -44,8 +44,8 @@ def setting_of(dishes: TablewareDishes | None) -> Setting:
         fork=_utensil(dishes.fork),
         spoon=_utensil(dishes.spoon),
     )
-    known = all(d is None or (d.foot_radius is not None and d.wall is not None) for d in round_things.values())
-    return Setting(sizes, gripper, stacking=known)
+    stackable = all(d is None or (d.foot_radius is not None and d.wall is not None) for d in round_things.values())
+    return Setting(sizes, gripper, stacking=stackable)
 
 
 def estimated_setting(items: tuple[Detection, ...], gripper: Gripper) -> Setting:
@@ -54,10 +54,13 @@ def estimated_setting(items: tuple[Detection, ...], gripper: Gripper) -> Setting
     sizes: dict[str, Measures | None] = dict.fromkeys(("cup", "bowl", "plate", "fork", "spoon"))
     alike = set()
     for kind in DISHES:
-        seen = [item.size for item in items if item.kind == kind and item.size is not None]
-        if not seen:
+        sizes_of_kind = [item.size for item in items if item.kind == kind and item.size is not None]
+        if not sizes_of_kind:
             continue
-        rims, heights = np.array([size.rim_radius for size in seen]), np.array([size.height for size in seen])
+        rims, heights = (
+            np.array([size.rim_radius for size in sizes_of_kind]),
+            np.array([size.height for size in sizes_of_kind]),
+        )
         sizes[kind] = dish_measures(float(np.median(heights)), float(np.median(rims)))
         if max(float(np.ptp(rims)), float(np.ptp(heights))) <= ALIKE:
             alike.add(LETTERS[kind])
@@ -69,18 +72,18 @@ def file_of(setting: Setting) -> TablewareDishes | None:
     if setting == Setting():
         return None
     grip = setting.gripper
-    told: dict[str, object] = {
+    fields: dict[str, object] = {
         "gripper": {"opening": grip.opening, "jaw_height": grip.jaw_height, "finger_width": 2 * grip.finger}
     }
     for kind in setting.sizes.dishes if setting.sizes != STANDARD else ():
         size = setting.sizes[kind]
-        told[kind] = {"height": size.height, "rim_radius": size.rim_radius}
+        fields[kind] = {"height": size.height, "rim_radius": size.rim_radius}
         if setting.stacking:
-            told[kind] |= {"foot_radius": size.foot_radius, "wall": size.wall}  # type: ignore[operator]
+            fields[kind] |= {"foot_radius": size.foot_radius, "wall": size.wall}  # type: ignore[operator]
     for kind in setting.sizes.utensils if setting.sizes != STANDARD else ():
         size = setting.sizes[kind]
-        told[kind] = {"length": size.length, "width": size.width, "thickness": size.height}
-    return TablewareDishes.model_validate(told)
+        fields[kind] = {"length": size.length, "width": size.width, "thickness": size.height}
+    return TablewareDishes.model_validate(fields)
 
 
 def _dish(size: DishSize | None) -> Measures | None:

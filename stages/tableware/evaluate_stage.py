@@ -23,6 +23,7 @@ from scenewright.stages.tableware.world.scenes import make_table
 BASELINE = "random"
 """The policy against which ratios are taken."""
 SAME = 1e-6
+"""Difference of time below which two policies are alike [s]."""
 
 
 @dataclass(frozen=True)

@@ -51,14 +51,14 @@ def run(
     """Plan from what was detected, from a scene's image, or from its ground truth."""
     model, chances = time_model(parameters), chances_of(parameters.chances)
     with context.progress.step("see"):
-        seen = _accepted(detections, scene, parameters, context)
-    accepted, notes, setting = seen.accepted, seen.notes, seen.setting
+        table_seen = _understand_table(detections, scene, parameters, context)
+    accepted, notes, setting = table_seen.accepted, table_seen.notes, table_seen.setting
     table = accepted.table
     with context.progress.step("plan"):
         done: list[Done] = []
         policy = make_policy(parameters.policy, model, chances, context.seed, setting)
         nominal = run_in(FastWorld(table, model, EXACT, context.seed, setting), policy, hear=done.append)
-        expected = _expected(table, setting, model, chances, parameters, context.seed)
+        expected = _expect(table, setting, model, chances, parameters, context.seed)
     file = TablewarePlanFile(
         policy=parameters.policy,
         source="detections" if detections is not None else parameters.source,
@@ -66,7 +66,7 @@ def run(
         chances=parameters.chances,
         items=as_records(table),
         dishes=file_of(setting),
-        sizes=seen.sizes,
+        sizes=table_seen.sizes,
         steps=tuple(
             TablewareStep(action=as_record(step.action, step.before, model, chances), before=as_records(step.before))
             for step in done
@@ -112,23 +112,23 @@ class Understood:
     sizes: Sizes = "known"
 
 
-def _accepted(
+def _understand_table(
     detections: TablewareDetections | None, scene: TablewareScene | None, parameters: PlanParameters, context: Context
 ) -> Understood:
     """Return what is planned for. Raises BadInput for what cannot be planned from."""
     least = parameters.least_confidence
     if detections is not None:
         payload = detections.info
-        setting, notes, found = setting_of(payload.dishes), payload.notes, from_file(payload)
+        setting, notes, detected = setting_of(payload.dishes), payload.notes, from_file(payload)
         if payload.sizes == "estimated":
-            setting = estimated_setting(found, setting.gripper)
+            setting = estimated_setting(detected, setting.gripper)
             notes = (*notes, ESTIMATED)
         elif setting != Setting():
             notes = (*notes, OTHER_SETTING)
-        seen_so = setting_seen(found, setting)
+        seen_so = setting_seen(detected, setting)
         if seen_so != setting:
             notes = (*notes, FROM_THE_SIDE)
-        return Understood(understood(found, least, seen_so), notes, seen_so, payload.sizes)
+        return Understood(understood(detected, least, seen_so), notes, seen_so, payload.sizes)
     if scene is None:
         raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
     setting = setting_of(scene.info.dishes)
@@ -137,11 +137,11 @@ def _accepted(
         table = as_table(scene.info.items, setting.sizes)
         return Understood(accept(table, {}, (), least, Rules(setting)), notes, setting)
     color, depth, view = read_image(scene)
-    seen = look(color, depth, view, least, setting)
-    picture = Image.fromarray(draw_sight(color, seen.sight))
+    sighting = look(color, depth, view, least, setting)
+    picture = Image.fromarray(draw_sight(color, sighting.sight))
     picture.thumbnail((parameters.image_width, parameters.image_width))
     picture.save(context.output / "detections.png")
-    return Understood(seen.accepted, (*seen.sight.notes, *notes), setting)
+    return Understood(sighting.accepted, (*sighting.sight.notes, *notes), setting)
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class Expected:
     risk: float
 
 
-def _expected(
+def _expect(
     table: Table, setting: Setting, model: TimeModel, chances: Chances, parameters: PlanParameters, seed: int
 ) -> Expected:
     """Return what a policy comes to on the table as it was seen."""

@@ -19,8 +19,8 @@ from scenewright.stages.tableware.world.shape_files import write_shapes
 
 def run(dishes: Path | None, *, parameters: SceneParameters, context: Context) -> TablewareScene:
     """Make the table of a tier and a seed, and its image."""
-    told = None if dishes is None else read_dishes(dishes)
-    sizes = setting_of(told).sizes
+    dish_sizes = None if dishes is None else read_dishes(dishes)
+    sizes = setting_of(dish_sizes).sizes
     table, view = make_table(parameters.tier, context.seed, sizes), overhead_camera()
     with context.progress.step("image"):
         color, depth = render_overhead(table, context.seed, parameters.light, parameters.colors, view=view)
@@ -35,7 +35,7 @@ def run(dishes: Path | None, *, parameters: SceneParameters, context: Context) -
         camera=view.camera,
         world_from_camera=as_transform(view.world_from_camera),
         items=as_records(table),
-        dishes=told,
+        dishes=dish_sizes,
     ).write(context.output / "scene.json")
     summary = {"tier": parameters.tier, "items": len(table.items), "piles": len(table.stacks)}
     return TablewareScene(root=context.output, summary=summary)

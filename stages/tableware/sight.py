@@ -96,24 +96,24 @@ def named_as(seen: Table, truth: Table, reach: float = SAME_PLACE) -> Table:
     """Return a table whose items have the names of those of another that they are: of the same kind (forks and spoons
     are one), nearest first, no farther than `reach` [m]. The others are called `stray_1` and so on."""
     pairs = sorted(
-        (hypot(*(a - b for a, b in zip(item.position, other.position, strict=True))), item.name, other.name)
+        (hypot(*(a - b for a, b in zip(item.position, true_item.position, strict=True))), item.name, true_item.name)
         for item in seen.items
-        for other in truth.items
-        if item.kind == other.kind or not (item.is_dish or other.is_dish)
+        for true_item in truth.items
+        if item.kind == true_item.kind or not (item.is_dish or true_item.is_dish)
     )
     names: dict[str, str] = {}
-    taken: set[str] = set()
+    used_names: set[str] = set()
     for apart, name, true_name in pairs:
-        if apart <= reach and name not in names and true_name not in taken:
+        if apart <= reach and name not in names and true_name not in used_names:
             names[name] = true_name
-            taken.add(true_name)
+            used_names.add(true_name)
     for item in seen.items:  # what lies on something is met there, wherever exactly it was seen
         if item.name in names:
             continue
         for on_it in truth.carried.get(names.get(item.on or "", ""), ()):
-            if on_it.name not in taken and (item.kind == on_it.kind or not (item.is_dish or on_it.is_dish)):
+            if on_it.name not in used_names and (item.kind == on_it.kind or not (item.is_dish or on_it.is_dish)):
                 names[item.name] = on_it.name
-                taken.add(on_it.name)
+                used_names.add(on_it.name)
                 break
     strays = (item.name for item in seen.items if item.name not in names)
     names |= {name: f"stray_{number}" for number, name in enumerate(strays, start=1)}

@@ -80,12 +80,12 @@ def planned_actions(plan: TablewarePlan, table: Table, sizes: DishSizes = STANDA
     """Return the actions of a plan with the tables on which they were decided, named as the things that stand there in
     truth. Raises BadInput when the plan is about another table."""
     file = plan.info
-    seen = as_table(file.items, sizes)
-    renamed = named_as(seen, table)
-    names = {item.name: true_item.name for item, true_item in zip(seen.items, renamed.items, strict=True)}
-    if seen.items and all(name.startswith("stray_") for name in names.values()):
+    planned_table = as_table(file.items, sizes)
+    renamed = named_as(planned_table, table)
+    names = {item.name: true_item.name for item, true_item in zip(planned_table.items, renamed.items, strict=True)}
+    if planned_table.items and all(name.startswith("stray_") for name in names.values()):
         raise BadInput(
-            f"{plan.root}: none of its {len(seen.items)} items stands where one of the scene stands",
+            f"{plan.root}: none of its {len(planned_table.items)} items stands where one of the scene stands",
             hint="plan this scene, not another",
         )
     actions = []
@@ -108,8 +108,8 @@ def planned_actions(plan: TablewarePlan, table: Table, sizes: DishSizes = STANDA
 
 def carry_out(world: World, planned: Iterable[tuple[Action, Table]], done: list[Done]) -> Trial:
     """Carry out actions as they stand, whatever comes of them."""
-    for action, seen in planned:
-        done.append(do_in(world, action, seen))
+    for action, seen_table in planned:
+        done.append(do_in(world, action, seen_table))
     return world.trial
 
 

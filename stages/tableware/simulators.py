@@ -23,8 +23,9 @@ from scenewright.stages.tableware.world.items import Table
 from scenewright.stages.tableware.world.setting import Gripper, Setting
 
 ANIMATION_WIDTH = 560
+"""Largest width of an animation [px]; by eye."""
 SIMULATION = "scenewright.stages.tableware.simulation"
-"""Its modules of physics are loaded only when they are asked for."""
+"""Package whose modules of physics are loaded only when they are asked for."""
 Again = Callable[[Table, Done, int], Action]
 """Decides in the policy's place after actions that changed nothing (trial.run_in)."""
 
@@ -85,9 +86,13 @@ class PhysicsSimulator:
     recorded_chances: str = "contact"
 
     def __init__(self, parameters: SimulateParameters) -> None:
-        given = {"trip": parameters.trip_seconds, "stack": parameters.stack_seconds, "pull": parameters.pull_seconds}
+        given_seconds = {
+            "trip": parameters.trip_seconds,
+            "stack": parameters.stack_seconds,
+            "pull": parameters.pull_seconds,
+        }
         arm = arm_times(parameters.delay)
-        self.times = replace(arm, **{name: value for name, value in given.items() if value is not None})
+        self.times = replace(arm, **{name: value for name, value in given_seconds.items() if value is not None})
         self.chances = replace(chances_of(parameters.chances), spills=True)
         self.again: Again | None = physics_part("physics_trial").alone
         self._recording = physics_part("recording").Recording()

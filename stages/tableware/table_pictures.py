@@ -18,8 +18,9 @@ from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Kind, Ta
 from scenewright.stages.tableware.world.setting import Gripper
 
 SUPERSAMPLING = 2
+"""Sub-pixels of a pixel along each side."""
 MARGIN = 0.03
-"""Around the table [m]."""
+"""Room around the table in a picture [m]."""
 COLORS: dict[Kind, str] = {
     "bowl": "#5b8fc9",
     "cup": "#e0904a",
@@ -166,7 +167,7 @@ def _font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 def captioned(image: Image.Image, caption: str) -> Image.Image:
     """Return a picture with lines of text below it."""
     size = max(11, round(image.width * 0.042))
-    lines = _wrapped(caption, image.width - 8, size)
+    lines = _wrap_lines(caption, image.width - 8, size)
     sheet = Image.new("RGB", (image.width, image.height + round(1.3 * size) * max(2, len(lines)) + 6), "#ffffff")
     sheet.paste(image, (0, 0))
     draw = ImageDraw.Draw(sheet)
@@ -175,7 +176,7 @@ def captioned(image: Image.Image, caption: str) -> Image.Image:
     return sheet
 
 
-def _wrapped(text: str, width: int, size: int) -> list[str]:
+def _wrap_lines(text: str, width: int, size: int) -> list[str]:
     font = _font(size)
     lines = [""]
     for word in text.split():
@@ -224,11 +225,11 @@ def write_animation(path: Path, steps: Sequence[tuple[Action, Table, Table, str]
         frames, times = [draw_table(Table(()), width, None, "nothing to clear")], [700]
     times[-1] = 1500
     tallest = max(frame.height for frame in frames)
-    even = [_padded(frame, tallest).quantize(96) for frame in frames]
+    even = [_pad_below(frame, tallest).quantize(96) for frame in frames]
     even[0].save(path, save_all=True, append_images=even[1:], duration=times, loop=0, optimize=False)
 
 
-def _padded(image: Image.Image, height: int) -> Image.Image:
+def _pad_below(image: Image.Image, height: int) -> Image.Image:
     sheet = Image.new("RGB", (image.width, height), "#ffffff")
     sheet.paste(image, (0, 0))
     return sheet

@@ -23,10 +23,11 @@ LOOK_SECONDS, SPEED = 10.0, 0.5
 FALLS = 0.8
 """What falls off furniture lies this near to it [m]."""
 ROLLS = 0.4
-"""Of the distance from where it was lost at which it is e times less likely [m]."""
+"""Distance from where a thing was lost at which it is e times less likely [m]; by eye."""
 FLOOR_FROM, FLOOR_TO, FLOOR_ASIDE = 0.8, 1.9, 1.0
 """Distances from the base [m], and bearings off the middle [rad], of floor that three wrist poses show well."""
 HEADINGS = 8
+"""Headings at each place that are compared; by eye."""
 Question = tuple[tuple[float, float], frozenset[int], int]
 """Where something is [m], quarter turns from which it was looked at, regions by which what it is taken for is ahead."""
 
@@ -47,8 +48,10 @@ def vote_information(ahead: int, wrong: float = WRONG) -> float:
 
 def worth(base: Base, way: float, questions: Sequence[Question]) -> float:
     """Return what a look from a base pose is expected to tell, over its time [bit/s]; `way` [m]: to there."""
-    told = sum(vote_information(ahead) for at, seen, ahead in questions if quarter(base, at) not in seen)
-    return told / (LOOK_SECONDS + way / SPEED)
+    information = sum(
+        vote_information(ahead) for at, sides_seen, ahead in questions if quarter(base, at) not in sides_seen
+    )
+    return information / (LOOK_SECONDS + way / SPEED)
 
 
 def fallen_where(
@@ -70,14 +73,14 @@ def floor_seen(obstacles: ObstacleMap, base: Base, cells: np.ndarray) -> np.ndar
     offset = cells - (base.x, base.y)
     away = np.hypot(*offset.T)
     aside = np.abs((np.arctan2(offset[:, 1], offset[:, 0]) - base.yaw + np.pi) % (2 * np.pi) - np.pi)
-    seen = (away >= FLOOR_FROM) & (away <= FLOOR_TO) & (aside <= FLOOR_ASIDE)
+    in_view = (away >= FLOOR_FROM) & (away <= FLOOR_TO) & (aside <= FLOOR_ASIDE)
     window, origin = obstacles.window, np.array(obstacles.origin)
     steps = np.linspace(0.0, 1.0, round(FLOOR_TO / CELL) + 1)
     points = (base.x, base.y) + offset[:, None] * steps[None, :, None]
     rows = np.clip(np.rint((points - origin) / CELL).astype(int), 0, np.array(window.shape) - 1)
     on_the_way = away[:, None] * (1 - steps) > 1.5 * CELL
     blocked = ((window[rows[..., 0], rows[..., 1]] == OCCUPIED) & on_the_way).any(axis=1)
-    return np.asarray(seen & ~blocked)
+    return np.asarray(in_view & ~blocked)
 
 
 def best_floor_view(
@@ -92,13 +95,13 @@ def best_floor_view(
     places = [(0.0, here.x, here.y)] + [
         (float(field[i, j]), float(x), float(y)) for (i, j), (x, y) in zip(rows, rows * CELL + origin, strict=True)
     ]
-    near = [p for p in places if len(cells) and np.hypot(*(cells - p[1:]).T).min() < FLOOR_TO]
+    viewpoints = [p for p in places if len(cells) and np.hypot(*(cells - p[1:]).T).min() < FLOOR_TO]
     best: tuple[float, Base, float] | None = None
-    for way, x, y in near:
+    for distance, x, y in viewpoints:
         for k in range(HEADINGS):
             base = Base(x, y, 2 * np.pi * k / HEADINGS - np.pi)
             shows = float(likely[floor_seen(obstacles, base, cells)].sum())
-            value = shows / (LOOK_SECONDS + way / SPEED)
+            value = shows / (LOOK_SECONDS + distance / SPEED)
             if shows > 0 and (best is None or value > best[0]):
                 best = value, base, shows
     return None if best is None else best[1:]

@@ -29,12 +29,13 @@ SURE_OF_USE = 2
 SEEN_FROM = 2
 """Regions of views from which every corner of furniture is looked at before what is not seen there counts as absent."""
 MOST_VIEWS = 6
+"""Most regions of views that one look at furniture takes; by eye."""
 TRIES = 6
 """Executions within one call."""
 BESIDE = 0.4
 """How far around its spot something is looked for that is not on it [m]."""
 AWAY = 0.1
-"""Of what was placed from its spot, at most [m]."""
+"""Farthest that what was placed may lie from its spot [m]; by eye."""
 OFF_SPOT = 0.05
 """Spots this near to one that something rolled off are not tried again [m]."""
 SAME_POSE = 0.15
@@ -44,16 +45,17 @@ SAME_ON_SIDE, SAME_BEFORE_OPEN = 0.3, 0.1
 SAME_TARGET = 0.1
 """A base pose that failed for one position fails for those this near [m]."""
 HAND_VIEWS = 3
+"""Looks at the hand from which what it holds is told; by eye."""
 FLOOR_VIEWS, FLOOR_AT = 4, 1.2
 """Looks at the floor for what fell, and how far before the base they are at [m]."""
 LITTLE = 0.1
 """No look is taken that shows less of where it may lie."""
 PULLS = 3
-"""At one door within one call: where it does not move from there, the rest is not the base pose."""
+"""Most pulls at one door within one call: where it does not move from there, the rest is not the base pose. By eye."""
 DEEPER = (0.0, 0.07, 0.14)
-"""Before what is open a base with a short arm stands so much farther away [m], too, and at more places."""
+"""Extra distances at which a base with a short arm stands before what is open [m], too, and at more places; by eye."""
 ON_FLOOR = 0.2
-"""Lower things lie on the floor [m]."""
+"""Height below which things lie on the floor [m]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -117,8 +119,8 @@ class OwnSkills(CommonSkills):
         """Look from here; where that was done already, from another side, then at each thing that is not sure yet from
         near by. What was seen before stays."""
         looked = self._sides(place)
-        again = self._use.other_sides and quarter(self._body.base, self.scene.furniture[place].centre) in looked
-        if again and not self._go_round(place, looked):
+        looked_before = self._use.other_sides and quarter(self._body.base, self.scene.furniture[place].centre) in looked
+        if looked_before and not self._go_round(place, looked):
             for item in [i for i in self.scene.items.values() if i.place == place]:
                 self._look(place, item)
         self._look(place)
@@ -126,7 +128,7 @@ class OwnSkills(CommonSkills):
             self._see_all_of(place)
         if self._use.agreement:
             for item in [i for i in self.scene.items.values() if i.place == place]:
-                if again or len(set(item.votes.values())) > 1:
+                if looked_before or len(set(item.votes.values())) > 1:
                     self._confirm(item)
         if self._use.repair:
             self._look_on_floor(place)
@@ -140,8 +142,8 @@ class OwnSkills(CommonSkills):
     def picture_of(self, target: SceneObject) -> Observation:
         """What is there by all views so far and one from where there was none yet."""
         if target.key in self.scene.furniture:
-            found = self.explore_local(target.key)
-            return Observation(target.key, tuple(o.label for o in found))
+            object_map = self.explore_local(target.key)
+            return Observation(target.key, tuple(o.label for o in object_map))
         item = self.scene.items[target.key]
         for _ in range(MOST_VIEWS):
             if (quarter(self._body.base, item.position), True) in item.votes and self._use.other_sides:
@@ -161,13 +163,13 @@ class OwnSkills(CommonSkills):
         look = self._body.look(at, close=close)
         if not close:
             self._stood.setdefault(place, []).append(base)
-        seen = {
-            found.key
-            for found in self.scene.enter(look.detections, place, lambda d: (quarter(base, d.position), close))
+        keys_seen = {
+            entered.key
+            for entered in self.scene.enter(look.detections, place, lambda d: (quarter(base, d.position), close))
         }
         should = [item] if item is not None else [i for i in self.scene.items.values() if i.place == place]
         for each in should if look.in_view else ():
-            if each.key not in seen:
+            if each.key not in keys_seen:
                 each.votes[quarter(base, each.position), close] = None
                 if len(each.sides(seen=False)) > len(each.sides(seen=True)):
                     self.scene.items.pop(each.key, None)
@@ -188,19 +190,19 @@ class OwnSkills(CommonSkills):
         for _ in range(MOST_VIEWS):
             if item.margin >= self._body.enough or item.key not in self.scene.items:
                 return
-            near = self._near_by(item)
-            if near is not None and self._there(near, item.place):
+            viewpoint = self._near_by(item)
+            if viewpoint is not None and self._there(viewpoint, item.place):
                 self._look(item.place, item)
                 continue
-            seen = {side for side, _ in item.votes if isinstance(side, int)}
-            if not self._use.other_sides or not self._go_round(item.place, seen):
+            sides_seen = {side for side, _ in item.votes if isinstance(side, int)}
+            if not self._use.other_sides or not self._go_round(item.place, sides_seen):
                 return
             self._look(item.place)
 
     def _near_by(self, item: Item) -> Base | None:
         """Return the nearest base pose from which the arm gets to a thing that was not looked at from near there."""
-        here = self._body.base
-        poses = [(0.0, here)] if self.scene.in_front(here) == item.place else []
+        present_base = self._body.base
+        poses = [(0.0, present_base)] if self.scene.in_front(present_base) == item.place else []
         if self._use.other_sides:
             poses += self._before(item.place)
         fresh = (b for _, b in poses if (quarter(b, item.position), True) not in item.votes)
@@ -233,14 +235,14 @@ class OwnSkills(CommonSkills):
 
     def _in_hand(self) -> str:
         """Return the class that two views of the hand agree on, empty for an empty hand."""
-        said: list[str] = []
+        labels: list[str] = []
         for view in range(HAND_VIEWS):
-            seen = self._body.look_at_hand(view)
-            label = seen.label if seen else ""
-            if label in said:
+            detection = self._body.look_at_hand(view)
+            label = detection.label if detection else ""
+            if label in labels:
                 return label
-            said.append(label)
-        return said[0]
+            labels.append(label)
+        return labels[0]
 
     # ---- base and arm ----
 
@@ -256,8 +258,8 @@ class OwnSkills(CommonSkills):
 
     def _open(self, poses: list[tuple[float, Base]]) -> list[tuple[float, Base]]:
         """Return the poses that are not where driving failed before."""
-        near = ((hypot(p.x - b.x, p.y - b.y) < SAME_POSE for b in self._blocked) for _, p in poses)
-        return [pose for pose, blocked in zip(poses, near, strict=True) if not any(blocked)]
+        is_blocked = ((hypot(p.x - b.x, p.y - b.y) < SAME_POSE for b in self._blocked) for _, p in poses)
+        return [pose for pose, blocked in zip(poses, is_blocked, strict=True) if not any(blocked)]
 
     def _before(self, place: str) -> list[tuple[float, Base]]:
         """Return the base poses along all sides of furniture that the robot can get to, the nearest first."""
@@ -268,19 +270,19 @@ class OwnSkills(CommonSkills):
 
     def navigate(self, target: SceneObject) -> Outcome:
         """Drive before furniture, to a side from which it was not looked at yet as long as there is one."""
-        place = target.key if target.key in self.scene.furniture else self.scene.items[target.key].place
-        seen = self._sides(place) if self._use.other_sides else set()
-        poses = self._other_sides(place, seen) or self._before(place)
+        furniture_key = target.key if target.key in self.scene.furniture else self.scene.items[target.key].place
+        sides_seen = self._sides(furniture_key) if self._use.other_sides else set()
+        poses = self._other_sides(furniture_key, sides_seen) or self._before(furniture_key)
         for _, base in poses[: TRIES if self._use.repair else 1]:
-            if self.drive(base, place):
+            if self.drive(base, furniture_key):
                 return Outcome(True)
-        return Outcome(False, "no_way", f"no way to {place} was found", {"base_poses": len(poses)})
+        return Outcome(False, "no_way", f"no way to {furniture_key} was found", {"base_poses": len(poses)})
 
     def _stations(self, place: str, at: Position, *, take: bool = False) -> Iterator[Base]:
         """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short
         arm explores until one is known. To `take` what is there a grasp of what was seen so far has to be possible,
         or, where none is from anywhere, a pose that reaches shows more, and the next one other sides of it."""
-        wanted, tried = take, list[Base]()
+        take_first, tried = take, list[Base]()
         while len(tried) < TRIES:
             fresh = self._fresh(place, at, tried, take)
             if fresh is None and take:
@@ -294,38 +296,42 @@ class OwnSkills(CommonSkills):
                 continue
             tried.append(fresh)
             yield fresh
-            take = wanted
+            take = take_first
 
     def _fresh(self, place: str, at: Position, tried: list[Base], take: bool) -> Base | None:
         """Return the nearest base pose that reaches a position and was not tried, nor failed, for it."""
         poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
         poses += self._before(place)
-        known = tried + self._remembered(place, at)
-        near = SAME_BEFORE_OPEN if self.scene.furniture[place].opened and self._body.short_armed else SAME_ON_SIDE
-        apart = (base for _, base in poses if not any(hypot(base.x - b.x, base.y - b.y) < near for b in known))
+        tried_bases = tried + self._failed_bases(place, at)
+        same_within = (
+            SAME_BEFORE_OPEN if self.scene.furniture[place].opened and self._body.short_armed else SAME_ON_SIDE
+        )
+        apart = (
+            base for _, base in poses if not any(hypot(base.x - b.x, base.y - b.y) < same_within for b in tried_bases)
+        )
         return next((b for b in apart if not self._use.reachability or self._body.reaches(b, at, take=take)), None)
 
     def _there(self, base: Base, place: str) -> bool:
         return base == self._body.base or self.drive(base, place)
 
-    def _failed_from(self, place: str, base: Base, at: Position) -> None:
+    def _remember_failure(self, place: str, base: Base, at: Position) -> None:
         self._bad.setdefault(place, []).append((base, at))
 
-    def _remembered(self, place: str, at: Position) -> list[Base]:
+    def _failed_bases(self, place: str, at: Position) -> list[Base]:
         """Return base poses that failed; with a short arm those that failed for a position near by: what it does not
         get to from one pose says little about the rest."""
         if not self._use.memory:
             return []
-        near = not self._body.short_armed
-        return [b for b, p in self._bad.get(place, []) if near or hypot(p[0] - at[0], p[1] - at[1]) < SAME_TARGET]
+        any_target = not self._body.short_armed
+        return [b for b, p in self._bad.get(place, []) if any_target or hypot(p[0] - at[0], p[1] - at[1]) < SAME_TARGET]
 
     def _unreachable(self, place: str, tries: int, last: Failure | None = None) -> Outcome:
         """Say that all base poses failed, and what motion planning or control said the last time."""
         piece = self.scene.furniture[place]
         why = f"the arm gets to nothing on {place} ({piece.label}, {piece.height:.1f} m high)"
         numbers = {"height": piece.height, "base_poses": float(tries), **(last.numbers if last else {})}
-        said = f"{why}: {tries} base poses failed{f'; {last.message}' if last else ''}"
-        return Outcome(False, "unreachable", said, numbers)
+        message = f"{why}: {tries} base poses failed{f'; {last.message}' if last else ''}"
+        return Outcome(False, "unreachable", message, numbers)
 
     def grasp(self, item: Item) -> Outcome:
         """Make sure of what it is, take it, and make sure that it is held."""
@@ -338,52 +344,52 @@ class OwnSkills(CommonSkills):
                 return Outcome(False, "wrong_object", f"{item.key} is rather a {item.label}", label=item.label)
             if item.doubt and item.key not in self._told:
                 self._told.add(item.key)
-                said = f"{item.key} may be a {item.label} or a {item.doubt}: {len(item.votes)} views do not agree"
-                return Outcome(False, "doubtful", said, label=item.doubt)
+                message = f"{item.key} may be a {item.label} or a {item.doubt}: {len(item.votes)} views do not agree"
+                return Outcome(False, "doubtful", message, label=item.doubt)
             if item.disputed and item.key not in self._told:
                 self._told.add(item.key)
-                said = f"{item.key} looks like a {item.label}, but not from everywhere: also like a {item.disputed}"
-                return Outcome(False, "disputed", said, label=item.disputed)
-        place = item.place
+                message = f"{item.key} looks like a {item.label}, but not from everywhere: also like a {item.disputed}"
+                return Outcome(False, "disputed", message, label=item.disputed)
+        furniture_key = item.place
         outcome = self._take(item)
-        if self.holding is not None and place in self._patches:
-            self.scene.furniture.pop(place)
+        if self.holding is not None and furniture_key in self._patches:
+            self.scene.furniture.pop(furniture_key)
         return outcome
 
     def _take(self, item: Item) -> Outcome:
         """Take a thing, by other grasps and from other base poses where one does not do it, and make sure that it is
         held. Nothing is executed that is known to fail, but for one try where nothing else is left: it says why."""
-        place, candidate, tries, executed = item.place, 0, 0, 0
+        furniture_key, candidate, tries, executed = item.place, 0, 0, 0
         last: Failure | None = None
-        stations = ((base, False) for base in self._stations(place, item.position, take=True))
-        last_resort = ((base, True) for _, base in self._before(place)[:1])
+        stations = ((base, False) for base in self._stations(furniture_key, item.position, take=True))
+        last_resort = ((base, True) for _, base in self._before(furniture_key)[:1])
         for base, desperate in chain(stations, last_resort):
             if (executed and desperate) or (tries and not self._use.repair):
                 break
             tries += 1
-            if not self._there(base, place):
+            if not self._there(base, furniture_key):
                 continue
             asks = self._use.reachability and self._use.repair and not desperate
             if asks and not self._body.reaches(self._body.base, item.position, take=True):
-                self._failed_from(place, base, item.position)
+                self._remember_failure(furniture_key, base, item.position)
                 continue
             while executed < TRIES:
                 executed += 1
                 felt = self._body.grasp(item.position, item.label, candidate)
                 if not felt.ok:
                     last = felt.failure
-                    self._failed_from(place, self._body.base, item.position)
+                    self._remember_failure(furniture_key, self._body.base, item.position)
                     break
-                held = self._in_hand() if self._use.recheck else item.label
-                if held:
-                    return self._holds(item, held)
+                label_in_hand = self._in_hand() if self._use.recheck else item.label
+                if label_in_hand:
+                    return self._holds(item, label_in_hand)
                 candidate += 1
                 if not self._use.repair:
                     return Outcome(False, "not_held", f"{item.key} slipped out of the hand")
-                if not self._found_again(item):
+                if not self._find_again(item):
                     self._missing.append(Lost(item, item.position, frozenset(self.scene.items)))
                     return Outcome(False, "lost", f"{item.key} slipped and is not seen any more")
-        return self._unreachable(place, tries, last)
+        return self._unreachable(furniture_key, tries, last)
 
     def _holds(self, item: Item, held: str) -> Outcome:
         """Count what the hand's view says as one more vote: it is of one region, as any other."""
@@ -395,19 +401,23 @@ class OwnSkills(CommonSkills):
         if held == believed:
             return Outcome(True)
         if self._use.agreement and item.label == believed:
-            said = f"what the hand holds may be a {believed} or a {held}"
-            return Outcome(False, "doubtful_in_hand", said, label=held)
+            message = f"what the hand holds may be a {believed} or a {held}"
+            return Outcome(False, "doubtful_in_hand", message, label=held)
         return Outcome(False, "wrong_in_hand", f"what the hand holds looks like a {held}", label=held)
 
-    def _found_again(self, item: Item) -> bool:
+    def _find_again(self, item: Item) -> bool:
         """Look for a thing that was pushed; move its entry there."""
         self.scene.items.pop(item.key, None)
         for close in (True, False):
             look = self._body.look(item.position, close=close)
-            near = [d for d in look.detections if d.label == item.label]
-            near = [d for d in near if hypot(d.position[0] - item.position[0], d.position[1] - item.position[1]) < 0.12]
-            if near:
-                item.position = near[0].position
+            same_label = [d for d in look.detections if d.label == item.label]
+            same_label = [
+                d
+                for d in same_label
+                if hypot(d.position[0] - item.position[0], d.position[1] - item.position[1]) < 0.12
+            ]
+            if same_label:
+                item.position = same_label[0].position
                 self.scene.items[item.key] = item
                 return True
         self._stood[item.place] = [self._body.base]
@@ -423,12 +433,12 @@ class OwnSkills(CommonSkills):
             item, classes = lost.item, lost.classes
             if any(i.label in classes and i.key not in lost.known for i in self._lying_at(place)):
                 continue
-            seen = self._seen_on_floor(lost)
-            if seen is not None:
-                patch = self.scene.patch(seen.position)
+            detection = self._find_on_floor(lost)
+            if detection is not None:
+                patch = self.scene.patch(detection.position)
                 self._patches[patch] = place
-                found = self.scene.add(seen, patch, (quarter(self._body.base, seen.position), False))
-                found.votes = {**item.votes, **found.votes}
+                entered = self.scene.add(detection, patch, (quarter(self._body.base, detection.position), False))
+                entered.votes = {**item.votes, **entered.votes}
             elif self._body.base != before:
                 self.drive(before, place)
 
@@ -436,7 +446,7 @@ class OwnSkills(CommonSkills):
         """Return the things of a place, with those that fell off it."""
         return [i for i in self.scene.items.values() if place in (i.place, self._patches.get(i.place))]
 
-    def _seen_on_floor(self, lost: Lost) -> Detection | None:
+    def _find_on_floor(self, lost: Lost) -> Detection | None:
         """Return what is seen on the floor around its furniture that looks like a thing, from the views that show most
         of where it may lie."""
         piece, spot = self.scene.furniture[lost.item.place], lost.spot
@@ -445,14 +455,14 @@ class OwnSkills(CommonSkills):
             view = self._floor_view(cells, likely)
             if view is None:
                 break
-            here = self._body.base
-            if (view.x, view.y) != (here.x, here.y) and not self.drive(view, lost.item.place):
+            base = self._body.base
+            if (view.x, view.y) != (base.x, base.y) and not self.drive(view, lost.item.place):
                 likely = np.where(floor_seen(self.scene.obstacles, view, cells), 0.0, likely)
                 continue
             look = self._body.look((*ahead_of(view, FLOOR_AT), 0.0), close=False)
-            found = [d for d in look.detections if d.label in lost.classes and d.position[2] < ON_FLOOR]
-            if found:
-                return min(found, key=lambda d: hypot(d.position[0] - spot[0], d.position[1] - spot[1]))
+            on_floor = [d for d in look.detections if d.label in lost.classes and d.position[2] < ON_FLOOR]
+            if on_floor:
+                return min(on_floor, key=lambda d: hypot(d.position[0] - spot[0], d.position[1] - spot[1]))
             likely = np.where(floor_seen(self.scene.obstacles, view, cells), 0.0, likely)
         return None
 
@@ -460,8 +470,8 @@ class OwnSkills(CommonSkills):
         """Return the base pose to look at the floor from next; exploring, where none is known that shows much."""
 
         def best() -> Base | None:
-            found = best_floor_view(self.scene.obstacles, self._body.base, cells, likely)
-            return found[0] if found is not None and found[1] >= LITTLE else None
+            best_view = best_floor_view(self.scene.obstacles, self._body.base, cells, likely)
+            return best_view[0] if best_view is not None and best_view[1] >= LITTLE else None
 
         view = best()
         if view is None and not self._explored:
@@ -472,10 +482,10 @@ class OwnSkills(CommonSkills):
 
     def place(self, target: SceneObject) -> Outcome:
         """Put down what is held, on a carrier or on free spots of furniture, and make sure that it lies there."""
-        place, label, at = self.places_on(target)
+        furniture_key, label, at = self.places_on(target)
         if self._use.memory:
             at = [p for p in at if not any(hypot(p[0] - q[0], p[1] - q[1]) < OFF_SPOT for q in self._off)] or at
-        return self.place_at(place, label, at[:: max(1, len(at) // TRIES)])
+        return self.place_at(furniture_key, label, at[:: max(1, len(at) // TRIES)])
 
     def place_at(self, place: str, label: str, at: list[Position]) -> Outcome:
         """Try the positions, each from base poses that reach it."""
@@ -492,14 +502,14 @@ class OwnSkills(CommonSkills):
                 if felt.ok:
                     return self._lies(place, label, position)
                 last = felt.failure
-                self._failed_from(place, base, position)
+                self._remember_failure(place, base, position)
         return self._unreachable(place, tries, last)
 
     def _lies(self, place: str, label: str, at: Position) -> Outcome:
         """Look at the spot from two regions of views; say where it lies if not there."""
         item = self.holding
         assert item is not None
-        wanted, believed = {vote for vote in item.votes.values() if vote}, item.label
+        voted_labels, believed = {vote for vote in item.votes.values() if vote}, item.label
         self.put(place, at)
         if not self._use.recheck:
             return Outcome(True)
@@ -509,28 +519,28 @@ class OwnSkills(CommonSkills):
         seen_from: set[Region] = set()  # what was seen of it before it was moved says nothing of where it is now
         for close in (True, False):
             look = self._body.look(at, close=close)
-            known = self.scene.matched(look.detections, place)
-            for d, other in zip(look.detections, known, strict=True):
-                shoved = over if other is None and over is not None and d.label == over.label else other
+            matched_items = self.scene.matched(look.detections, place)
+            for d, matched in zip(look.detections, matched_items, strict=True):
+                shoved = over if matched is None and over is not None and d.label == over.label else matched
                 if shoved is not None and shoved.label in CARRIERS and d.whole:
                     shoved.position = d.position  # the hand may have pushed it
                 over_seen = over_seen or shoved is over
-            new = [
+            new_detections = [
                 d
-                for d, other in zip(look.detections, known, strict=True)
-                if d.label in wanted and (other is None or other.label != d.label)
+                for d, matched in zip(look.detections, matched_items, strict=True)
+                if d.label in voted_labels and (matched is None or matched.label != d.label)
             ]
-            near = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new]
-            away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
-            if seen is not None and away < BESIDE:
-                item.position, item.place = seen.position, place
-                seen_from.add((quarter(self._body.base, seen.position), close))
-                item.votes[quarter(self._body.base, seen.position), close] = seen.label
+            distances = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new_detections]
+            away, nearest = min(distances, default=(BESIDE, None), key=lambda pair: pair[0])
+            if nearest is not None and away < BESIDE:
+                item.position, item.place = nearest.position, place
+                seen_from.add((quarter(self._body.base, nearest.position), close))
+                item.votes[quarter(self._body.base, nearest.position), close] = nearest.label
                 self.scene.items[item.key] = item
                 carries = self.scene.carrier_of(item) == (over.key if over else "")
                 if away <= AWAY and carries and (over_seen or not close):
-                    said = "" if item.label == believed else f"{item.key} looks like a {item.label} after all"
-                    return Outcome(True, message=said, label=item.label)
+                    message = "" if item.label == believed else f"{item.key} looks like a {item.label} after all"
+                    return Outcome(True, message=message, label=item.label)
         self._off.append(at)
         if item.key in self.scene.items:
             item.votes = {region: vote for region, vote in item.votes.items() if region in seen_from}
@@ -556,5 +566,5 @@ class OwnSkills(CommonSkills):
                 self.scene.set_opened(key, opening, felt.furniture)
                 return Outcome(True)
             last = felt.failure
-            self._failed_from(key, base, at)
+            self._remember_failure(key, base, at)
         return self._unreachable(key, tries, last)

@@ -43,15 +43,15 @@ class CommonSkills(ABC):
             explore(self._body, self.scene)
             return self.scene.global_map()
         if name == "explore_local":
-            place = self.scene.in_front(self._body.base)
-            return self.explore_local(place) if place else ObjectMap()
+            furniture_key = self.scene.in_front(self._body.base)
+            return self.explore_local(furniture_key) if furniture_key else ObjectMap()
         target = arguments[0]
         if name == "report_observation" and isinstance(target, str):
             if target not in ("stay", "rest"):
                 raise PlanError("wrong_arguments", 'a picture is of an object, of "stay" or of "rest"')
-            place = self.scene.in_front(self._body.base)
-            if target == "rest" and place:
-                return self.picture_of(self.scene.scene_object(place))
+            furniture_key = self.scene.in_front(self._body.base)
+            if target == "rest" and furniture_key:
+                return self.picture_of(self.scene.scene_object(furniture_key))
             return self.picture_of_hand()
         assert isinstance(target, SceneObject)
         if target.key not in self.scene.furniture and target.key not in self.scene.items:

@@ -9,13 +9,13 @@ from scenewright.stages.agent.scene_map import Item, SceneMap, quarter
 from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 
 APART = 0.35
-"""Between neighbouring base poses along an edge [m]."""
+"""Distance between neighbouring base poses along an edge [m]; by eye."""
 FINE = 0.03
-"""Between positions around a middle, and of one from the rim of what is known to stand near [m]."""
+"""Distance between positions around a middle, and of one from the rim of what is known to stand near [m]; by eye."""
 RING = 0.5
-"""Of the radius of a small carrier, where things are put on it."""
+"""Share of the radius of a small carrier at which things are put on it; by eye."""
 INSIDE = 0.2
-"""Of a spot from the edge over which it is placed [m]."""
+"""Distance of a spot from the edge over which it is placed [m]; by eye."""
 
 
 def facing(x: float, y: float, at: tuple[float, ...]) -> Base:
@@ -65,8 +65,8 @@ def _before_opening(piece: SeenFurniture, pose: Base) -> bool:
 
 def drivable(scene: SceneMap, base: Base, poses: list[Base]) -> list[tuple[float, Base]]:
     """Return the poses that the robot can get to with the way [m], the nearest first."""
-    ways = [(scene.obstacles.way(base, (p.x, p.y)), p) for p in poses if scene.obstacles.fits(p.x, p.y)]
-    return sorted(((way, p) for way, p in ways if way < float("inf")), key=lambda pair: pair[0])
+    lengths = [(scene.obstacles.way(base, (p.x, p.y)), p) for p in poses if scene.obstacles.fits(p.x, p.y)]
+    return sorted(((length, p) for length, p in lengths if length < float("inf")), key=lambda pair: pair[0])
 
 
 def spots(scene: SceneMap, place: str, base: Base, apart: float = 0.18) -> list[Position]:
@@ -76,12 +76,12 @@ def spots(scene: SceneMap, place: str, base: Base, apart: float = 0.18) -> list[
         [c - s / 2 + INSIDE + k * apart for k in range(max(1, int((s - 2 * INSIDE) / apart) + 1))]
         for c, s in zip(piece.centre, piece.size, strict=True)
     ]
-    taken = [(i.position, i.radius) for i in scene.items.values() if i.place == place]
+    occupied = [(i.position, i.radius) for i in scene.items.values() if i.place == place]
     free = [
         (x, y, piece.height + 0.02)
         for x in steps[0]
         for y in steps[1]
-        if all(hypot(x - p[0], y - p[1]) > r + 0.1 for p, r in taken)
+        if all(hypot(x - p[0], y - p[1]) > r + 0.1 for p, r in occupied)
     ]
     return sorted(free, key=lambda p: hypot(p[0] - base.x, p[1] - base.y))
 
@@ -91,21 +91,22 @@ def spots_on(scene: SceneMap, carrier: Item) -> list[Position]:
     x, y, z = carrier.position
     far = RING * carrier.radius
     ring = [(x + far * cos(k * pi / 3), y + far * sin(k * pi / 3), z) for k in range(6)]
-    taken = [i.position for i in scene.items.values() if i.key != carrier.key and i.place == carrier.place]
-    near = {p: min((hypot(p[0] - q[0], p[1] - q[1]) for q in taken), default=1.0) for p in ring}
-    return sorted(ring, key=lambda p: -round(near[p], 2))
+    positions = [i.position for i in scene.items.values() if i.key != carrier.key and i.place == carrier.place]
+    clearance = {p: min((hypot(p[0] - q[0], p[1] - q[1]) for q in positions), default=1.0) for p in ring}
+    return sorted(ring, key=lambda p: -round(clearance[p], 2))
 
 
 def spots_near(scene: SceneMap, place: str, middle: Position) -> list[Position]:
     """Return positions around a middle that are free as far as is known, the nearest first; the middle if none is."""
     x, y, z = middle
     steps = [k * FINE for k in range(-3, 4)]
-    taken = [(i.position, i.radius) for i in scene.items.values() if i.place == place]
+    occupied = [(i.position, i.radius) for i in scene.items.values() if i.place == place]
     free = [
         (x + dx, y + dy, z)
         for dx in steps
         for dy in steps
-        if hypot(dx, dy) <= NEAR_MIDDLE - FINE and all(hypot(x + dx - p[0], y + dy - p[1]) > r + FINE for p, r in taken)
+        if hypot(dx, dy) <= NEAR_MIDDLE - FINE
+        and all(hypot(x + dx - p[0], y + dy - p[1]) > r + FINE for p, r in occupied)
     ]
     return sorted(free, key=lambda p: hypot(p[0] - x, p[1] - y)) or [middle]
 

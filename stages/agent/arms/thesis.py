@@ -19,20 +19,20 @@ class ThesisSkills(CommonSkills):
         """Build the local map of a place anew from where the robot stands."""
         piece = self.scene.furniture[place]
         look = self._body.look((*piece.centre, piece.height), close=False)
-        seen = set()
+        seen_keys = set()
         items = self.scene.enter(look.detections, place, lambda _: (look.sector, False))
         for detection, item in zip(look.detections, items, strict=True):
             item.votes = {(look.sector, False): detection.label}
-            seen.add(item.key)
-        self.scene.items = {k: item for k, item in self.scene.items.items() if item.place != place or k in seen}
+            seen_keys.add(item.key)
+        self.scene.items = {k: item for k, item in self.scene.items.items() if item.place != place or k in seen_keys}
         return self.scene.local_map(place)
 
     def picture_of_hand(self) -> Observation:
         """One picture; the same view of the same state says the same. A hand that looks empty counts as empty."""
-        held = self._body.look_at_hand(0)
-        if held is None:
+        detection = self._body.look_at_hand(0)
+        if detection is None:
             self.holding = None
-        return Observation("hand", (held.label,) if held else ())
+        return Observation("hand", (detection.label,) if detection else ())
 
     def picture_of(self, target: SceneObject) -> Observation:
         """A close-up of what lies where a thing is, or all on a piece of furniture."""
@@ -41,9 +41,9 @@ class ThesisSkills(CommonSkills):
             look = self._body.look((*piece.centre, piece.height), close=False)
             return Observation(target.key, tuple(d.label for d in look.detections))
         item = self.scene.items[target.key]
-        seen = self._body.look(item.position, close=True).detections
-        used = next((d.used for d in seen if d.label == item.label), None)
-        return Observation(target.key, tuple(d.label for d in seen), used)
+        detections = self._body.look(item.position, close=True).detections
+        used = next((d.used for d in detections if d.label == item.label), None)
+        return Observation(target.key, tuple(d.label for d in detections), used)
 
     def navigate(self, target: SceneObject) -> Outcome:
         """Drive to the pose nearest to the robot of those that face furniture, or the nearest to a thing."""

@@ -12,7 +12,7 @@ from scenewright.stages.kit.language.messages import Message, say
 from scenewright.stages.kit.language.reply_schema import schema_of
 
 SHOWN_TURNS = 30
-"""Of the latest programs and what came of them, shown with every question."""
+"""Latest programs that are shown with every question, with what came of them; by eye."""
 
 
 class ProgramReply(Model):
@@ -39,7 +39,7 @@ class LanguageBrain:
         """Return the model's next program. Raises LanguageFailed."""
         if last is not None:
             self._turns.append(say("user", feedback_text(last)))
-        shown = self._turns[-2 * SHOWN_TURNS :]
-        answer = self.chat.ask((*self._first, *shown), schema_of(ProgramReply))
+        latest_turns = self._turns[-2 * SHOWN_TURNS :]
+        answer = self.chat.ask((*self._first, *latest_turns), schema_of(ProgramReply))
         self._turns.append(say("assistant", answer.model_dump_json()))
         return Reply(answer.reason, answer.code)

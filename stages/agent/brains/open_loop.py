@@ -46,15 +46,15 @@ def _is_mobile(goal: Goal) -> bool:
 def _program(goal: Goal, number: int, mobile: bool) -> list[str]:
     match goal:
         case Shut(what=what, opened=opened):
-            place = f"rooms.find({what.labels[0]!r})[0]"
-            return [f"navigate({place})", f"{'open' if opened else 'close'}({place})"]
+            furniture_code = f"rooms.find({what.labels[0]!r})[0]"
+            return [f"navigate({furniture_code})", f"{'open' if opened else 'close'}({furniture_code})"]
         case Among(what=what, around=around):
             return _each(what, [f"place_among(objects.find({around.labels[0]!r})[0])"], f"moved_{number}")
         case Gather(what=what, onto=onto):
             target = f"rooms.find({onto.labels[0]!r})[0]"
             put = [f"navigate({target})", f"place({target})", "navigate(spot)"]
             inner = ["navigate(spot)", "objects = explore_local()", *_each(what, put)]
-            return [f"for spot in rooms.find({onto.labels[0]!r}):", f"    if spot != {target}:", *_indented(inner, 2)]
+            return [f"for spot in rooms.find({onto.labels[0]!r}):", f"    if spot != {target}:", *_indent(inner, 2)]
         case Move():
             return _move(goal, number, mobile)
 
@@ -64,19 +64,19 @@ def _move(goal: Move, number: int, mobile: bool) -> list[str]:
     if not mobile:
         return _each(goal.what, [f"place(objects.find({onto!r})[0])"], flag)
     start = goal.start or "table"
-    target = there = f"rooms.find({onto!r})[0]"
+    target = home = f"rooms.find({onto!r})[0]"
     lines = []
     if onto not in FURNITURE:
-        target, there = f"carrier_{number}", f"home_{number}"
-        seen = [f"{target} = objects.find({onto!r})[0]", f"{there} = spot"]
+        target, home = f"carrier_{number}", f"home_{number}"
+        remembering_lines = [f"{target} = objects.find({onto!r})[0]", f"{home} = spot"]
         lines = ["for spot in rooms.find('table'):", "    navigate(spot)", "    objects = explore_local()"]
-        lines += [f"    if objects.find({onto!r}):", *_indented(seen, 2)]
-    put = [f"navigate({there})", f"place({target})", *(["navigate(spot)"] if goal.every else [])]
+        lines += [f"    if objects.find({onto!r}):", *_indent(remembering_lines, 2)]
+    put = [f"navigate({home})", f"place({target})", *(["navigate(spot)"] if goal.every else [])]
     inner = ["navigate(spot)", *(["open(spot)"] if start in WITH_DOORS else []), "objects = explore_local()"]
-    loop = [f"for spot in rooms.find({start!r}):", *_indented([*inner, *_each(goal.what, put)], 1)]
+    loop = [f"for spot in rooms.find({start!r}):", *_indent([*inner, *_each(goal.what, put)], 1)]
     if flag:
         once = _each(goal.what, put, flag)
-        loop = [once[0], loop[0], f"    if not {flag}:", *_indented([*inner, *once[1:]], 2)]
+        loop = [once[0], loop[0], f"    if not {flag}:", *_indent([*inner, *once[1:]], 2)]
     return [*lines, *loop]
 
 
@@ -85,12 +85,12 @@ def _each(what: Description, put: list[str], flag: str = "") -> list[str]:
     color = f", {what.color!r}" if what.color else ""
     body = ["grasp(item)", *put]
     if flag:
-        body = [f"if not {flag}:", *_indented([*body, f"{flag} = 1"], 1)]
+        body = [f"if not {flag}:", *_indent([*body, f"{flag} = 1"], 1)]
     lines = [f"{flag} = 0"] if flag else []
     for label in what.labels:
-        lines += [f"for item in objects.find({label!r}{color}):", *_indented(body, 1)]
+        lines += [f"for item in objects.find({label!r}{color}):", *_indent(body, 1)]
     return lines
 
 
-def _indented(lines: list[str], levels: int) -> list[str]:
+def _indent(lines: list[str], levels: int) -> list[str]:
     return ["    " * levels + line for line in lines]

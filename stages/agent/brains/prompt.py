@@ -50,7 +50,7 @@ def feedback_text(ran: Ran) -> str:
         returned = called.error.message if called.error is not None else as_text(called.value)
         lines.append(f"{called.name}({', '.join(called.arguments)}): {returned}")
     lines += [f"printed: {quoted(text)}" for text in ran.printed]
-    said = {called.error.message for called in ran.calls if called.error is not None}
-    if ran.error is not None and ran.error.message not in said:
+    messages = {called.error.message for called in ran.calls if called.error is not None}
+    if ran.error is not None and ran.error.message not in messages:
         lines.append(f"error: {ran.error.message}")
     return "\n".join(lines) or "nothing came back"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 EXECUTION = re.compile(r"\b(navigate|grasp|place|place_among|open|close)\((.*)\)\s*$")
 KINDS = ("place", "name", "call")
-"""As in 3.4.3: placing without a grasp before, a name where an object belongs; and a call of another interface."""
+"""Slips of 3.4.3: placing without a grasp before, a name where an object belongs; and a call of another interface."""
 
 
 class Slips:
@@ -19,14 +19,14 @@ class Slips:
 
     def written(self, line: str, key: int) -> str:
         """Return a line as it gets written."""
-        found = EXECUTION.search(line)
-        which = self._happens(key) if found else None
-        if found is None or which is None:
+        match = EXECUTION.search(line)
+        which = self._happens(key) if match else None
+        if match is None or which is None:
             return line
         kind = KINDS[int(which * len(KINDS))]
-        if kind == "place" and found[1] == "grasp":
-            return f"{line[: found.start()]}place({found[2]})"
+        if kind == "place" and match[1] == "grasp":
+            return f"{line[: match.start()]}place({match[2]})"
         if kind == "call":
-            other = {"grasp": "pick", "place": "put", "navigate": "go_to"}.get(found[1], f"{found[1]}_it")
-            return f"{line[: found.start()]}{other}({found[2]})"
-        return f'{line[: found.start()]}{found[1]}("it")'
+            wrong_name = {"grasp": "pick", "place": "put", "navigate": "go_to"}.get(match[1], f"{match[1]}_it")
+            return f"{line[: match.start()]}{wrong_name}({match[2]})"
+        return f'{line[: match.start()]}{match[1]}("it")'

@@ -70,7 +70,7 @@ def steps_to(at: str, source: str, target: str, shut: frozenset[str], doors: fro
     initial = {("at", at or NOWHERE), ("located", AFTER, target)}
     initial |= {("shut" if p in shut else "ajar", p) for p in places} | {("door", p) for p in places if p in doors}
     initial |= {("free",), ("lies", IT, BEFORE), ("located", BEFORE, source)} if source else {("holding", IT)}
-    return _planned(objects, frozenset(initial), frozenset({("lies", IT, AFTER)}))
+    return _plan(objects, frozenset(initial), frozenset({("lies", IT, AFTER)}))
 
 
 @lru_cache(maxsize=1024)
@@ -78,10 +78,10 @@ def steps_to_door(at: str, furniture: str, *, opened: bool) -> tuple[Step, ...]:
     """Return the steps that open or close a door that is not so already."""
     objects = dict.fromkeys(sorted({at or NOWHERE, furniture}), "furniture")
     initial = {("at", at or NOWHERE), ("shut" if opened else "ajar", furniture), ("door", furniture), ("free",)}
-    return _planned(objects, frozenset(initial), frozenset({("ajar" if opened else "shut", furniture)}))
+    return _plan(objects, frozenset(initial), frozenset({("ajar" if opened else "shut", furniture)}))
 
 
-def _planned(objects: dict[str, str], initial: frozenset, goal: frozenset) -> tuple[Step, ...]:  # type: ignore[type-arg]
+def _plan(objects: dict[str, str], initial: frozenset, goal: frozenset) -> tuple[Step, ...]:  # type: ignore[type-arg]
     problem = Problem("errand", objects, initial, goal)
     actions = plan_task(problem, ground(DOMAIN, problem), heuristic="max").actions or ()
     return tuple(

@@ -46,19 +46,19 @@ def understood(words: str) -> tuple[Goal, ...]:
         raise NotUnderstood(f"the task has {len(text)} characters, more than {LONGEST}")
     literals = list(LITERAL.finditer(text))
     if literals:
-        return tuple(_literal(found) for found in literals)
+        return tuple(_literal(match) for match in literals)
     if TIDY.search(text):
         return TIDIED
     clean = "pour" in text or "drink" in text
     goals: list[Goal] = []
-    taken: Move | None = None
+    move_before: Move | None = None
     for clause in filter(None, (part.strip() for part in CLAUSES.split(text.split(", i ")[0]))):
-        found = TAKE_OUT.fullmatch(clause)
-        if found:
-            what, every = _things(found["what"], clean)
-            taken = Move(what, what, every, _furniture(found["start"]))
+        match = TAKE_OUT.fullmatch(clause)
+        if match:
+            what, every = _things(match["what"], clean)
+            move_before = Move(what, what, every, _furniture(match["start"]))
             continue
-        goal = _clause(clause, clean, taken)
+        goal = _clause(clause, clean, move_before)
         goals.append(goal)
     if not goals:
         raise NotUnderstood(f"I do not know what to do: {words[:80]!r}")

@@ -126,16 +126,16 @@ class Interpreter:
                     return -number
                 raise PlanError("wrong_arguments", f"- of a {sort_of(number)}", line=node.lineno)
             case ast.BoolOp(op=op, values=parts):
-                wanted = isinstance(op, ast.Or)
-                return next((wanted for part in parts if truth(self._value(part)) == wanted), not wanted)
+                deciding = isinstance(op, ast.Or)
+                return next((deciding for part in parts if truth(self._value(part)) == deciding), not deciding)
             case ast.Compare(left=left, ops=ops, comparators=rights):
-                return self._compared(left, ops, rights, node.lineno)
+                return self._compare(left, ops, rights, node.lineno)
             case ast.Subscript(value=inner, slice=index):
                 return self._item(self._value(inner), self._value(index), node.lineno)
             case ast.Attribute(value=inner, attr=name):
                 return self._attribute(self._value(inner), name, node.lineno)
             case ast.Call(func=function, args=arguments):
-                return self._called(function, tuple(self._value(a) for a in arguments), node.lineno)
+                return self._call_function(function, tuple(self._value(a) for a in arguments), node.lineno)
         raise PlanError("not_in_language", "not in the language here", line=getattr(node, "lineno", 0))
 
     def _variable(self, name: str, line: int) -> Value:
@@ -145,7 +145,7 @@ class Interpreter:
             )
         return self.variables[name]
 
-    def _compared(self, left: ast.expr, ops: list[ast.cmpop], rights: list[ast.expr], line: int) -> bool:
+    def _compare(self, left: ast.expr, ops: list[ast.cmpop], rights: list[ast.expr], line: int) -> bool:
         first = self._value(left)
         for op, right in zip(ops, rights, strict=True):
             second = self._value(right)
@@ -160,13 +160,13 @@ class Interpreter:
 
     def _item(self, value: Value, index: Value, line: int) -> Value:
         if isinstance(value, ObjectMap) and isinstance(index, str):
-            found = value.get(index)
-            if found is None:
+            entry = value.get(index)
+            if entry is None:
                 keys = [item.key for item in value]
                 raise PlanError(
                     "unknown_object", f"no {quoted(index)} in the map", line=line, nearest=nearest(index, keys)
                 )
-            return found
+            return entry
         if isinstance(value, tuple) and isinstance(index, int) and not isinstance(index, bool):
             if -len(value) <= index < len(value):
                 return value[index]
@@ -178,10 +178,10 @@ class Interpreter:
         if name not in names:
             message = f"a {sort_of(value)} has no {quoted(name)}"
             raise PlanError("unknown_name", message, line=line, nearest=nearest(name, names))
-        found: Value = getattr(value, name)
-        return found
+        attribute: Value = getattr(value, name)
+        return attribute
 
-    def _called(self, function: ast.expr, arguments: tuple[Value, ...], line: int) -> Value:
+    def _call_function(self, function: ast.expr, arguments: tuple[Value, ...], line: int) -> Value:
         match function:
             case ast.Attribute(value=ast.Name(id="robot"), attr=name) if "robot" not in self.variables:
                 return self._tool(name, arguments, line)
@@ -224,9 +224,9 @@ class Interpreter:
                 sort_of(value) in sorts for value, sorts in zip(arguments, tool.takes, strict=True)
             )
             if not fitting:
-                given = ", ".join(map(sort_of, arguments))
+                sorts_given = ", ".join(map(sort_of, arguments))
                 raise PlanError(
-                    "wrong_arguments", f"{name}({given}) cannot be called", line=line, nearest=tool.signature
+                    "wrong_arguments", f"{name}({sorts_given}) cannot be called", line=line, nearest=tool.signature
                 )
             if len(self._ran.calls) >= MOST_CALLS:
                 raise PlanError("too_many_steps", f"more than {MOST_CALLS} calls in one program", line=line)

@@ -95,9 +95,9 @@ class Observation:
     @property
     def text(self) -> str:
         """As feedback says it."""
-        there = ", ".join(map(quoted, self.labels)) or "nothing"
+        labels_text = ", ".join(map(quoted, self.labels)) or "nothing"
         state = "" if self.used is None else f", {'used' if self.used else 'clean'}"
-        return f"{'the hand holds' if self.subject == 'hand' else 'there is'} {there}{state}"
+        return f"{'the hand holds' if self.subject == 'hand' else 'there is'} {labels_text}{state}"
 
 
 Value = None | bool | int | float | str | SceneObject | ObjectMap | Outcome | Observation | tuple["Value", ...] | range

@@ -18,8 +18,11 @@ from dataclasses import dataclass, replace
 from scenewright.stages.kit.rendering.segmenter_errors import GRASPS, SegmenterRates
 
 EXECUTIONS = 262
+"""Executions that table 3.4 counts."""
 PLACES = 140 / 2 + 122 / 4
+"""Executions that place, as assumed above."""
 DRIVES = 122 / 2
+"""Executions that drive, as assumed above."""
 CHECKS = GRASPS + PLACES
 """Executions of which an image was looked at afterwards."""
 TABLE_3_4 = {

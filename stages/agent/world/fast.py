@@ -18,7 +18,7 @@ from scenewright.stages.agent.world.floor import Floor
 from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors
 
 REACH, HIGHEST = 1.3, 1.4
-"""Of the arm from the middle of the base over the ground, and the highest place [m]."""
+"""Reach of the arm from the middle of the base over the ground, and the highest place that it reaches [m]."""
 FOUND_WITHIN = 0.12
 """The hand closes on what is nearest to where it goes, up to this far [m]."""
 NOISE, FURNITURE_NOISE = 0.006, 0.02
@@ -30,7 +30,7 @@ ROLLS, BESIDE = 0.22, 0.1
 CLEARANCE = 3.0
 """Cells of the obstacle map that the base keeps from what is occupied."""
 SPEED = 0.4
-"""Of the base [m/s]."""
+"""Speed of the base [m/s]."""
 SECONDS = {
     "sweep": 8.0,
     "drive": 4.0,
@@ -98,8 +98,8 @@ class FastWorld:
     def sweep(self) -> Sweep:
         """Cast rays over the floor from the base, to the first occupied cell."""
         self._seconds += SECONDS["sweep"]
-        free, struck, seen = self._floor.swept(self._base)
-        sweep = Sweep(free, struck, tuple(self._seen(self.apartment.furniture[k]) for k in seen))
+        free, struck, furniture_seen = self._floor.swept(self._base)
+        sweep = Sweep(free, struck, tuple(self._see_furniture(self.apartment.furniture[k]) for k in furniture_seen))
         self.obstacles.add(sweep)
         return sweep
 
@@ -112,7 +112,7 @@ class FastWorld:
         )
         ok = not bad and self._floor.stands(base)
         if toward:
-            self._done("drive", f"drive to {piece.name if piece else toward}", ok, "navigation")
+            self._log_done("drive", f"drive to {piece.name if piece else toward}", ok, "navigation")
         if not ok:
             return Felt(False, "no_way")
         length = self.obstacles.way(self._base, (base.x, base.y))
@@ -126,26 +126,28 @@ class FastWorld:
         self._seconds += SECONDS["close" if close else "look"]
         sector = _sector(self._base, at)
         piece = self._under(at)
-        found = []
+        detections = []
         for body in self._visible(piece):
             if close and hypot(body.at[0] - at[0], body.at[1] - at[1]) > FOUND_WITHIN:
                 continue
-            detection = self._detected(body, _sector(self._base, (*body.at, 0.0)), close)
+            detection = self._detect(body, _sector(self._base, (*body.at, 0.0)), close)
             if detection is not None:
-                found.append(detection)
-        return Look(tuple(found), sector, close)
+                detections.append(detection)
+        return Look(tuple(detections), sector, close)
 
     def look_at_hand(self, view: int) -> Detection | None:
         """See what the hand holds; a view of one state may be misjudged for good."""
         self._seconds += SECONDS["hand"]
-        held = self.bodies[self.held] if self.held else None
+        body_in_hand = self.bodies[self.held] if self.held else None
         if self._luck.happens(self._rates.feedback, "feedback", self._grasps, view):
             self._log.mistaken("feedback", f"hand {self._grasps}")
-            return self._named(self._other(), self._hand_position(), "", 0.04) if held is None else None
-        if held is None:
+            return self._detection(self._other(), self._hand_position(), "", 0.04) if body_in_hand is None else None
+        if body_in_hand is None:
             return None
-        label = self._label(held, "hand", False)
-        return self._named(label, self._hand_position(), held.thing.color, held.thing.radius, held.thing.used)
+        label = self._label(body_in_hand, "hand", False)
+        return self._detection(
+            label, self._hand_position(), body_in_hand.thing.color, body_in_hand.thing.radius, body_in_hand.thing.used
+        )
 
     def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
         """Whether the arm gets there: by distance and height, and as far as a bad base pose can be foreseen; nothing
@@ -165,27 +167,27 @@ class FastWorld:
         body, piece = self._at(at), self._under(at)
         step = f"grasp {body.thing.name}" if body is not None and body.thing.label == label else f"grasp a {label}"
         if self.held is not None:
-            self._done("grasp", step, False, "api")
+            self._log_done("grasp", step, False, "api")
             return Felt(False, "no_grasp")
         if not self._in_reach(self._base, at):
-            self._done("grasp", step, False, "grasp")
+            self._log_done("grasp", step, False, "grasp")
             return Felt(False, "out_of_reach")
         if piece is not None and self._luck.happens(
             self._rates.base, "base", piece.name, self._cell(self._base, piece)
         ):
-            self._done("grasp", step, False, "grasp")
+            self._log_done("grasp", step, False, "grasp")
             return Felt(False, "no_grasp")
         self._grasps += 1
         if body is None:
-            self._done("grasp", step, False, "")  # it closed on air: what came before is to blame
+            self._log_done("grasp", step, False, "")  # it closed on air: what came before is to blame
             return Felt(True)
         if self._luck.happens(self._rates.slip, "slip", body.thing.name, body.moved, candidate):
             self._nudge(body)
-            self._done("grasp", step, False, "grasp")
+            self._log_done("grasp", step, False, "grasp")
             return Felt(True)
         self.held, body.on, body.moved = body.thing.name, "", body.moved + 1
         right = body.thing.label == label
-        self._done("grasp", step, right, "" if right else "false_positive")
+        self._log_done("grasp", step, right, "" if right else "false_positive")
         return Felt(True)
 
     def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
@@ -195,13 +197,13 @@ class FastWorld:
         onto = self._label_of(carrier) if carrier else "floor"
         step = f"place {self.held or 'nothing'} on {label}"
         if self.held is None:
-            self._done("release", step, False, "")
+            self._log_done("release", step, False, "")
             return Felt(True)
         spot = (round(at[0], 1), round(at[1], 1))
         if not self._in_reach(self._base, at) or self._luck.happens(
             self._rates.shut, "shut", carrier, spot, self._cell(self._base, self._under(at))
         ):
-            self._done("release", step, False, "place")
+            self._log_done("release", step, False, "place")
             return Felt(False, "no_trajectory" if self._in_reach(self._base, at) else "out_of_reach")
         body = self.bodies[self.held]
         self.held = None
@@ -212,7 +214,7 @@ class FastWorld:
             self._roll(body, at)
         lies_on = self._label_of(body.on) if body.on != "floor" else "floor"
         ok = lies_on == label  # what rolls on furniture is on it all the same
-        self._done("release", step, ok, "" if ok else "false_positive" if onto != label else "place")
+        self._log_done("release", step, ok, "" if ok else "false_positive" if onto != label else "place")
         return Felt(True)
 
     def pull(self, at: Position, *, opening: bool) -> Felt:
@@ -221,13 +223,13 @@ class FastWorld:
         piece = self._under(at)
         step = f"{'open' if opening else 'close'} {piece.name if piece else 'nothing'}"
         if piece is None or not piece.door or not self._in_reach(self._base, at, edge=True):
-            self._done("pull", step, False, "grasp")
+            self._log_done("pull", step, False, "grasp")
             return Felt(False, "out_of_reach")
         if self._luck.happens(self._rates.base, "base", piece.name, self._cell(self._base, piece)):
-            self._done("pull", step, False, "grasp")
+            self._log_done("pull", step, False, "grasp")
             return Felt(False, "door_stuck")
         (self.opened.add if opening else self.opened.discard)(piece.name)
-        self._done("pull", step, True)
+        self._log_done("pull", step, True)
         return Felt(True)
 
     # ---- how it truly is ----
@@ -237,10 +239,10 @@ class FastWorld:
         """What was done and what the eyes got wrong, in order."""
         return self._log.events
 
-    def _done(self, verb: str, step: str, ok: bool, cause: str = "") -> None:
+    def _log_done(self, verb: str, step: str, ok: bool, cause: str = "") -> None:
         self._log.done(verb, step, ok, cause, self.bodies[self.held].thing.label if self.held is not None else "")
 
-    def _seen(self, piece: Furniture) -> SeenFurniture:
+    def _see_furniture(self, piece: Furniture) -> SeenFurniture:
         x, y = (c + FURNITURE_NOISE * self._normal("furniture", piece.name, k) for k, c in enumerate(piece.centre))
         return SeenFurniture(piece.label, (x, y), piece.size, piece.height, piece.door, piece.name in self.opened)
 
@@ -256,7 +258,7 @@ class FastWorld:
             on = self.bodies[on].on
         return on
 
-    def _detected(self, body: Body, sector: int, close: bool) -> Detection | None:
+    def _detect(self, body: Body, sector: int, close: bool) -> Detection | None:
         name = body.thing.name
         region = (sector, close)
         if self._errors.misses(name, body.moved, *region):
@@ -268,7 +270,7 @@ class FastWorld:
             used = not used
         height = 0.02 + (self.furniture[self.root(name)].height if self.root(name) in self.furniture else 0.0)
         position = (*(c + NOISE * self._normal(name, body.moved, *region, k) for k, c in enumerate(body.at)), height)
-        return self._named(
+        return self._detection(
             self._label(body, *region),
             position,  # type: ignore[arg-type]
             body.thing.color,
@@ -282,7 +284,7 @@ class FastWorld:
     def _other(self) -> str:
         return self._sought[0] if self._sought else "thing"
 
-    def _named(self, label: str, at: Position, color: str, radius: float, used: bool | None = None) -> Detection:
+    def _detection(self, label: str, at: Position, color: str, radius: float, used: bool | None = None) -> Detection:
         return Detection(label, at, color, used, radius)
 
     def _hand_position(self) -> Position:
@@ -296,9 +298,9 @@ class FastWorld:
     def _at(self, at: Position) -> Body | None:
         piece = self._under(at)
         loose = [b for b in self._visible(piece) if not b.thing.carries]
-        near = [(hypot(b.at[0] - at[0], b.at[1] - at[1]), b.thing.name) for b in loose]
-        near = [(d, name) for d, name in near if d <= FOUND_WITHIN]
-        return self.bodies[min(near)[1]] if near else None
+        by_distance = [(hypot(b.at[0] - at[0], b.at[1] - at[1]), b.thing.name) for b in loose]
+        by_distance = [(d, name) for d, name in by_distance if d <= FOUND_WITHIN]
+        return self.bodies[min(by_distance)[1]] if by_distance else None
 
     def _under(self, at: Position) -> Furniture | None:
         """Return the furniture at a position, with a hand's breadth around it."""
@@ -339,7 +341,7 @@ class FastWorld:
     def _nudge(self, body: Body) -> None:
         """A slip pushes a thing a little, and what hangs on its pose is drawn anew."""
         turn = 2 * pi * self._luck.uniform("nudge", body.thing.name, body.moved)
-        body.at = self._kept_on(body, (body.at[0] + 0.04 * cos(turn), body.at[1] + 0.04 * sin(turn)))
+        body.at = self._clip_to_carrier(body, (body.at[0] + 0.04 * cos(turn), body.at[1] + 0.04 * sin(turn)))
         body.moved += 1
 
     def _roll(self, body: Body, at: Position) -> None:
@@ -351,9 +353,9 @@ class FastWorld:
         toward = atan2(centre[1] - origin[1], centre[0] - origin[0])
         toward += self._luck.uniform("roll", body.thing.name, body.moved) - 0.5
         body.on = piece.name if piece is not None else "floor"
-        body.at = self._kept_on(body, (origin[0] + far * cos(toward), origin[1] + far * sin(toward)))
+        body.at = self._clip_to_carrier(body, (origin[0] + far * cos(toward), origin[1] + far * sin(toward)))
 
-    def _kept_on(self, body: Body, at: tuple[float, float]) -> tuple[float, float]:
+    def _clip_to_carrier(self, body: Body, at: tuple[float, float]) -> tuple[float, float]:
         """Return a position within the furniture that a thing is on."""
         piece = self.furniture.get(body.on if body.on in self.furniture else self.root(body.thing.name))
         if piece is None:

@@ -10,9 +10,9 @@ from scenewright.stages.agent.obstacle_map import CELL, cell_of
 from scenewright.stages.agent.senses import Base
 
 RANGE, RAYS = 5.0, 360
-"""Of the head camera [m], and rays of one turn."""
+"""Range of the head camera [m], and rays of one turn."""
 ROBOT_CELLS = 2
-"""Around the base's own that have to be free."""
+"""Cells around the base's own that have to be free."""
 SEEN_CELLS = 3
 """Cells of a piece of furniture that have to be hit for it to be made out."""
 Swept = tuple[np.ndarray, np.ndarray, tuple[int, ...]]
@@ -79,11 +79,11 @@ class Floor:
         passed = np.cumsum(hit, axis=1)
         free, struck = self._once(rows[passed == 0]), self._once(rows[hit & (passed == 1)])
         owners, counts = np.unique(self._owner[struck[:, 0], struck[:, 1]], return_counts=True)
-        seen = tuple(int(k) for k, n in zip(owners, counts, strict=True) if k >= 0 and n >= SEEN_CELLS)
-        return free + self._corner, struck + self._corner, seen
+        furniture_seen = tuple(int(k) for k, n in zip(owners, counts, strict=True) if k >= 0 and n >= SEEN_CELLS)
+        return free + self._corner, struck + self._corner, furniture_seen
 
     def _once(self, rows: np.ndarray) -> np.ndarray:
         """Return the rows (N, 2) once each, in order."""
-        there = np.zeros(self.occupied.shape, bool)
-        there[rows[:, 0], rows[:, 1]] = True
-        return np.argwhere(there)
+        hit = np.zeros(self.occupied.shape, bool)
+        hit[rows[:, 0], rows[:, 1]] = True
+        return np.argwhere(hit)

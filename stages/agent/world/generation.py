@@ -20,9 +20,9 @@ PLACES = 200
 RIM = 0.1
 """Things keep this far from the edge of what carries them [m]."""
 GAP = 0.09
-"""Between things [m]: room for fingers."""
+"""Gap between things [m]: room for fingers. By eye."""
 BESIDE = 0.45
-"""Of the robot's start from the edge of the table in front of it [m]."""
+"""Distance of the robot's start from the edge of the table in front of it [m]; by eye."""
 
 
 class Piece(Model):
@@ -93,21 +93,21 @@ class Draft:
         name = f"{label}_{sum(f.label == label for f in self.furniture)}"
         for _ in range(PLACES):
             room = self.rooms[int(self.random.integers(len(self.rooms)))]
-            placed = self._placed(room, piece)
+            placed = self._draw_place(room, piece)
             if placed is None:
                 continue
             centre, size = placed
-            made = Furniture(
+            candidate = Furniture(
                 name=name, label=label, centre=centre, size=size, height=piece.height, door=piece.door, opened=opened
             )
-            if all(_gap(made, other) >= self.recipe.passage for other in self.furniture) and all(
-                _distance(made, door.centre) >= self.recipe.door_clearance for door in self.doors
+            if all(_gap(candidate, earlier) >= self.recipe.passage for earlier in self.furniture) and all(
+                _distance(candidate, door.centre) >= self.recipe.door_clearance for door in self.doors
             ):
-                self.furniture.append(made)
+                self.furniture.append(candidate)
                 return name
         raise NoRoom
 
-    def _placed(self, room: Room, piece: Piece) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    def _draw_place(self, room: Room, piece: Piece) -> tuple[tuple[float, float], tuple[float, float]] | None:
         """Draw a place in a room: with its back to a wall, or free with a way all around."""
         side = int(self.random.integers(4))
         along, across = piece.size if side < 2 else piece.size[::-1]

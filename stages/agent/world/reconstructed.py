@@ -48,27 +48,27 @@ def apartment_of(bodies: Sequence[SceneBody], where: str) -> Apartment:
     roots = {body.name: body.parent for body in bodies}
     carried = [(b, on) for b in bodies if b.carriable and (on := _on(b.name, roots, set(standing)))]
     furniture = [_furniture(b, [c for c, on in carried if on == b.name], room) for b in standing.values()]
-    kept = {piece.name for piece in furniture if piece is not None}
-    made = Apartment(
+    furniture_names = {piece.name for piece in furniture if piece is not None}
+    reconstructed = Apartment(
         rooms=(room,),
         doors=(),
         furniture=tuple(piece for piece in furniture if piece is not None),
-        things=tuple(_thing(body, on) for body, on in carried if on in kept),
+        things=tuple(_thing(body, on) for body, on in carried if on in furniture_names),
         start=(*_point((low + high) / 2), 0.0),
     )
-    return made.model_copy(update={"start": roomiest(made)})
+    return reconstructed.model_copy(update={"start": roomiest(reconstructed)})
 
 
 def mapped(known: Apartment) -> Mapped:
     """Return what a robot believes that is given an apartment as its map."""
     names = [piece.name for piece in known.furniture]
     pieces = [SeenFurniture(f.label, f.centre, f.size, f.height, f.door, f.opened) for f in known.furniture]
-    things = []
+    numbered_detections = []
     for thing in known.things:
         number = names.index(thing.on)
         at = (*thing.at, pieces[number].height + 0.02)
-        things.append((number, Detection(thing.label, at, thing.color, None, thing.radius)))
-    return Mapped(Sweep(*Floor(known).cells(), tuple(pieces)), tuple(things))
+        numbered_detections.append((number, Detection(thing.label, at, thing.color, None, thing.radius)))
+    return Mapped(Sweep(*Floor(known).cells(), tuple(pieces)), tuple(numbered_detections))
 
 
 def roomiest(apartment: Apartment) -> tuple[float, float, float]:
@@ -113,7 +113,7 @@ def _furniture(body: SceneBody, carried: list[SceneBody], room: Room) -> Furnitu
     low[:2], high[:2] = np.maximum(low[:2], room.low), np.minimum(high[:2], room.high)
     if np.any(high[:2] - low[:2] < LEAST) or high[2] < LEAST or low[2] > HANGS:
         return None
-    inside = [float(_extent(thing)[0][2]) for thing in carried if thing.relation == "contains"]
+    inside = [float(_extent(carried_body)[0][2]) for carried_body in carried if carried_body.relation == "contains"]
     doors = [joint for joint in body.joints if joint.type == "revolute"] or list(body.joints)
     values = [
         abs(body.joint_values.get(joint.name, 0.0)) / max(abs(joint.upper - joint.lower), 1e-6) for joint in doors

@@ -11,7 +11,7 @@ from scenewright.stages.cutting.world.canonical import canonical
 from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 
 ATTEMPTS = 8
-"""To place a plane that the knife cuts."""
+"""Most attempts to place a plane that the knife cuts; by eye."""
 
 
 @dataclass(frozen=True)
@@ -145,13 +145,13 @@ def _place(
     low, high = body.extent_along(axis)
     shares = np.array(task.split.shares[task.first : task.last])
     aim = low + (high - low) * shares[:parts].sum() / shares.sum()
-    near = (high - low) * min(shares[parts - 1], shares[parts]) / shares.sum()
+    smaller_part = (high - low) * min(shares[parts - 1], shares[parts]) / shares.sum()
     for _ in range(ATTEMPTS):
-        place = aim + near * np.clip(random.normal(scale=scatter.spacing), -0.4, 0.4)
+        position = aim + smaller_part * np.clip(random.normal(scale=scatter.spacing), -0.4, 0.4)
         lean = random.normal(scale=scatter.tilt, size=2)
         others = task.axes[:, [k for k in range(3) if k != task.split.axis]]
         normal = axis + others @ lean
-        point = body.moments[0] + axis * (place - axis @ body.moments[0])
+        point = body.moments[0] + axis * (position - axis @ body.moments[0])
         plane = Plane.through(point, normal)
         try:
             results = cut(body, plane, knife)

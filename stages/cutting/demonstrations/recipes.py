@@ -46,6 +46,7 @@ CELLS = {
 }
 """110 trials in all, as in section 6.4.1, which does not say how many each; 40 % of n1m1 are for training."""
 TRAINING_SHARE = 0.4
+"""Share of the trials of n1m1 that are for training."""
 
 
 def equal_parts(axis: int, count: int, then: Recipe) -> Recipe:
@@ -55,17 +56,17 @@ def equal_parts(axis: int, count: int, then: Recipe) -> Recipe:
 
 def recipe_of(category: Category, random: np.random.Generator, *, half: bool = False) -> Recipe:
     """Return how an object, or half of one, is cut into a category."""
-    few = int(half)
+    fewer = int(half)
     match category:
         case "chunks":
-            return equal_parts(LONG, int(random.integers(2, 5 - few)), category)
+            return equal_parts(LONG, int(random.integers(2, 5 - fewer)), category)
         case "slices":
-            return equal_parts(LONG, int(random.integers(5 - few, 10 - 3 * few)), category)
+            return equal_parts(LONG, int(random.integers(5 - fewer, 10 - 3 * fewer)), category)
         case "strips":
-            wide, thin = ((2, 2), (3, 1), (3, 2))[int(random.integers(3 - few))]
+            wide, thin = ((2, 2), (3, 1), (3, 2))[int(random.integers(3 - fewer))]
             return equal_parts(WIDE, wide, equal_parts(THIN, thin, category))
         case "cubes":
-            long = int(random.integers(2, 5 - 2 * few))
+            long = int(random.integers(2, 5 - 2 * fewer))
             return equal_parts(LONG, long, equal_parts(WIDE, 2, equal_parts(THIN, 2, category)))
 
 

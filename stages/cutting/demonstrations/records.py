@@ -50,15 +50,15 @@ def replay(record: DemonstrationRecord, objects: Sequence[Body], where: str) -> 
     for number, each in enumerate(record.cuts):
         plane = Plane(np.array(each.plane.normal), each.plane.d)
         try:
-            parts = cut(done.pieces[each.piece], plane, Knife())
+            pieces = cut(done.pieces[each.piece], plane, Knife())
         except Refused as refused:
             raise BadInput(f"{where}: cut {number}: {refused.failure.message}", hint="record it again") from None
-        if len(parts) != len(each.shifts):
+        if len(pieces) != len(each.shifts):
             raise BadInput(
-                f"{where}: cut {number} gives {len(parts)} pieces, {len(each.shifts)} were recorded",
+                f"{where}: cut {number} gives {len(pieces)} pieces, {len(each.shifts)} were recorded",
                 hint="record it again",
             )
-        done.enter(each.piece, plane, parts, [np.array(shift) for shift in each.shifts])
+        done.enter(each.piece, plane, pieces, [np.array(shift) for shift in each.shifts])
     done.categories |= record.categories
     return done
 

@@ -11,7 +11,7 @@ from scenewright.stages.cutting.world.foods import FAMILIES, make_food
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 SPACING = 0.3
-"""Between objects on the board [m]."""
+"""Distance between objects on the board [m]; by eye."""
 
 
 def make_trial(cell: str, seed: Sequence[int], scatter: Scatter | None = None) -> Demonstration:

@@ -10,7 +10,7 @@ from scenewright.stages.cutting.world.voxels import Grid
 from scipy.optimize import linear_sum_assignment
 
 VOXELS = 48
-"""Along the longest edge of the two fragments."""
+"""Voxels along the longest edge of the two fragments; by eye."""
 
 
 def overlaps(made: Sequence[Canonical], wanted: Sequence[Canonical]) -> np.ndarray:
@@ -40,11 +40,11 @@ def overlap(first: tuple[Grid, np.ndarray], second: tuple[Grid, np.ndarray]) -> 
     counts = [int(filled.sum()) for _, filled in (first, second)]
     common = 0
     if (high > low).all():
-        parts = [
+        grids = [
             filled[tuple(slice(a, b) for a, b in zip(low - start, high - start, strict=True))]
             for start, (_, filled) in zip(starts, (first, second), strict=True)
         ]
-        common = int((parts[0] & parts[1]).sum())
+        common = int((grids[0] & grids[1]).sum())
     union = sum(counts) - common
     return common / union if union else 0.0
 

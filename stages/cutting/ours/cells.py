@@ -118,9 +118,9 @@ def _moments(
     end[0] = len(points)
     number, mean, covariance = np.zeros(leaves), np.zeros((leaves, 3)), np.zeros((leaves, 3, 3))
     for node in range(len(nodes)):
-        axis, child, parts, leaf, _ = nodes[node]
+        axis, child, part_count, leaf, _ = nodes[node]
         inside = order[start[node] : end[node]]
-        if parts == 0:
+        if part_count == 0:
             number[leaf] = len(inside)
             for i in inside:
                 for j in range(3):
@@ -136,9 +136,9 @@ def _moments(
                     covariance[leaf, j, k] /= max(len(inside), 1)
                     covariance[leaf, k, j] = covariance[leaf, j, k]
             continue
-        share = weights[child : child + parts].copy()
+        share = weights[child : child + part_count].copy()
         if len(volumes):
-            for k in range(parts):
+            for k in range(part_count):
                 share[k] = volumes[nodes[child + k, 3] : nodes[child + k, 3] + nodes[child + k, 4]].sum()
         marks = np.cumsum(share)[:-1] / share.sum()
         along = points[inside, axis]
@@ -150,7 +150,7 @@ def _moments(
                 places = along.min() + (along.max() - along.min()) * marks
             which = np.searchsorted(places, along)
             at = start[node]
-            for k in range(parts):
+            for k in range(part_count):
                 start[child + k] = at
                 for i in range(len(inside)):
                     if which[i] == k:

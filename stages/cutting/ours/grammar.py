@@ -21,9 +21,11 @@ from scenewright.stages.cutting.world.canonical import axis_across
 from scipy.cluster.vq import kmeans2
 
 MOST_TYPES = 12
+"""Most types that are tried; by eye."""
 LEAST_DEVIATION = 0.05
-"""Of a logarithm of an edge within a type."""
+"""Least standard deviation of a logarithm of an edge within a type; by eye."""
 AXES = 3
+"""Axes along which a rule may cut."""
 
 
 @dataclass(frozen=True)
@@ -80,18 +82,18 @@ class Grammar:
         return np.log(self.shares) - np.log(self.deviations).sum(axis=1), self.means, self.deviations
 
     @cached_property
-    def _seen(self) -> dict[int, dict[tuple[int, tuple[int, int]], int]]:
-        found: dict[int, dict[tuple[int, tuple[int, int]], int]] = {}
+    def _rule_counts(self) -> dict[int, dict[tuple[int, tuple[int, int]], int]]:
+        counts_of_parent: dict[int, dict[tuple[int, tuple[int, int]], int]] = {}
         for rule in self.rules:
-            found.setdefault(rule.parent, {})[rule.axis, rule.children] = rule.seen
-        return found
+            counts_of_parent.setdefault(rule.parent, {})[rule.axis, rule.children] = rule.seen
+        return counts_of_parent
 
     def rule_bits(self, parent: int, axis: int, children: tuple[int, int]) -> float:
         """Return the code length of a rule [bits]: short for what was often seen of a type."""
         pair = (min(children), max(children))
-        seen = self._seen.get(parent, {})
+        counts = self._rule_counts.get(parent, {})
         possible = AXES * self.types * (self.types + 1) / 2
-        return -math.log2((seen.get((axis, pair), 0) + 0.5) / (sum(seen.values()) + 0.5 * possible))
+        return -math.log2((counts.get((axis, pair), 0) + 0.5) / (sum(counts.values()) + 0.5 * possible))
 
     def category_of(self, edges: np.ndarray) -> np.ndarray:
         """Return the likeliest category (N,) of fragments, through their types."""
@@ -126,7 +128,7 @@ def learn(demonstrations: Sequence[Demonstration], seed: int) -> Grammar:
         raise ValueError("no demonstration cuts anything")
     tried = [_fit(corpus, count, seed) for count in range(1, min(MOST_TYPES, len(corpus.pieces) // 4) + 1)]
     best = min(tried, key=lambda grammar: grammar.bits)
-    return _named(best, demonstrations)
+    return _with_names(best, demonstrations)
 
 
 def _corpus(demonstrations: Sequence[Demonstration]) -> _Corpus:
@@ -148,33 +150,35 @@ def _fit(corpus: _Corpus, count: int, seed: int) -> Grammar:
     edges = corpus.pieces[:, :3]
     _, types = kmeans2(edges, count, minit="++", seed=np.random.default_rng([seed, count]), iter=50)
     types = np.unique(types, return_inverse=True)[1]
-    kept = types.max() + 1
-    means = np.stack([edges[types == k].mean(axis=0) for k in range(kept)])
-    deviations = np.stack([np.maximum(edges[types == k].std(axis=0), LEAST_DEVIATION) for k in range(kept)])
-    shares = np.bincount(types, minlength=kept) / len(types)
+    type_count = types.max() + 1
+    means = np.stack([edges[types == k].mean(axis=0) for k in range(type_count)])
+    deviations = np.stack([np.maximum(edges[types == k].std(axis=0), LEAST_DEVIATION) for k in range(type_count)])
+    shares = np.bincount(types, minlength=type_count) / len(types)
     off = (edges - means[types]) / deviations[types]
     nats = 0.5 * (off**2).sum() + np.log(deviations[types] * np.sqrt(2 * np.pi)).sum()
     prices = 0.5 * means.size * 2 * np.log2(len(edges))
     root_bits = -np.log2(shares[types[corpus.roots]]).sum()
-    seen: dict[tuple[int, int, int, int], int] = {}
-    of_parent = np.zeros(kept)
-    possible = AXES * kept * (kept + 1) / 2
+    rule_counts: dict[tuple[int, int, int, int], int] = {}
+    of_parent = np.zeros(type_count)
+    possible = AXES * type_count * (type_count + 1) / 2
     rule_bits = 0.0
     for parent, axis, first, second in corpus.cuts:
         low, high = sorted((int(types[first]), int(types[second])))
         key = (int(types[parent]), int(axis), low, high)
-        rule_bits -= np.log2((seen.get(key, 0) + 0.5) / (of_parent[key[0]] + 0.5 * possible))
-        seen[key] = seen.get(key, 0) + 1
+        rule_bits -= np.log2((rule_counts.get(key, 0) + 0.5) / (of_parent[key[0]] + 0.5 * possible))
+        rule_counts[key] = rule_counts.get(key, 0) + 1
         of_parent[key[0]] += 1
-    rules = tuple(Rule(parent, axis, (low, high), times) for (parent, axis, low, high), times in sorted(seen.items()))
-    empty = np.zeros((kept, len(CATEGORIES)))
+    rules = tuple(
+        Rule(parent, axis, (low, high), times) for (parent, axis, low, high), times in sorted(rule_counts.items())
+    )
+    empty = np.zeros((type_count, len(CATEGORIES)))
     bits = float(nats / np.log(2) + prices + root_bits + rule_bits)
     return Grammar(means, deviations, shares, rules, empty, np.zeros((len(CATEGORIES), 2, 2)), np.ones(4), bits)
 
 
-def _named(grammar: Grammar, demonstrations: Sequence[Demonstration]) -> Grammar:
+def _with_names(grammar: Grammar, demonstrations: Sequence[Demonstration]) -> Grammar:
     """Return the grammar with what fragments are called, and how far those that were meant to be alike differ."""
-    named = np.zeros((grammar.types, len(CATEGORIES)))
+    category_counts = np.zeros((grammar.types, len(CATEGORIES)))
     ratios: list[list[np.ndarray]] = [[] for _ in CATEGORIES]
     spread: list[np.ndarray] = []
     for demonstration in demonstrations:
@@ -187,14 +191,14 @@ def _named(grammar: Grammar, demonstrations: Sequence[Demonstration]) -> Grammar
             if not pieces:
                 continue
             rows = features([item_of(body, k) for k, body in enumerate(pieces)])
-            named[:, number] += np.bincount(grammar.type_of(rows[:, :3]), minlength=grammar.types)
+            category_counts[:, number] += np.bincount(grammar.type_of(rows[:, :3]), minlength=grammar.types)
             ratios[number].append(np.diff(rows[:, :3], axis=1))
             spread.append(rows - rows.mean(axis=0))
     shapes = np.tile([[0.0, 0.0], [1.0, 1.0]], (len(CATEGORIES), 1, 1))  # of what was never shown, anything
-    for number, found in enumerate(ratios):
-        if found:
-            together = np.concatenate(found)
+    for number, ratios_of_type in enumerate(ratios):
+        if ratios_of_type:
+            together = np.concatenate(ratios_of_type)
             shapes[number] = together.mean(axis=0), np.maximum(together.std(axis=0), LEAST_DEVIATION)
     together = np.concatenate(spread) if spread else np.full((1, 4), 0.2)
     scatter = np.maximum(np.sqrt((together**2).mean(axis=0)), LEAST_DEVIATION)
-    return replace(grammar, named=named, ratios=shapes, scatter=scatter)
+    return replace(grammar, named=category_counts, ratios=shapes, scatter=scatter)

@@ -36,8 +36,8 @@ def imagine(objects: Sequence[Body], words: Words, grammar: Grammar) -> tuple[li
         mine = [(int(shares[name][number]), name) for _, name in words if shares[name][number]]
         if not mine:
             continue
-        made = cells(cloud, _tree(cloud, mine, grammar))
-        for row in made:
+        cells_made = cells(cloud, _tree(cloud, mine, grammar))
+        for row in cells_made:
             edges = np.exp(row[:3])
             items.append(Item(len(items), (float(edges[0]), float(edges[1]), float(edges[2])), float(np.exp(row[3]))))
         names += [name for count, name in mine for _ in range(count)]
@@ -47,16 +47,16 @@ def imagine(objects: Sequence[Body], words: Words, grammar: Grammar) -> tuple[li
 def shared_out(count: int, room: np.ndarray) -> np.ndarray:
     """Return whole numbers (N,) that add up to the count, in proportion to what room there is (largest remainders)."""
     exact = count * room / room.sum()
-    whole = np.floor(exact).astype(int)
-    whole[np.argsort(-(exact - whole), kind="stable")[: count - int(whole.sum())]] += 1
-    return whole
+    counts = np.floor(exact).astype(int)
+    counts[np.argsort(-(exact - counts), kind="stable")[: count - int(counts.sum())]] += 1
+    return counts
 
 
 def _tree(cloud: Cloud, words: Words, grammar: Grammar) -> Tree:
     share = 1.0 / len(words)
     edges = cloud.edges * np.where(np.arange(3) == LONG, share, 1.0)
-    parts = tuple(_grid(edges, count, name, grammar) for count, name in words)
-    return parts[0] if len(parts) == 1 else Split(LONG, parts, (share,) * len(parts))
+    grids = tuple(_grid(edges, count, name, grammar) for count, name in words)
+    return grids[0] if len(grids) == 1 else Split(LONG, grids, (share,) * len(grids))
 
 
 def _grid(edges: np.ndarray, count: int, name: CategoryName, grammar: Grammar) -> Tree:

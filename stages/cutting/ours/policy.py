@@ -17,7 +17,8 @@ from scenewright.stages.cutting.world.body import Body, Plane
 from scenewright.stages.cutting.world.knife import Knife, face_edges
 
 DOUBT = 0.02
-"""Of what is there that a goal may ask for beyond it, or leave over without that being a fragment of its own."""
+"""Share of what is there that a goal may ask for beyond it, or leave over without that being a fragment of its own; by
+eye."""
 TILT, ASIDE = 0.12, 0.12
 """Angle [rad] and distance, as a share of a part's thickness, by which one cut through several pieces may miss the
 planes that each would get alone: about what the scripted cutter misses."""
@@ -78,16 +79,16 @@ class OursPolicy:
         chosen, face = [], board[action.piece].section(action.plane)
         for number in others:
             planned = self._plans[number][0]
-            own, center = planned.action.plane, board[number].moments[0]
-            cosine = float(action.plane.normal @ own.normal)
-            there = center - own.height(center) * own.normal
-            if abs(cosine) < np.cos(TILT) or abs(action.plane.height(there)) > ASIDE * planned.thickness:
+            planned_plane, center = planned.action.plane, board[number].moments[0]
+            cosine = float(action.plane.normal @ planned_plane.normal)
+            on_planned_plane = center - planned_plane.height(center) * planned_plane.normal
+            if abs(cosine) < np.cos(TILT) or abs(action.plane.height(on_planned_plane)) > ASIDE * planned.thickness:
                 continue
-            both = np.concatenate([face, board[number].section(action.plane)])
-            if face_edges(both)[0] > self._knife.length:
+            both_faces = np.concatenate([face, board[number].section(action.plane)])
+            if face_edges(both_faces)[0] > self._knife.length:
                 continue
             chosen.append(number)
-            face = both
+            face = both_faces
             if cosine < 0:
                 self._plans[number][0] = replace(planned, below=planned.above, above=planned.below)
         return tuple(chosen)
@@ -113,13 +114,16 @@ class OursPolicy:
             self._jobs[action.piece] = self._jobs[action.piece][:1]
 
     def _impossible(self, board: Mapping[int, Body]) -> Failure | None:
-        there, asked = sum(body.volume for body in board.values()), sum(item.volume for item in self._items)
+        board_volume, goal_volume = (
+            sum(body.volume for body in board.values()),
+            sum(item.volume for item in self._items),
+        )
         thinnest = min(item.edges[0] for item in self._items)
-        if asked > (1.0 + self._doubt) * there:
+        if goal_volume > (1.0 + self._doubt) * board_volume:
             return Failure(
                 kind="too_much_volume",
-                message=f"the goal holds {1e6 * asked:.1f} cm3, there are {1e6 * there:.1f} cm3",
-                numbers={"asked": asked, "there": there},
+                message=f"the goal holds {1e6 * goal_volume:.1f} cm3, there are {1e6 * board_volume:.1f} cm3",
+                numbers={"asked": goal_volume, "there": board_volume},
             )
         if len(self._items) < len(board):
             return Failure(
@@ -139,10 +143,13 @@ class OursPolicy:
     def _with_rest(self, board: Mapping[int, Body]) -> list[Item]:
         """Return the items, with what is left over as one more, of any shape; where that is within the doubt, the
         items' volumes, made to add up to what is there."""
-        there, asked = sum(body.volume for body in board.values()), sum(item.volume for item in self._items)
-        if there - asked < self._doubt * there:
-            return [replace(item, volume=item.volume * there / asked) for item in self._items]
-        return [*self._items, Item(len(self._items), (np.nan, np.nan, np.nan), there - asked)]
+        board_volume, goal_volume = (
+            sum(body.volume for body in board.values()),
+            sum(item.volume for item in self._items),
+        )
+        if board_volume - goal_volume < self._doubt * board_volume:
+            return [replace(item, volume=item.volume * board_volume / goal_volume) for item in self._items]
+        return [*self._items, Item(len(self._items), (np.nan, np.nan, np.nan), board_volume - goal_volume)]
 
 
 def _cuts(piece: int, cloud: Cloud, trees: Sequence[Foreseen]) -> list[_Planned]:
@@ -159,10 +166,10 @@ def _middle_cut(piece: int, cloud: Cloud, foreseen: Foreseen, ahead: float) -> _
     below, above = foreseen.items[:count], foreseen.items[count:]
     share = sum(item.volume for item in below) / sum(item.volume for item in foreseen.items)
     normal = np.eye(3)[tree.axis]
-    place = float(np.quantile(cloud.points[:, tree.axis], share))
-    plane = Plane(normal, -place).moved(cloud.frame)
-    said = (
+    cut_position = float(np.quantile(cloud.points[:, tree.axis], share))
+    plane = Plane(normal, -cut_position).moved(cloud.frame)
+    reason = (
         f"{len(foreseen.items)} fragments: {len(below)} below, {len(above)} above, {ahead:.0f} bits ahead of the next"
     )
     thickness = float(np.ptp(cloud.points[:, tree.axis])) / len(tree.parts)
-    return _Planned(Action(piece, plane, said, foreseen.likeness), below, above, thickness)
+    return _Planned(Action(piece, plane, reason, foreseen.likeness), below, above, thickness)

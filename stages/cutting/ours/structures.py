@@ -22,7 +22,7 @@ UNLIKE = 1.5
 MOST_GROUPS = 4
 """Groups of unlike fragments that are set apart within one piece before anything else."""
 MOST_BITS = 60.0
-"""That one fragment which does not fit can cost: one odd fragment does not decide."""
+"""Highest cost of one fragment which does not fit [bits], so that one odd fragment does not decide; by eye."""
 
 
 @dataclass(frozen=True)
@@ -40,45 +40,45 @@ class Foreseen:
 
 def best_trees(cloud: Cloud, items: Sequence[Item], grammar: Grammar) -> list[Foreseen]:
     """Return foreseen trees that make as many fragments as there are items, fewest bits first; at least one."""
-    wanted = features(items)
+    wanted_features = features(items)
     if len(items) == 1:
-        return [_foresee(cloud, None, items, wanted, grammar)]
+        return [_foresee(cloud, None, items, wanted_features, grammar)]
     trees: dict[Tree, None] = {}
-    for groups in groupings(wanted, grammar):
-        trees |= dict.fromkeys(proposals(cloud.edges, [wanted[group] for group in groups], grammar))
+    for groups in groupings(wanted_features, grammar):
+        trees |= dict.fromkeys(proposals(cloud.edges, [wanted_features[group] for group in groups], grammar))
     chosen = list(trees)
     if len(chosen) > FINALISTS:
-        chosen.sort(key=lambda tree: _rough_bits(cloud.coarse, tree, wanted, grammar))
-    found = [_foresee(cloud, tree, items, wanted, grammar) for tree in chosen[:FINALISTS]]
-    return sorted(found, key=lambda foreseen: foreseen.bits)
+        chosen.sort(key=lambda tree: _rough_bits(cloud.coarse, tree, wanted_features, grammar))
+    foreseen_trees = [_foresee(cloud, tree, items, wanted_features, grammar) for tree in chosen[:FINALISTS]]
+    return sorted(foreseen_trees, key=lambda foreseen: foreseen.bits)
 
 
 def groupings(
     wanted: np.ndarray, grammar: Grammar, most: int = MOST_GROUPS, unlike: float = UNLIKE
 ) -> list[list[np.ndarray]]:
     """Return ways to group items (N, 4): all alike, by what their types are called, by clusters of their own."""
-    known = ~np.isnan(wanted[:, 0])
+    has_size = ~np.isnan(wanted[:, 0])
     labels = [np.zeros(len(wanted), dtype=int)]
-    named = np.full(len(wanted), -1)
-    named[known] = grammar.category_of(wanted[known, :3])
-    labels.append(named)
-    if known.sum() > 2:
-        tree = linkage(wanted[known] / grammar.scatter, "ward")
+    category_labels = np.full(len(wanted), -1)
+    category_labels[has_size] = grammar.category_of(wanted[has_size, :3])
+    labels.append(category_labels)
+    if has_size.sum() > 2:
+        tree = linkage(wanted[has_size] / grammar.scatter, "ward")
         for count in range(2, most + 1):
             clusters = np.full(len(wanted), -1)
-            clusters[known] = fcluster(tree, count, "maxclust")
+            clusters[has_size] = fcluster(tree, count, "maxclust")
             if clusters.max() < count:
                 break
             middles = [(wanted[clusters == value] / grammar.scatter).mean(axis=0) for value in range(1, count + 1)]
             if pdist(np.array(middles)).min() < unlike:
                 break
             labels.append(clusters)
-    found: dict[tuple[tuple[int, ...], ...], None] = {}
+    distinct: dict[tuple[tuple[int, ...], ...], None] = {}
     for each in labels:
         groups = sorted(tuple(np.flatnonzero(each == value).tolist()) for value in np.unique(each))
         if len(groups) <= most and (len(groups) == 1 or len(groups) < len(wanted)):
-            found[tuple(groups)] = None
-    return [[np.array(group) for group in groups] for groups in found]
+            distinct[tuple(groups)] = None
+    return [[np.array(group) for group in groups] for groups in distinct]
 
 
 def proposals(edges: np.ndarray, groups: Sequence[np.ndarray], grammar: Grammar) -> Iterator[Tree]:
@@ -97,10 +97,10 @@ def proposals(edges: np.ndarray, groups: Sequence[np.ndarray], grammar: Grammar)
         )
         rows.append((misfit, axis, slabs))
     for rank, (_, axis, slabs) in enumerate(sorted(rows, key=lambda row: row[0])):
-        parts = [_grids(slab, group, grammar, 1)[0] for slab, group in zip(slabs, groups, strict=True)]
+        grids = [_grids(slab, group, grammar, 1)[0] for slab, group in zip(slabs, groups, strict=True)]
         orders = list(permutations(range(len(groups))))
         for order in orders if rank == 0 else orders[:1]:
-            yield Split(axis, tuple(parts[k] for k in order), tuple(float(shares[k]) for k in order))
+            yield Split(axis, tuple(grids[k] for k in order), tuple(float(shares[k]) for k in order))
 
 
 def _grids(edges: np.ndarray, group: np.ndarray, grammar: Grammar, most: int = BEAM) -> list[Tree]:
@@ -149,7 +149,7 @@ def nested(edges: np.ndarray, counts: Sequence[int], grammar: Grammar) -> Tree:
 
 def rule_bits(grammar: Grammar, edges: np.ndarray, tree: Tree) -> float:
     """Return the code length [bits] of deriving a tree from a box (3,) [m] by rules that cut in two, halving runs."""
-    kept: dict[tuple[object, ...], float] = {}
+    bits_of_key: dict[tuple[object, ...], float] = {}
     types: dict[tuple[float, ...], int] = {}
 
     def type_of(box: tuple[float, ...]) -> int:
@@ -163,19 +163,19 @@ def rule_bits(grammar: Grammar, edges: np.ndarray, tree: Tree) -> float:
             return 0.0 if part is None else bits(box, part, 0, len(part.parts))
         same = split.weights.count(split.weights[0]) == len(split.weights) and len(set(split.parts)) == 1
         key = (box, id(split), (last - first) if same else (first, last))
-        if key not in kept:
+        if key not in bits_of_key:
             middle = (first + last) // 2
             weights = split.weights
-            whole = sum(weights[first:last])
+            total_weight = sum(weights[first:last])
             sides: list[tuple[tuple[float, ...], int, int]] = []
             for low, high in ((first, middle), (middle, last)):
                 side = list(box)
-                side[split.axis] = round(box[split.axis] * sum(weights[low:high]) / whole, 6)
+                side[split.axis] = round(box[split.axis] * sum(weights[low:high]) / total_weight, 6)
                 sides.append((tuple(side), low, high))
             rank = sum(edge < box[split.axis] for k, edge in enumerate(box) if k != split.axis)
             rule = grammar.rule_bits(type_of(box), rank, (type_of(sides[0][0]), type_of(sides[1][0])))
-            kept[key] = rule + sum(bits(cut_box, split, low, high) for cut_box, low, high in sides)
-        return kept[key]
+            bits_of_key[key] = rule + sum(bits(cut_box, split, low, high) for cut_box, low, high in sides)
+        return bits_of_key[key]
 
     box = tuple(float(edge) for edge in np.round(edges, 6))
     return 0.0 if tree is None else bits(box, tree, 0, len(tree.parts))
@@ -189,9 +189,9 @@ def _foresee(cloud: Cloud, tree: Tree, items: Sequence[Item], wanted: np.ndarray
     """Match fragments to items by thickness, put the planes where the items' volumes are, and match again."""
     _, order = match(cells(cloud, tree), wanted, grammar.scatter)
     volumes = np.exp(wanted[order, 3])
-    made = cells(cloud, tree, volumes)
-    bits, order = match(made, wanted, grammar.scatter)
-    alike = np.nan_to_num(likeness(made, wanted[order]), nan=1.0)
+    features_made = cells(cloud, tree, volumes)
+    bits, order = match(features_made, wanted, grammar.scatter)
+    alike = np.nan_to_num(likeness(features_made, wanted[order]), nan=1.0)
     return Foreseen(
         tree, tuple(items[k] for k in order), bits + rule_bits(grammar, cloud.edges, tree), float(alike.mean())
     )

@@ -14,11 +14,13 @@ from scenewright.stages.kit.geometry.transforms import look_at
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 WIDTH, HEIGHT = 480, 360
-"""Of one picture [px]."""
+"""Size of one picture [px]."""
 EYES = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
+"""Directions from which it is looked: above, front and end."""
 UPS = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+"""Direction that is up in each picture."""
 FAR = 8.0
-"""From where it is looked [m]: so far that planes through the eye are almost parallel to each other."""
+"""Distance from which it is looked [m]: so far that planes through the eye are almost parallel to each other."""
 SHORTEST = 8.0
 """Distance between two clicks that is a line [px]."""
 
@@ -67,10 +69,10 @@ def panels(pieces: Mapping[int, Body]) -> Panels:
     meshes: list[tuple[int, trimesh.Trimesh]] = [(number + 1, colored(body, number)) for number, body in pieces.items()]
     renderer = SceneRenderer(meshes)
     poses = tuple(look_at(middle + FAR * np.array(eye), middle, up) for eye, up in zip(EYES, UPS, strict=True))
-    seen = [renderer.render(camera, pose) for pose in poses]
+    rendered = [renderer.render(camera, pose) for pose in poses]
     return Panels(
-        np.concatenate([each.color for each in seen], axis=1),
-        np.concatenate([each.instance for each in seen], axis=1) - 1,
+        np.concatenate([each.color for each in rendered], axis=1),
+        np.concatenate([each.instance for each in rendered], axis=1) - 1,
         camera,
         poses,
     )

@@ -47,19 +47,19 @@ class RecordingServer(BoundedServer):
         """Do what is asked, one thing at a time, and say what lies there then. Raises NoCut."""
         with self._turn:
             session = self._session
-            said = ""
+            message = ""
             if asked.do == "cut":
                 if asked.points is None:
                     raise NoCut("a cut needs two points")
-                said = session.cut(np.array(asked.points))
+                message = session.cut(np.array(asked.points))
             elif asked.do == "undo":
-                said = session.undo()
+                message = session.undo()
             elif asked.do == "finish":
-                said = session.finish(asked.category)
+                message = session.finish(asked.category)
             picture = io.BytesIO()
             Image.fromarray(session.shown.color).save(picture, "PNG")
             return {
-                "said": said,
+                "said": message,
                 "picture": base64.b64encode(picture.getvalue()).decode(),
                 "trials": session.trials,
                 "cuts": len(session.trial.cuts),
@@ -87,12 +87,12 @@ class _Handler(BoundedHandler):
         if body is None:
             return
         try:
-            asked = Asked.model_validate_json(body)
-            if asked.do == "end":
+            request_read = Asked.model_validate_json(body)
+            if request_read.do == "end":
                 self.answer(200, json.dumps({"said": "ended"}).encode())
                 self.server.end()
             else:
-                self.answer(200, json.dumps(self.server.do(asked)).encode())
+                self.answer(200, json.dumps(self.server.do(request_read)).encode())
         except ValidationError:
             self.refuse(400, "this is nothing that the page asks for")
         except NoCut as refused:

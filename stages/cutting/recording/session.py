@@ -18,9 +18,9 @@ from scenewright.stages.cutting.world.knife import Knife, Refused, cut
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 GAP = 0.008
-"""By which what was cut is pushed apart [m]."""
+"""Distance by which what was cut is pushed apart [m]; by eye."""
 CELL = "n1m1"
-"""Of the thesis's table: one object, one category."""
+"""Cell of the thesis's table: one object, one category."""
 HINT = "give the file of a recording (scenewright cutting record FILE)"
 LYING = transform_from(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]), np.zeros(3))
 """Spine along x, shortest edge up."""
@@ -73,11 +73,11 @@ class Session:
         """Cut where two clicks (2, 2) [px] say; return what came of it. Raises NoCut, also for what no knife does."""
         piece, plane = self.shown.plane(points)
         try:
-            parts = cut(self.trial.pieces[piece], plane, Knife())
+            bodies = cut(self.trial.pieces[piece], plane, Knife())
         except Refused as refused:
             raise NoCut(refused.failure.message) from None
-        numbers = self.trial.do(piece, plane, parts, GAP)
-        self._changed()
+        numbers = self.trial.do(piece, plane, bodies, GAP)
+        self._save()
         return f"piece {piece} became {', '.join(map(str, numbers))}"
 
     def undo(self) -> str:
@@ -86,7 +86,7 @@ class Session:
             raise NoCut("nothing was cut yet")
         last = self.trial.cuts.pop()
         del self.trial.pieces[-len(last.results) :]
-        self._changed()
+        self._save()
         return f"piece {last.piece} is whole again"
 
     def finish(self, category: CategoryName | None) -> str:
@@ -95,19 +95,19 @@ class Session:
             raise NoCut("nothing was cut yet")
         self.trial.finished = category is not None
         self.trial.categories = {} if category is None else dict.fromkeys(self.trial.final, category)
-        self._changed()
-        self._before.append(self._recorded())
-        said = f"kept: {len(self.trial.final)} {category or 'fragments, not finished'}"
+        self._save()
+        self._before.append(self._recorded_trial())
+        message = f"kept: {len(self.trial.final)} {category or 'fragments, not finished'}"
         self._seed += 1
         self._begin()
-        return said
+        return message
 
-    def _recorded(self) -> RecordedTrial:
+    def _recorded_trial(self) -> RecordedTrial:
         return RecordedTrial(food=self._food, seed=self._seed, trial=record_of(self.trial, training=True))
 
-    def _changed(self) -> None:
+    def _save(self) -> None:
         self.__dict__.pop("shown", None)
-        begun = [self._recorded()] if self.trial.cuts else []
+        begun = [self._recorded_trial()] if self.trial.cuts else []
         partial = self._path.with_name(f".{self._path.name}.partial")
         CuttingRecording(trials=(*self._before, *begun)).write(partial)
         os.replace(partial, self._path)

@@ -17,8 +17,11 @@ from scenewright.stages.cutting.thesis.model import FEATURES
 from scenewright.stages.cutting.world.body import Body
 
 EMBEDDING = 32
+"""Numbers of the embedding of a piece; by eye."""
 DISCOUNT, MARGIN = 0.95, 0.2
+"""Discount of a later cut, and the margin by which other pieces are worth less; by eye."""
 STEPS, BATCH = 600, 16
+"""Steps of the training and examples of a step; by eye."""
 POOL = 0.1
 """Sums over fragments are brought to the size of one of ten."""
 Rule = Literal["bc", "qnet"]
@@ -39,9 +42,9 @@ class ChoiceNetwork(torch.nn.Module):
 
     def values(self, z: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
         """Return a number for each fragment (N,), given those of the goal (G, 17)."""
-        state, wanted = self.pooled(z), self.pooled(goal)
-        both = torch.cat([state, wanted]).expand(len(z), -1)
-        return self.value(torch.cat([z, both], dim=1))[:, 0]
+        state, pooled_goal = self.pooled(z), self.pooled(goal)
+        state_and_goal = torch.cat([state, pooled_goal]).expand(len(z), -1)
+        return self.value(torch.cat([z, state_and_goal], dim=1))[:, 0]
 
 
 @dataclass(frozen=True)
@@ -63,15 +66,15 @@ def learn(corpus: Corpus, features: Features, rule: Rule, seed: int) -> ChoiceMo
     def loss(chosen: np.ndarray) -> torch.Tensor:
         choices = [corpus.choices[k] for k in chosen]
         which = torch.stack([of_choice(network, z, choice) for choice in choices]).mean()
-        given = torch.stack([_given(network, z[c.piece], z[list(c.goal)]) for c in choices])
+        plane_inputs = torch.stack([_plane_input(network, z[c.piece], z[list(c.goal)]) for c in choices])
         planes = torch.from_numpy(np.array([choice.plane for choice in choices], np.float32))
-        return which + network.planes.loss(given, planes)
+        return which + network.planes.loss(plane_inputs, planes)
 
     fit(network, loss, len(corpus.choices), random, steps=STEPS, batch=BATCH)
     return ChoiceModel(features, network, rule)
 
 
-def _given(network: ChoiceNetwork, z: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
+def _plane_input(network: ChoiceNetwork, z: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
     return torch.cat([z, network.pooled(goal)])
 
 
@@ -109,20 +112,20 @@ class ChoicePolicy:
     @torch.no_grad()
     def decide(self, board: Mapping[int, Body]) -> Action | Stop:
         """Return the next cut."""
-        new = [number for number in board if number not in self._known]
-        if new:
-            self._known |= dict(zip(new, self._features([board[n] for n in new]), strict=True))
+        new_numbers = [number for number in board if number not in self._known]
+        if new_numbers:
+            self._known |= dict(zip(new_numbers, self._features([board[n] for n in new_numbers]), strict=True))
         numbers = [number for number in board if number not in self._refused] or list(board)
         z = torch.stack([self._known[number] for number in numbers])
         values = self._model.network.values(z, self._goal)
         if self._model.rule == "bc":
             chances = torch.softmax(values, dim=0).numpy().astype(float)
-            place = int(self._random.choice(len(numbers), p=chances / chances.sum()))
+            chosen = int(self._random.choice(len(numbers), p=chances / chances.sum()))
         else:
-            place = int(values.argmax())
-        given = _given(self._model.network, z[place], self._goal).numpy()
-        plane = plane_out(board[numbers[place]], self._model.network.planes.draw(given, self._random))
-        return Action(numbers[place], plane, f"value {float(values[place]):.2f}")
+            chosen = int(values.argmax())
+        plane_input = _plane_input(self._model.network, z[chosen], self._goal).numpy()
+        plane = plane_out(board[numbers[chosen]], self._model.network.planes.draw(plane_input, self._random))
+        return Action(numbers[chosen], plane, f"value {float(values[chosen]):.2f}")
 
     def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
         """What was refused may be tried again."""

@@ -15,6 +15,7 @@ BETWEEN = 0.05
 ROW = 0.5
 """Length of a row, where all fragments are laid out together [m]."""
 UP = np.array([0.0, 0.0, 1.0])
+"""Direction up (3,)."""
 
 
 class Hand:
@@ -31,9 +32,9 @@ class Hand:
 
     def lay(self, board: dict[int, Body]) -> None:
         """Lay down the pieces that were not there before, in place, in one row."""
-        new = {number: body for number, body in board.items() if number not in self._known}
-        self._known |= set(new)
-        board |= self._at_rest(dict(zip(new, in_rows(list(new.values()), np.inf, BETWEEN), strict=True)))
+        new_bodies = {number: body for number, body in board.items() if number not in self._known}
+        self._known |= set(new_bodies)
+        board |= self._at_rest(dict(zip(new_bodies, in_rows(list(new_bodies.values()), np.inf, BETWEEN), strict=True)))
 
     def lay_out(self, bodies: Sequence[Body], gap: float = BETWEEN) -> list[Body]:
         """Return bodies as they come to rest, laid in rows this far apart [m]."""

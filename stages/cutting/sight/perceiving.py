@@ -36,14 +36,14 @@ class PerceivingPolicy:
         """Return the next cut, planned from what was seen."""
         if not self._seen:
             self._look(board)
-        there = {number: self._seen[number] for number in board if number in self._seen}
-        return self._ours.decide(there)
+        seen_board = {number: self._seen[number] for number in board if number in self._seen}
+        return self._ours.decide(seen_board)
 
     def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
         """Look at what came of a cut."""
         self._look(results)
-        seen = {number: self._seen[number] for number in results if number in self._seen}
-        self._ours.done(action, seen, above)
+        seen_results = {number: self._seen[number] for number in results if number in self._seen}
+        self._ours.done(action, seen_results, above)
 
     def refused(self, action: Action, failure: Failure) -> None:
         """Hear why the knife did not cut."""
@@ -51,12 +51,12 @@ class PerceivingPolicy:
 
     def _look(self, bodies: Mapping[int, Body]) -> None:
         """See bodies; which is which is known by where each was laid down."""
-        found = see(look(list(bodies.values()), self._random))
+        seen_bodies = see(look(list(bodies.values()), self._random))
         numbers = list(bodies)
-        if found:
+        if seen_bodies:
             places = np.array([body.moments[0] for body in bodies.values()])
-            off = np.linalg.norm(places[:, None] - np.array([body.moments[0] for body in found])[None], axis=2)
+            off = np.linalg.norm(places[:, None] - np.array([body.moments[0] for body in seen_bodies])[None], axis=2)
             for row, column in zip(*linear_sum_assignment(off), strict=True):
                 if off[row, column] < BETWEEN:
-                    self._seen[numbers[row]] = found[column]
+                    self._seen[numbers[row]] = seen_bodies[column]
         self.missed += sum(number not in self._seen for number in numbers)

@@ -27,8 +27,11 @@ from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 
 HINT = "a folder of color.png, depth.png and camera.json, or of such folders (docs/CUTTING.md)"
 MILLIMETRE = 0.001
+"""Unit of the depth in files [m]."""
 MOST_CAMERAS, MOST_PIXELS, LARGEST_CAMERA = 8, 10_000_000, 100_000
+"""Most cameras, most pixels of a picture, and the largest file of a camera [bytes]; by eye."""
 WOOD = np.array([196, 164, 124, 255], np.uint8)
+"""Colour (RGBA) of the board."""
 
 
 class CameraFile(Model):
@@ -45,22 +48,22 @@ def read_pictures(folder: Path) -> list[tuple[View, np.ndarray]]:
         raise BadInput(f"{folder}: holds no pictures", hint=HINT)
     if len(folders) > MOST_CAMERAS:
         raise BadInput(f"{folder}: pictures of {len(folders)} cameras, at most {MOST_CAMERAS}", hint=HINT)
-    return [_read(each) for each in folders]
+    return [_read_view(each) for each in folders]
 
 
-def _read(folder: Path) -> tuple[View, np.ndarray]:
+def _read_view(folder: Path) -> tuple[View, np.ndarray]:
     file = CameraFile.read(folder / "camera.json", largest=LARGEST_CAMERA, hint=HINT)
     camera, pose = file.camera, np.array(file.world_from_camera)
     if min(camera.width, camera.height) < 1 or camera.width * camera.height > MOST_PIXELS or camera.fx * camera.fy <= 0:
         raise BadInput(f"{folder / 'camera.json'}: this is no camera", hint=HINT)
     if not is_rigid(pose) or pose[2, 3] <= 0:
         raise BadInput(f"{folder / 'camera.json'}: world_from_camera is no pose over a board at z = 0", hint=HINT)
-    depth = _decoded(folder / "depth.png", np.dtype(np.uint16), 2, camera)
-    color = _decoded(folder / "color.png", np.dtype(np.uint8), 3, camera)
+    depth = _decode(folder / "depth.png", np.dtype(np.uint16), 2, camera)
+    color = _decode(folder / "color.png", np.dtype(np.uint8), 3, camera)
     return View(depth.astype(np.float32) * np.float32(MILLIMETRE), camera, pose), np.ascontiguousarray(color[..., ::-1])
 
 
-def _decoded(path: Path, kind: np.dtype, dimensions: int, camera: Camera) -> np.ndarray:
+def _decode(path: Path, kind: np.dtype, dimensions: int, camera: Camera) -> np.ndarray:
     data = file_content(path, LARGEST_SHOWN, hint=HINT)
     image = None
     if may_be_decoded(data):

@@ -22,9 +22,10 @@ FEWEST = 40
 LATTICE = 40
 """Steps along a fragment's longest edge, but none finer or coarser than these [m]."""
 FINEST, COARSEST = 0.0008, 0.0025
+"""Finest and coarsest step of the lattice that is carved [m]; by eye."""
 DOUBT = 0.15
-"""By which share of volume what two cameras see may be off: more than that which is wanted and that which is there
-differ by where nothing is left over."""
+"""Share of volume by which what two cameras see may be off. Where wanted and seen volume differ by less, nothing is
+left over or missing."""
 DOUBT_OF_ONE = 0.35
 """The same of one camera: undersides that it does not see are filled down to the board."""
 BLUR = 0.8
@@ -38,18 +39,18 @@ def see(views: Sequence[View]) -> list[Body]:
     """
     clouds = []
     for view in views:
-        seen = back_project(view.depth, view.camera)[view.depth > 0].astype(float)
-        points = apply(view.world_from_camera, seen)
+        in_camera = back_project(view.depth, view.camera)[view.depth > 0].astype(float)
+        points = apply(view.world_from_camera, in_camera)
         clouds.append(points[points[:, 2] > ABOVE])
     points = np.concatenate(clouds)
     if len(points) < FEWEST:
         return []
     which = clusters(points, APART)
     segments = [points[which == k] for k in range(int(which.max()) + 1)]
-    return [body for segment in segments if len(segment) >= FEWEST for body in _carved(segment, views)]
+    return [body for segment in segments if len(segment) >= FEWEST for body in _carve(segment, views)]
 
 
-def _carved(segment: np.ndarray, views: Sequence[View]) -> list[Body]:
+def _carve(segment: np.ndarray, views: Sequence[View]) -> list[Body]:
     """Return the bodies around a segment's points (N, 3): where flying pixels joined fragments, carving parts them."""
     low, high = segment.min(axis=0), segment.max(axis=0)
     low[2] = 0.0
@@ -64,11 +65,11 @@ def _carved(segment: np.ndarray, views: Sequence[View]) -> list[Body]:
     for axis in range(3):
         for end in (0, -1):
             np.moveaxis(field, axis, 0)[end] = -step
-    parts, _ = label(field > 0)
-    of_points = grey_dilation(parts, 3)[tuple(np.round((segment - low) / step).astype(int).T)]
+    components, _ = label(field > 0)
+    of_points = grey_dilation(components, 3)[tuple(np.round((segment - low) / step).astype(int).T)]
     bodies = []
     for number in np.flatnonzero(np.bincount(of_points, minlength=1)[1:] >= FEWEST) + 1:
-        alone = np.where((parts != number) & (field > 0), -1e-3 * step, field)
+        alone = np.where((components != number) & (field > 0), -1e-3 * step, field)
         vertices, faces = zero_surface(alone)
         bodies.append(Body.of_mesh(low + step * vertices, faces))
     return bodies

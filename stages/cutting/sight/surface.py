@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 
 _UNIT = np.eye(3, dtype=np.int64)
+"""Unit steps along the axes of the lattice."""
 _TETRAHEDRA = np.array(
     [[np.zeros(3, int), _UNIT[a], _UNIT[a] + _UNIT[b], np.ones(3, int)] for a, b, _ in permutations(range(3))]
 )
@@ -35,8 +36,8 @@ def zero_surface(field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mine = number[count == within]
         for triangle in pairs:
             edges.append(np.stack([mine[:, list(pair)] for pair in triangle], axis=1))
-    found = np.concatenate(edges)  # (F, 3, 2): each corner of a triangle lies on an edge, its inner end first
-    keys, faces = np.unique(found[..., 0] * field.size + found[..., 1], return_inverse=True)
+    corner_edges = np.concatenate(edges)  # (F, 3, 2): each corner of a triangle lies on an edge, its inner end first
+    keys, faces = np.unique(corner_edges[..., 0] * field.size + corner_edges[..., 1], return_inverse=True)
     unique, faces = np.stack(np.divmod(keys, field.size), axis=1), faces.reshape(-1, 3)
     ends = np.stack(np.unravel_index(unique, field.shape), axis=-1).astype(float)
     inner, outer = values.ravel()[unique[:, 0]], values.ravel()[unique[:, 1]]
@@ -50,3 +51,4 @@ def zero_surface(field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 _QUAD = (((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2)))
+"""The two triangles of a tetrahedron's section with four corners, by the edges that they lie on."""

@@ -15,14 +15,15 @@ from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
 from scenewright.stages.kit.rendering.depth_noise import disturb_depth
 
 WIDTH, HEIGHT, FOCAL = 1280, 720, 900.0
-"""Of the sensors [px]."""
+"""Size and focal length of the sensors [px]."""
 EYES = (np.array([0.32, 0.32, 0.45]), np.array([-0.32, -0.32, 0.45]))
-"""Where the cameras stand [m]: opposite each other and across the rows, so that both see the board's middle."""
+"""Places of the cameras [m]: opposite each other and across the rows, so that both see the board's middle."""
 FRAMES = 9
-"""That a camera takes of a board on which nothing moves; of each pixel the median counts."""
+"""Frames that a camera takes of a board on which nothing moves; of each pixel the median counts. By eye."""
 REFLECTANCE = 0.4
+"""Reflectance of all that is seen; by eye."""
 MARGIN = 14
-"""Of board around what lies there that is looked at [px]."""
+"""Width of board around what lies there that is looked at [px]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,13 @@ def look(bodies: Sequence[Body], random: np.random.Generator, eyes: Sequence[np.
 
 def _view(bodies: Sequence[Body], eye: np.ndarray, random: np.random.Generator) -> View:
     pose = look_at(eye, np.zeros(3))
-    whole = Camera(width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL, cx=0.5 * WIDTH - 0.5, cy=0.5 * HEIGHT - 0.5)
-    pixels, _ = project(np.concatenate([apply(inverse(pose), body.vertices) for body in bodies]), whole)
+    full_camera = Camera(width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL, cx=0.5 * WIDTH - 0.5, cy=0.5 * HEIGHT - 0.5)
+    pixels, _ = project(np.concatenate([apply(inverse(pose), body.vertices) for body in bodies]), full_camera)
     low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - MARGIN, 0)
     high = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + MARGIN, (WIDTH, HEIGHT))
     width, height = np.maximum(high - low, 16).tolist()
-    camera = whole.model_copy(
-        update={"width": width, "height": height, "cx": whole.cx - low[0], "cy": whole.cy - low[1]}
+    camera = full_camera.model_copy(
+        update={"width": width, "height": height, "cx": full_camera.cx - low[0], "cy": full_camera.cy - low[1]}
     )
     depth, cosine = _true_depth(bodies, camera, pose)
     even, matt = np.full(depth.shape, REFLECTANCE, np.float32), np.zeros(depth.shape, np.float32)

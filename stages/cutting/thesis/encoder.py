@@ -12,7 +12,9 @@ from scenewright.stages.cutting.world.body import Body
 from scenewright.stages.cutting.world.canonical import Canonical, canonical
 
 CODE = 16
+"""Numbers of a shape's code; widths are not stated in the thesis: by eye."""
 STEPS, BATCH = 800, 24
+"""Steps of the training and shapes of a step; not stated in the thesis: by eye."""
 
 
 class Encoder(torch.nn.Module):
@@ -77,6 +79,6 @@ class Features:
 
 @torch.no_grad()
 def _raw(encoder: Encoder, shapes: Sequence[Canonical]) -> np.ndarray:
-    seen = sampled(shapes)
-    code = encoder(torch.from_numpy(seen.surfaces)).numpy().astype(float)
-    return np.column_stack([code, np.log(seen.scales)])
+    samples = sampled(shapes)
+    code = encoder(torch.from_numpy(samples.surfaces)).numpy().astype(float)
+    return np.column_stack([code, np.log(samples.scales)])

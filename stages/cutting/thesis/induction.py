@@ -9,6 +9,7 @@ from scenewright.stages.cutting.corpus import Corpus
 from scipy.cluster.vq import kmeans2
 
 MOST_TYPES = 9
+"""Most types that are tried; by eye."""
 GAMMA = 0.28
 """Coefficient of the model's size in eq. 6.1, per production of the corpus. The thesis states neither its value nor its
 sign: with fewer types productions become likelier, so that a grammar of one type would win were it not positive. At
@@ -48,8 +49,8 @@ def induce(features: np.ndarray, corpus: Corpus, seed: int) -> tuple[Grammar, np
     best: tuple[float, Grammar, np.ndarray] | None = None
     for count in range(2, min(MOST_TYPES, len(features) // 3) + 1):
         centres, types = kmeans2(features, count, minit="++", seed=np.random.default_rng([seed, 2, count]), iter=100)
-        kept, types = np.unique(types, return_inverse=True)
-        grammar, likelihood = _counted(centres[kept], types, corpus)
+        types_used, types = np.unique(types, return_inverse=True)
+        grammar, likelihood = _count_rules(centres[types_used], types, corpus)
         score = likelihood + GAMMA * len(corpus.choices) * grammar.types
         if best is None or score > best[0]:
             best = score, grammar, types
@@ -62,13 +63,13 @@ def production_of(choice_piece: int, results: tuple[int, ...], types: np.ndarray
     return int(types[choice_piece]), tuple(sorted(int(types[k]) for k in results))
 
 
-def _counted(centres: np.ndarray, types: np.ndarray, corpus: Corpus) -> tuple[Grammar, float]:
-    seen: dict[tuple[int, tuple[int, ...]], int] = {}
+def _count_rules(centres: np.ndarray, types: np.ndarray, corpus: Corpus) -> tuple[Grammar, float]:
+    rule_counts: dict[tuple[int, tuple[int, ...]], int] = {}
     of_left: dict[int, int] = {}
     for choice in corpus.choices:
         key = production_of(choice.piece, choice.results, types)
-        seen[key] = seen.get(key, 0) + 1
+        rule_counts[key] = rule_counts.get(key, 0) + 1
         of_left[key[0]] = of_left.get(key[0], 0) + 1
-    rules = tuple(Production(left, right, n / of_left[left]) for (left, right), n in sorted(seen.items()))
-    likelihood = sum(n * np.log(n / of_left[left]) for (left, _), n in seen.items())
+    rules = tuple(Production(parent, right, n / of_left[parent]) for (parent, right), n in sorted(rule_counts.items()))
+    likelihood = sum(n * np.log(n / of_left[parent]) for (parent, _), n in rule_counts.items())
     return Grammar(centres, rules), float(likelihood)

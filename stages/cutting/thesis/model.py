@@ -14,6 +14,7 @@ from scenewright.stages.cutting.thesis.encoder import CODE, Features, train_enco
 from scenewright.stages.cutting.thesis.induction import Grammar, induce, production_of
 
 FEATURES = CODE + 1
+"""Numbers of a piece: its shape's code and the logarithm of its size."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,10 @@ def learn_grammar(corpus: Corpus, features: Features, seed: int) -> ThesisModel:
     grammar, types = induce(z, corpus, seed)
     random = seeded(seed, 3)
     classifier = layers(FEATURES, 64, grammar.types)
-    inputs, wanted = torch.from_numpy(z.astype(np.float32)), torch.from_numpy(types.astype(np.int64))
+    inputs, target_types = torch.from_numpy(z.astype(np.float32)), torch.from_numpy(types.astype(np.int64))
 
     def classify(chosen: np.ndarray) -> torch.Tensor:
-        return torch.nn.functional.cross_entropy(classifier(inputs[chosen]), wanted[chosen])
+        return torch.nn.functional.cross_entropy(classifier(inputs[chosen]), target_types[chosen])
 
     fit(classifier, classify, len(z), random, steps=500, batch=64)
     planes = MixtureOfPlanes(len(grammar.productions) + FEATURES)
@@ -63,7 +64,7 @@ def learn_grammar(corpus: Corpus, features: Features, seed: int) -> ThesisModel:
         model.given(numbers[production_of(choice.piece, choice.results, types)], z[choice.piece])
         for choice in corpus.choices
     ]
-    given = torch.from_numpy(np.array(rows, np.float32))
-    shown = torch.from_numpy(np.array([choice.plane for choice in corpus.choices], np.float32))
-    fit(planes, lambda k: planes.loss(given[k], shown[k]), len(rows), random, steps=800, batch=64)
+    plane_inputs = torch.from_numpy(np.array(rows, np.float32))
+    planes_shown = torch.from_numpy(np.array([choice.plane for choice in corpus.choices], np.float32))
+    fit(planes, lambda k: planes.loss(plane_inputs[k], planes_shown[k]), len(rows), random, steps=800, batch=64)
     return model

@@ -26,17 +26,17 @@ class ThesisPolicy:
 
     def decide(self, board: Mapping[int, Body]) -> Action | Stop:
         """Return a cut of the best parse tree that is found; after a refusal too, with planes drawn anew."""
-        new = [number for number in board if number not in self._known]
-        if new:
-            self._known |= dict(zip(new, self._model.features.of([board[n] for n in new]), strict=True))
+        new_numbers = [number for number in board if number not in self._known]
+        if new_numbers:
+            self._known |= dict(zip(new_numbers, self._model.features.of([board[n] for n in new_numbers]), strict=True))
         numbers = list(board)
         tree = self._search.best(np.exp(self._model.log_types(np.array([self._known[n] for n in numbers]))))
-        cuts = [(place, tree.rules[place]) for place in range(len(numbers)) if place in tree.rules]
+        cuts = [(leaf, tree.rules[leaf]) for leaf in range(len(numbers)) if leaf in tree.rules]
         if not cuts:
             message = "no production of the grammar cuts any of the fragments"
             return Stop(Failure(kind="no_production", message=message))
-        place, rule = cuts[int(self._random.integers(len(cuts)))]
-        piece = numbers[place]
+        leaf, rule = cuts[int(self._random.integers(len(cuts)))]
+        piece = numbers[leaf]
         values = self._model.planes.draw(self._model.given(rule, self._known[piece]), self._random)
         production = self._model.grammar.productions[rule]
         return Action(

@@ -12,11 +12,13 @@ from scipy.optimize import linear_sum_assignment
 ROUNDS = 160
 """Rollouts a decision; the thesis does not say."""
 EXPLORATION = 0.7
+"""Weight of exploration; by eye."""
 ANNEALED = 6
 """Rollouts, the best by prior and shapes, that are annealed for the layout: all of them would take minutes a cut."""
 SWAPS = 60
+"""Swaps of an annealing of the layout; by eye."""
 UNMATCHED = math.log(1e-4)
-"""For a terminal without a fragment, or a fragment without a terminal."""
+"""Logarithm of the likelihood of a terminal without a fragment, or a fragment without a terminal; by eye."""
 
 
 @dataclass
@@ -43,10 +45,10 @@ class ParseTree:
         production = grammar.productions[rule]
         first = len(self.kinds)
         self.kinds += production.right
-        new = tuple(range(first, len(self.kinds)))
-        self.rules[leaf], self.children[leaf] = rule, new
+        new_leaves = tuple(range(first, len(self.kinds)))
+        self.rules[leaf], self.children[leaf] = rule, new_leaves
         self.leaves.remove(leaf)
-        self.leaves += new
+        self.leaves += new_leaves
         self.log_prior += math.log(production.chance)
 
 
@@ -72,7 +74,7 @@ class Search:
     def best(self, chances: np.ndarray) -> ParseTree:
         """Return the best tree found over fragments whose types have these chances (N, K)."""
         roots: dict[tuple[int, ...], _Node] = {}
-        found: list[tuple[float, int, ParseTree]] = []
+        valued: list[tuple[float, int, ParseTree]] = []
         low, high = math.inf, -math.inf
         cumulated = chances.cumsum(axis=1)
         for number in range(ROUNDS):
@@ -87,8 +89,8 @@ class Search:
             for node in path:
                 node.visits += 1
                 node.total += value
-            found.append((value, -number, tree))
-        finalists = sorted(found, key=lambda entry: entry[:2], reverse=True)[:ANNEALED]
+            valued.append((value, -number, tree))
+        finalists = sorted(valued, key=lambda entry: entry[:2], reverse=True)[:ANNEALED]
         return max(finalists, key=lambda entry: entry[0] + self._layout(entry[2]))[2]
 
     def _node(self, tree: ParseTree) -> _Node:
@@ -163,14 +165,14 @@ class Search:
 
     def _energy(self, tree: ParseTree, places: dict[int, np.ndarray]) -> float:
         """Return the sum of distances [m] of nodes to the node that they came from, each the mean of its fragments."""
-        means: dict[int, tuple[np.ndarray, int]] = {leaf: (place, 1) for leaf, place in places.items()}
+        means: dict[int, tuple[np.ndarray, int]] = {leaf: (position, 1) for leaf, position in places.items()}
         total = 0.0
         for node in sorted(tree.children, reverse=True):  # children have greater numbers: from below
-            parts = [means[child] for child in tree.children[node] if child in means]
-            if not parts:
+            child_means = [means[child] for child in tree.children[node] if child in means]
+            if not child_means:
                 continue
-            count = sum(n for _, n in parts)
-            middle = sum((mean * n for mean, n in parts), np.zeros(3)) / count
+            count = sum(n for _, n in child_means)
+            middle = sum((mean * n for mean, n in child_means), np.zeros(3)) / count
             means[node] = middle, count
-            total += sum(float(np.linalg.norm(mean - middle)) for mean, _ in parts)
+            total += sum(float(np.linalg.norm(mean - middle)) for mean, _ in child_means)
         return total

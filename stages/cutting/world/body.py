@@ -120,8 +120,8 @@ def pieces(solid: manifold3d.Manifold) -> list[Body]:
     """Return the connected pieces of a solid, largest first."""
     if solid.is_empty():
         return []
-    parts = [Body(part) for part in solid.decompose()]
-    return sorted(parts, key=lambda body: -body.volume)
+    bodies = [Body(part) for part in solid.decompose()]
+    return sorted(bodies, key=lambda body: -body.volume)
 
 
 def unite(bodies: Sequence[Body]) -> list[Body]:

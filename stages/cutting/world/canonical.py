@@ -10,7 +10,7 @@ from scenewright.stages.cutting.world.voxels import Grid, occupancy
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
 
 OCTANT_VOXELS = 24
-"""Along the longest edge, to tell which octant holds most."""
+"""Voxels along the longest edge, by which the octant that holds most is told; by eye."""
 TURNS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 """Signs of the axes that keep the frame right-handed."""
 
@@ -69,8 +69,8 @@ def axis_across(body: Body, normal: np.ndarray) -> int:
 
 
 def _octant(filled: np.ndarray, middle: np.ndarray, signs: np.ndarray) -> int:
-    parts = tuple(slice(m, None) if s > 0 else slice(0, m) for m, s in zip(middle, signs, strict=True))
-    return int(filled[parts].sum())
+    half_spaces = tuple(slice(m, None) if s > 0 else slice(0, m) for m, s in zip(middle, signs, strict=True))
+    return int(filled[half_spaces].sum())
 
 
 def box_edges(covariance: np.ndarray) -> np.ndarray:

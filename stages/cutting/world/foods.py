@@ -47,28 +47,29 @@ FAMILIES: dict[str, Family] = {
     "bread": Family((0.14, 0.22), (0.05, 0.075), flatness=(1.1, 1.5), profile=_blunt(7.0), squareness=3.5),
     "cheese": Family((0.08, 0.14), (0.035, 0.055), (1.1, 1.6), _blunt(20.0), squareness=10.0, roughness=0.004),
 }
+"""Family -> lengths, thicknesses and shapes from which a food is drawn [m]; by eye."""
 
 
 def make_food(family: str, random: np.random.Generator) -> Body:
     """Return a food of a family, its spine along z, centred."""
-    made = FAMILIES[family]
-    length, thickness = random.uniform(*made.length), random.uniform(*made.thickness)
-    wide, bend = thickness * random.uniform(*made.flatness), random.uniform(*made.bend)
+    kind = FAMILIES[family]
+    length, thickness = random.uniform(*kind.length), random.uniform(*kind.thickness)
+    wide, bend = thickness * random.uniform(*kind.flatness), random.uniform(*kind.bend)
     # Rings stand closer where the profile falls off, so that blunt ends are round.
     t = np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, RINGS + 2)[1:-1])
-    share = made.profile(t)
+    share = kind.profile(t)
     angle = 2.0 * np.pi * np.arange(POINTS) / POINTS
-    outline = (np.abs(np.cos(angle)) ** made.squareness + np.abs(np.sin(angle)) ** made.squareness) ** (
-        -1.0 / made.squareness
+    outline = (np.abs(np.cos(angle)) ** kind.squareness + np.abs(np.sin(angle)) ** kind.squareness) ** (
+        -1.0 / kind.squareness
     )
-    radius = share[:, None] * outline * (1.0 + made.roughness * _waves(t, angle, random))
+    radius = share[:, None] * outline * (1.0 + kind.roughness * _waves(t, angle, random))
     x = 0.5 * thickness * radius * np.cos(angle)
     y = 0.5 * wide * radius * np.sin(angle)
     z = np.repeat(0.5 * length * t[:, None], POINTS, axis=1)
     rings = np.stack([x, y, z], axis=-1)
     poles = np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]])
     vertices = np.concatenate([rings.reshape(-1, 3), poles])
-    body = Body.of_mesh(_bent(vertices, length, bend), _faces())
+    body = Body.of_mesh(_bend(vertices, length, bend), _faces())
     return body.shifted(-body.moments[0])
 
 
@@ -83,7 +84,7 @@ def _waves(t: np.ndarray, angle: np.ndarray, random: np.random.Generator) -> np.
     return np.asarray(total / np.sqrt(3.0))
 
 
-def _bent(vertices: np.ndarray, length: float, angle: float) -> np.ndarray:
+def _bend(vertices: np.ndarray, length: float, angle: float) -> np.ndarray:
     """Return vertices (V, 3) with the z axis bent to an arc in the plane y, z."""
     if angle < 1e-3:
         return vertices
@@ -94,14 +95,14 @@ def _bent(vertices: np.ndarray, length: float, angle: float) -> np.ndarray:
 
 
 def _faces() -> np.ndarray:
-    here = np.arange(POINTS)
-    ahead = (here + 1) % POINTS
+    around = np.arange(POINTS)
+    ahead = (around + 1) % POINTS
     faces = []
     for ring in range(RINGS - 1):
         low, high = ring * POINTS, (ring + 1) * POINTS
-        faces += [np.column_stack([low + here, low + ahead, high + ahead])]
-        faces += [np.column_stack([low + here, high + ahead, high + here])]
+        faces += [np.column_stack([low + around, low + ahead, high + ahead])]
+        faces += [np.column_stack([low + around, high + ahead, high + around])]
     south, north, last = RINGS * POINTS, RINGS * POINTS + 1, (RINGS - 1) * POINTS
-    faces += [np.column_stack([np.full(POINTS, south), ahead, here])]
-    faces += [np.column_stack([np.full(POINTS, north), last + here, last + ahead])]
+    faces += [np.column_stack([np.full(POINTS, south), ahead, around])]
+    faces += [np.column_stack([np.full(POINTS, north), last + around, last + ahead])]
     return np.concatenate(faces)

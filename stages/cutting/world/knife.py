@@ -31,7 +31,7 @@ class Refused(Exception):
         self.failure = failure
 
 
-def _refused(kind: str, message: str, **numbers: float) -> Refused:
+def _refusal(kind: str, message: str, **numbers: float) -> Refused:
     return Refused(Failure(kind=kind, message=message, numbers=numbers))
 
 
@@ -45,7 +45,7 @@ def cut(body: Body, plane: Plane, knife: Knife) -> list[Body]:
     low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
     longest = float((high - low).max())
     if longest < knife.smallest:
-        raise _refused(
+        raise _refusal(
             "held_too_small",
             f"the fragment is {1e3 * longest:.1f} mm long, what is shorter than {1e3 * knife.smallest:.1f} mm "
             "cannot be held",
@@ -54,10 +54,10 @@ def cut(body: Body, plane: Plane, knife: Knife) -> list[Body]:
         )
     if above <= 0.0 or below <= 0.0:
         by = -min(above, below)
-        raise _refused("plane_misses", f"the plane misses the fragment by {1e3 * by:.1f} mm", by=by)
+        raise _refusal("plane_misses", f"the plane misses the fragment by {1e3 * by:.1f} mm", by=by)
     thinner = min(above, below)
     if thinner < knife.thinnest:
-        raise _refused(
+        raise _refusal(
             "sliver",
             f"the plane leaves a sliver of {1e3 * thinner:.2f} mm, the thinnest is {1e3 * knife.thinnest:.1f} mm",
             thickness=thinner,
@@ -65,14 +65,14 @@ def cut(body: Body, plane: Plane, knife: Knife) -> list[Body]:
         )
     long, wide = face_edges(body.section(plane))
     if long > knife.length:
-        raise _refused(
+        raise _refusal(
             "blade_too_short",
             f"the cut face is {1e3 * long:.0f} mm long, the blade {1e3 * knife.length:.0f} mm",
             face=long,
             blade=knife.length,
         )
     if wide > knife.height:
-        raise _refused(
+        raise _refusal(
             "blade_too_low",
             f"the cut face is at least {1e3 * wide:.0f} mm high, the blade {1e3 * knife.height:.0f} mm",
             face=wide,

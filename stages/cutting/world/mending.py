@@ -16,6 +16,7 @@ from scenewright.stages.kit.formats.mesh_files import read_mesh
 LONGEST, SHORTEST = 1.0, 0.004
 """Edge of what lies on a board [m]."""
 MOST_FACES = 200_000
+"""Most triangles of a mesh that is cut; by eye."""
 UNLIKE = 0.05
 """Share by which the volume that faces enclose may differ from the space inside: overlaps count twice."""
 LATTICE = 64
@@ -34,7 +35,7 @@ def read_body(path: Path, unit: Literal["m", "mm"]) -> tuple[Body, list[str]]:
     if unit == "mm":
         mesh.apply_scale(1e-3)
     _check_size(float(np.ptp(mesh.vertices, axis=0).max()), path, unit)
-    body, mended = _closed(mesh, path)
+    body, mended = _close(mesh, path)
     inside = _space_inside(body)
     if abs(inside - body.volume) > UNLIKE * max(inside, body.volume):
         raise BadInput(
@@ -64,29 +65,29 @@ def _check_size(longest: float, path: Path, unit: str) -> None:
         raise BadInput(f"{path}: {1e3 * longest:.2f} mm long, at least {1e3 * SHORTEST:.0f} mm are cut", hint=hint)
 
 
-def _closed(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
+def _close(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
     mended = []
-    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)  # files like STL repeat vertices: not a fault
-    whole.update_faces(whole.nondegenerate_faces() & whole.unique_faces())
-    if not whole.is_watertight:
-        whole.fill_holes()
-        if not whole.is_watertight:
-            edges = len(trimesh.grouping.group_rows(whole.edges_sorted, require_count=1))
+    merged = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)  # files like STL repeat vertices: not a fault
+    merged.update_faces(merged.nondegenerate_faces() & merged.unique_faces())
+    if not merged.is_watertight:
+        merged.fill_holes()
+        if not merged.is_watertight:
+            edges = len(trimesh.grouping.group_rows(merged.edges_sorted, require_count=1))
             raise BadInput(f"{path}: open: {edges} edges have one face", hint="close it in a mesh editor")
         mended.append("holes filled")
-    if not whole.is_winding_consistent or whole.volume < 0:
-        trimesh.repair.fix_normals(whole)
+    if not merged.is_winding_consistent or merged.volume < 0:
+        trimesh.repair.fix_normals(merged)
         mended.append("faces turned outwards")
-    parts = whole.split(only_watertight=False)
+    components = merged.split(only_watertight=False)
     try:
-        if len(parts) == 1:
-            return Body.of_mesh(whole.vertices, whole.faces), mended
-        united = unite([Body.of_mesh(part.vertices, part.faces) for part in parts])
+        if len(components) == 1:
+            return Body.of_mesh(merged.vertices, merged.faces), mended
+        united = unite([Body.of_mesh(part.vertices, part.faces) for part in components])
     except ValueError as error:
         raise BadInput(f"{path}: no closed body: {error}", hint="repair it in a mesh editor") from None
     if len(united) > 1:
         raise BadInput(f"{path}: {len(united)} bodies that do not hang together", hint="give them one by one")
-    return united[0], [*mended, f"{len(parts)} bodies that pass through each other united"]
+    return united[0], [*mended, f"{len(components)} bodies that pass through each other united"]
 
 
 def read_bodies_of(folder: Path, unit: Literal["m", "mm"]) -> tuple[list[Body], list[str]]:
@@ -95,5 +96,7 @@ def read_bodies_of(folder: Path, unit: Literal["m", "mm"]) -> tuple[list[Body], 
     paths = [folder] if folder.is_file() else sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
     if not paths:
         raise BadInput(f"{folder}: holds no meshes", hint=f"known: {', '.join(SUFFIXES)}")
-    read = [(path, *read_body(path, unit)) for path in paths]
-    return [body for _, body, _ in read], [f"{path.name}: {text}" for path, _, mended in read for text in mended]
+    bodies_read = [(path, *read_body(path, unit)) for path in paths]
+    return [body for _, body, _ in bodies_read], [
+        f"{path.name}: {text}" for path, _, mended in bodies_read for text in mended
+    ]

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 MARGIN = 1e-4
-"""Of a voxel: middles of columns are set off from where vertices of regular meshes lie."""
+"""Share of a voxel by which middles of columns are set off from where vertices of regular meshes lie."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def occupancy(vertices: np.ndarray, faces: np.ndarray, grid: Grid) -> np.ndarray
 
 
 @numba.njit(cache=True)
-def _left(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> bool:
+def _is_left_of(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> bool:
     """Whether (x, y) is left of a -> b; the same answer for both triangles of an edge."""
     if ax < bx or (ax == bx and ay < by):
         return bool((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0.0)
@@ -61,8 +61,8 @@ def _fill(vertices: np.ndarray, faces: np.ndarray, low: np.ndarray, voxel: float
             x = low[0] + voxel * i
             for j in range(first_y, last_y + 1):
                 y = low[1] + voxel * j
-                ab = _left(a[0], a[1], b[0], b[1], x, y)
-                if _left(b[0], b[1], c[0], c[1], x, y) != ab or _left(c[0], c[1], a[0], a[1], x, y) != ab:
+                ab = _is_left_of(a[0], a[1], b[0], b[1], x, y)
+                if _is_left_of(b[0], b[1], c[0], c[1], x, y) != ab or _is_left_of(c[0], c[1], a[0], a[1], x, y) != ab:
                     continue
                 of_b = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / doubled
                 of_c = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / doubled

@@ -43,29 +43,29 @@ _BETWEEN = {
 def say(predicate: Predicate) -> str:
     """Return what a predicate means, as a sentence."""
     objects = f" ({', '.join(letter[1:] for letter in predicate.variables)})" if predicate.arguments else ""
-    return f"{predicate.name}{objects}: {_said(predicate.means)}."
+    return f"{predicate.name}{objects}: {_say_tree(predicate.means)}."
 
 
-def _said(tree: Tree | str | float) -> str:
+def _say_tree(tree: Tree | str | float) -> str:
     if isinstance(tree, float):
         return f"{tree:.4g}"
     if isinstance(tree, str):
         return tree.removeprefix("?")
-    head, parts = str(tree[0]), tree[1:]
+    head, operands = str(tree[0]), tree[1:]
     if head in ("and", "or"):
-        return f" {head} ".join(_said(part) if _simple(part) else f"({_said(part)})" for part in parts)
+        return f" {head} ".join(_say_tree(part) if _simple(part) else f"({_say_tree(part)})" for part in operands)
     if head == "not":
-        return f"it is not so that {_said(parts[0])}"
+        return f"it is not so that {_say_tree(operands[0])}"
     if head in ("some", "every"):
         start = "there is another object" if head == "some" else "for every other object"
-        return f"{start} {_said(parts[0])} {'with' if head == 'some' else 'holds'}: {_said(parts[1])}"
+        return f"{start} {_say_tree(operands[0])} {'with' if head == 'some' else 'holds'}: {_say_tree(operands[1])}"
     if head in _BETWEEN:
-        return f"{_said(parts[0])} {_BETWEEN[head]} {_said(parts[1])}"
+        return f"{_say_tree(operands[0])} {_BETWEEN[head]} {_say_tree(operands[1])}"
     if head == "abs":
-        return f"the size of ({_said(parts[0])})"
+        return f"the size of ({_say_tree(operands[0])})"
     if head in _NAMES:
-        return f"{_NAMES[head]} of {_said(parts[0])}" if parts else _NAMES[head]
-    return f"{head}({', '.join(_said(part) for part in parts)})"
+        return f"{_NAMES[head]} of {_say_tree(operands[0])}" if operands else _NAMES[head]
+    return f"{head}({', '.join(_say_tree(part) for part in operands)})"
 
 
 def _simple(tree: Tree | str | float) -> bool:

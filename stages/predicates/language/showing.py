@@ -24,8 +24,8 @@ def domain_lines(file: LearnedDomainFile, operators: Domain) -> Iterator[str]:
     yield "Goals"
     for goal in file.goals:
         phrase = file.phrases[goal.phrase]
-        named = ", ".join(f"<{place + 1}>" for place in goal.places)
-        yield f"  {goal.text!r} wants {phrase.predicate}({named})"
+        places_text = ", ".join(f"<{index + 1}>" for index in goal.places)
+        yield f"  {goal.text!r} wants {phrase.predicate}({places_text})"
     if file.disbelieved:
         yield ""
         yield "No longer believed"
@@ -34,33 +34,33 @@ def domain_lines(file: LearnedDomainFile, operators: Domain) -> Iterator[str]:
 
 def example_lines(file: LearnedDomainFile, name: str) -> Iterator[str]:
     """Yield a predicate and every labelled example behind it. Raises UsageError when there is none of that name."""
-    found = [each for each in file.predicates if each.name == name]
-    if not found:
+    of_name = [each for each in file.predicates if each.name == name]
+    if not of_name:
         names = ", ".join(each.name for each in file.predicates)
         raise UsageError(f"there is no predicate {name!r}", hint=f"choose of {names}")
-    yield from _predicate_lines(file, found[0])
-    yield f"    {found[0].means}"
-    for phrase in _heard(file, found[0]):
+    yield from _predicate_lines(file, of_name[0])
+    yield f"    {of_name[0].means}"
+    for phrase in _phrases_of(file, of_name[0]):
         for example in phrase.examples:
             of = f" of {', '.join(example.objects)}" if example.objects else ""
             yield f"    {'holds' if example.holds else 'fails'}{of} in state {example.state}: {_reason(file, example)}"
 
 
 def _reason(file: LearnedDomainFile, example: LabelledExample) -> str:
-    said = example.source in ("sentence", "answer") and example.turn < len(file.dialogue)
-    return f"{example.source}, {file.dialogue[example.turn].text!r}" if said else example.source
+    in_dialogue = example.source in ("sentence", "answer") and example.turn < len(file.dialogue)
+    return f"{example.source}, {file.dialogue[example.turn].text!r}" if in_dialogue else example.source
 
 
-def _heard(file: LearnedDomainFile, predicate: LearnedPredicate) -> list[HeardPhrase]:
+def _phrases_of(file: LearnedDomainFile, predicate: LearnedPredicate) -> list[HeardPhrase]:
     return [phrase for phrase in file.phrases if phrase.predicate == predicate.name]
 
 
 def _predicate_lines(file: LearnedDomainFile, predicate: LearnedPredicate) -> Iterator[str]:
     yield f"  {predicate.said}"
-    heard = _heard(file, predicate)
-    if not heard:
+    phrases = _phrases_of(file, predicate)
+    if not phrases:
         yield "    given"
-    for phrase in heard:
+    for phrase in phrases:
         holds = sum(example.holds for example in phrase.examples)
         yield f"    heard: {phrase.text!r}; examples: {holds} for, {len(phrase.examples) - holds} against"
 

@@ -24,11 +24,11 @@ def candidates(
     phrase: Phrase, margins: Mapping[str, Sequence[float]], setting: Setting = KITCHEN
 ) -> list[tuple[float, Tree]]:
     """Return meanings (cost, expression), cheapest first; `margins` are thresholds that the labels suggest."""
-    found: dict[Tree, float] = {}
-    for tree, uses, extra, side in _proposed(phrase, margins, setting):
+    cost_of_tree: dict[Tree, float] = {}
+    for tree, uses, extra, side in _propose(phrase, margins, setting):
         cost = size_of(tree) + extra + _mismatch(phrase, uses) + (OTHER_SIDE if side < 0 else 0.0)
-        found[tree] = min(cost, found.get(tree, cost))
-    return sorted(((cost, tree) for tree, cost in found.items()), key=lambda entry: (entry[0], str(entry[1])))
+        cost_of_tree[tree] = min(cost, cost_of_tree.get(tree, cost))
+    return sorted(((cost, tree) for tree, cost in cost_of_tree.items()), key=lambda entry: (entry[0], str(entry[1])))
 
 
 def _mismatch(phrase: Phrase, uses: set[str]) -> float:
@@ -48,7 +48,7 @@ Proposed = Iterator[tuple[Tree, set[str], float, int]]
 """Expression, perceptions it uses, costs of its own, and side: -1 when it contradicts the phrase's negation."""
 
 
-def _proposed(phrase: Phrase, margins: Mapping[str, Sequence[float]], setting: Setting) -> Proposed:
+def _propose(phrase: Phrase, margins: Mapping[str, Sequence[float]], setting: Setting) -> Proposed:
     sided = 1 if phrase.denies else -1
     for tree, uses in _relations(phrase.arguments, setting):
         yield tree, uses, 0.0, sided
@@ -67,17 +67,17 @@ def _proposed(phrase: Phrase, margins: Mapping[str, Sequence[float]], setting: S
         for name, measure in setting.measures.items():
             for tree, used, extra in _comparisons(name, (name, variable), measure, phrase, margins):
                 yield tree, used, extra + unspoken, _side(tree, phrase, setting)
-        named = [f"category:{name}" for name in setting.categories if f"category:{name}" in phrase.concepts]
+        categories = [f"category:{name}" for name in setting.categories if f"category:{name}" in phrase.concepts]
         for name in setting.categories:
             tree = ("is", ("category", variable), name)
             yield tree, {f"category:{name}"}, unspoken, sided
             yield ("not", tree), {f"category:{name}"}, unspoken, -sided
-        if len(named) > 1:
-            parts = tuple(("is", ("category", variable), name.removeprefix("category:")) for name in named)
+        if len(categories) > 1:
+            memberships = tuple(("is", ("category", variable), name.removeprefix("category:")) for name in categories)
             # A list that was said costs its length, not all its words.
-            discount = size_of(("or", *parts)) - 2.0 - len(named)
-            yield ("or", *parts), set(named), unspoken - discount, sided
-            yield ("not", ("or", *parts)), set(named), unspoken - discount, -sided
+            discount = size_of(("or", *memberships)) - 2.0 - len(categories)
+            yield ("or", *memberships), set(categories), unspoken - discount, sided
+            yield ("not", ("or", *memberships)), set(categories), unspoken - discount, -sided
 
 
 def _side(tree: Tree, phrase: Phrase, setting: Setting) -> int:
@@ -102,9 +102,9 @@ def _comparisons(
         bounds.append(((measure.bound[0],), measure.bound[1], 0.0))
     bounds += [(value, frozenset(), OWN_NUMBER) for value in margins.get(name, ())]
     preference = 0.0 if name != "height" else 0.25  # of two measures that fit as well, the fingers' own comes first
-    for bound, more, extra in bounds:
-        yield ("less", call, bound), set(measure.uses | more), extra + preference
-        yield ("at_most", bound, call), set(measure.uses | more), extra + preference
+    for bound, uses_of_bound, extra in bounds:
+        yield ("less", call, bound), set(measure.uses | uses_of_bound), extra + preference
+        yield ("at_most", bound, call), set(measure.uses | uses_of_bound), extra + preference
 
 
 def _relations(arguments: int, setting: Setting) -> Iterator[tuple[Tree, set[str]]]:
@@ -127,7 +127,7 @@ def _relations(arguments: int, setting: Setting) -> Iterator[tuple[Tree, set[str
             yield ("some", "?x", (name, "?x", "?a")), uses | {"other"}
             yield ("some", "?x", (name, "?a", "?x")), uses | {"other"}
     if arguments == 2 and setting.boxes:
-        for one, two in combinations(
+        for first, second in combinations(
             (
                 ("near", ("bottom", "?a"), ("top", "?b")),
                 ("less", ("left", "?a"), ("right", "?b")),
@@ -137,4 +137,4 @@ def _relations(arguments: int, setting: Setting) -> Iterator[tuple[Tree, set[str
             ),
             2,
         ):
-            yield ("and", one, two), {"place"}
+            yield ("and", first, second), {"place"}

@@ -58,25 +58,25 @@ class Memory:
         """Return the predicate of every phrase; phrases that mean the same have the same."""
         by_meaning: dict[Tree, str] = {each.means: name for name, each in self.setting.given.items()}
         by_meaning |= {(name, *each.variables): name for name, each in self.setting.given.items()}
-        taken = set(self.setting.given)
-        found = {}
+        used_names = set(self.setting.given)
+        name_of_phrase = {}
         for phrase, means in self.meanings.items():
             if means not in by_meaning:
                 name = phrase.name
-                while name in taken:
+                while name in used_names:
                     name += "_too"
                 by_meaning[means] = name
-                taken.add(name)
-            found[phrase] = by_meaning[means]
-        return found
+                used_names.add(name)
+            name_of_phrase[phrase] = by_meaning[means]
+        return name_of_phrase
 
     def predicates(self) -> dict[str, Predicate]:
         """Return what was learned, with the given predicates that it uses."""
-        found = dict(self.setting.given)
+        by_name = dict(self.setting.given)
         for phrase, name in self.names().items():
-            if name not in found:
-                found[name] = Predicate(name, phrase.arguments, self.meanings[phrase])
-        return found
+            if name not in by_name:
+                by_name[name] = Predicate(name, phrase.arguments, self.meanings[phrase])
+        return by_name
 
     def used(self) -> dict[str, int]:
         """Return the predicates that plans are made with: those of phrases, and of the worked example."""
@@ -89,24 +89,24 @@ class Memory:
 
     def preconditions(self) -> dict[str, frozenset[Atom]]:
         """Return what the teacher named for each action."""
-        names, found = self.names(), defaultdict(set)
+        names, atoms_of_action = self.names(), defaultdict(set)
         for action, phrase, variables in self.stated:
             if phrase in names:
-                found[action].add((names[phrase], *variables))
-        return {action: frozenset(atoms) for action, atoms in found.items()}
+                atoms_of_action[action].add((names[phrase], *variables))
+        return {action: frozenset(atoms) for action, atoms in atoms_of_action.items()}
 
     def domain(self, name: str, actions: int | None = None) -> Domain:
         """Return the operators learned from scratch from all that was seen, or from the first `actions` alone."""
         predicates, used = self.predicates(), self.used()
-        seen = self.transitions[:actions]
-        wanted = {each.before for each in seen} | {each.after for each in seen}
+        transitions = self.transitions[:actions]
+        states_needed = {each.before for each in transitions} | {each.after for each in transitions}
         nothing: frozenset[Atom] = frozenset()
         atoms = [
-            Evaluator(state, predicates).atoms(used) if number in wanted else nothing
+            Evaluator(state, predicates).atoms(used) if number in states_needed else nothing
             for number, state in enumerate(self.states)
         ]
         apart = self.setting.tells_apart
-        return learn_operators(name, used, seen, atoms, self.preconditions(), apart)
+        return learn_operators(name, used, transitions, atoms, self.preconditions(), apart)
 
     def goal_atoms(self, parts: list[tuple[str, tuple[str, ...]]]) -> tuple[frozenset[Atom], tuple[str, ...]]:
         """Return what a goal sentence's parts want, and the parts that nobody has explained."""
@@ -117,5 +117,5 @@ class Memory:
                 unknown.append(part)
             for phrase, places in self.goals.get(part, []):
                 if phrase in names:
-                    atoms.add((names[phrase], *(objects[place] for place in places)))
+                    atoms.add((names[phrase], *(objects[index] for index in places)))
         return frozenset(atoms), tuple(unknown)

@@ -63,13 +63,13 @@ def learn_operators(
                 before_of[transition.action[0]][lifted].append(_of_arguments(transition.action, before))
     schemas = []
     for action in sorted(groups):
-        kept = _without_accidents(groups[action])
-        for number, (add, delete) in enumerate(kept):
+        effects = _without_accidents(groups[action])
+        for number, (add, delete) in enumerate(effects):
             variables = {term for atom in (*add, *delete) for term in atom[1:]}
-            wanted = stated.get(action, frozenset()) | delete
+            preconditions = stated.get(action, frozenset()) | delete
             if apart:
-                wanted |= _telling(before_of[action], (add, delete))
-            arity = {"?a"} | {term for atom in wanted for term in atom[1:]} | variables
+                preconditions |= _telling(before_of[action], (add, delete))
+            arity = {"?a"} | {term for atom in preconditions for term in atom[1:]} | variables
             if _takes_two(action, transitions):
                 arity.add("?b")
             parameters = tuple((variable, "") for variable in ("?a", "?b", "?x") if variable in arity)
@@ -79,7 +79,7 @@ def learn_operators(
                 Schema(
                     f"{action}-{number + 1}",
                     parameters,
-                    tuple(sorted(wanted)),
+                    tuple(sorted(preconditions)),
                     tuple(sorted(add)),
                     tuple(sorted(delete)),
                 )
@@ -96,11 +96,11 @@ def _of_arguments(action: Atom, held: frozenset[Atom]) -> frozenset[Atom]:
 def _telling(seen: Mapping[Lifted, list[frozenset[Atom]]], effect: Lifted) -> frozenset[Atom]:
     """Return the atoms over the arguments that held before every transition with an effect and before none with
     another; nothing where there is one effect alone."""
-    others = [held for other, each in seen.items() if other != effect for held in each]
+    others = [atoms for other_effect, each in seen.items() if other_effect != effect for atoms in each]
     if not others:
         return frozenset()
     always = frozenset.intersection(*seen[effect])
-    return frozenset(atom for atom in always if len(atom) > 1 and not any(atom in held for held in others))
+    return frozenset(atom for atom in always if len(atom) > 1 and not any(atom in atoms for atoms in others))
 
 
 def _takes_two(action: str, transitions: list[Transition]) -> bool:
@@ -111,4 +111,4 @@ def _without_accidents(counted: Mapping[Lifted, int]) -> list[Lifted]:
     """Return the changes in the order of how often they were seen, without rare ones."""
     total = sum(counted.values())
     order = sorted(counted, key=lambda lifted: (-counted[lifted], sorted(lifted[0]), sorted(lifted[1])))
-    return [lifted for place, lifted in enumerate(order) if place == 0 or counted[lifted] / total >= RARE]
+    return [lifted for rank, lifted in enumerate(order) if rank == 0 or counted[lifted] / total >= RARE]

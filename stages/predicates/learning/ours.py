@@ -22,11 +22,11 @@ from scenewright.stages.predicates.learning.synthesis import FOLLOWED, Label, Sy
 from scenewright.stages.predicates.teacher.simulated import Teacher
 
 MOST_QUESTIONS = 3
-"""About one phrase, told apart from its rivals."""
+"""Most questions about one phrase, by which it is told apart from its rivals; by eye."""
 ASKED_AGAIN = 2.0
 """Weight of a sentence that was confirmed."""
 MOST_TRIES = 3
-"""Of an action in one situation, when nothing that was named speaks against it."""
+"""Most tries of an action in one situation, when nothing that was named speaks against it; by eye."""
 DOUBT_AFTER = 2
 """Episodes without their goal after which what was said once is tried."""
 
@@ -64,7 +64,7 @@ class OursLearner:
         self._refusals.append((situation, action, state))
         if not sentence:
             return
-        phrase, objects = self._heard(state, sentence, f"{' '.join(action)}")
+        phrase, objects = self._hear(state, sentence, f"{' '.join(action)}")
         variables = dict(zip(action[1:], ("?a", "?b"), strict=False))
         if all(name in variables for name in objects):
             key = (action[0], phrase, tuple(variables[name] for name in objects))
@@ -94,8 +94,8 @@ class OursLearner:
         """Take in what the teacher misses of a goal."""
         if not sentence:
             return
-        phrase, objects = self._heard(state, sentence, "done")
-        fitting = [(part, named) for part, named in parts if set(objects) <= set(named)]
+        phrase, objects = self._hear(state, sentence, "done")
+        fitting = [(part, names) for part, names in parts if set(objects) <= set(names)]
         # The part that speaks of the same things; of several, one that nobody has explained yet.
         fitting.sort(
             key=lambda entry: (
@@ -106,22 +106,22 @@ class OursLearner:
         self._understand(phrase, state)
         if not fitting:
             return
-        part, named = fitting[0]
-        places = tuple(named.index(name) for name in objects)
-        meanings, known = self.memory.meanings, self.memory.goals[part]
-        if all(meanings.get(other) != meanings[phrase] or at != places for other, at in known):
-            known.append((phrase, places))
+        part, names = fitting[0]
+        places = tuple(names.index(name) for name in objects)
+        meanings, phrases = self.memory.meanings, self.memory.goals[part]
+        if all(meanings.get(known_phrase) != meanings[phrase] or at != places for known_phrase, at in phrases):
+            phrases.append((phrase, places))
 
     def reached(self, state: Perceived, parts: list[tuple[str, tuple[str, ...]]]) -> None:
         """Take in that a goal was reached: all that was missed of it holds."""
         number = self.memory.remember(state)
         for part, objects in parts:
             for phrase, places in self.memory.goals.get(part, []):
-                named = tuple(objects[place] for place in places)
-                self.memory.labels[phrase].append(Label(number, named, True, "goal"))
+                goal_objects = tuple(objects[index] for index in places)
+                self.memory.labels[phrase].append(Label(number, goal_objects, True, "goal"))
                 self._understand(phrase, state)
 
-    def _heard(self, state: Perceived, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
+    def _hear(self, state: Perceived, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
         self.memory.dialogue.append(Turn("teacher", sentence, about))
         phrase, objects = self._phrase_of(sentence, state)
         turn = len(self.memory.dialogue) - 1
@@ -142,7 +142,7 @@ class OursLearner:
         for _ in range(4):
             if not meaning.violated:
                 break
-            self._mend(phrase, labels, [labels[place] for place in meaning.violated])
+            self._mend(phrase, labels, [labels[index] for index in meaning.violated])
             meaning = self._synthesiser.best(phrase, labels)
         self.memory.meanings[phrase] = meaning.means
         while meaning.rivals and self._asked[phrase] < MOST_QUESTIONS:
@@ -169,8 +169,8 @@ class OursLearner:
                 _, action, *variables = label.source.split()
                 self.memory.stated.pop((action, phrase, tuple(variables)), None)
                 labels[:] = [each for each in labels if each.source != label.source]
-                said = phrase.text.replace("object ", "")
-                self.memory.disbelieved.append(f"that {action} fails when {said}: it was done all the same")
+                sentence = phrase.text.replace("object ", "")
+                self.memory.disbelieved.append(f"that {action} fails when {sentence}: it was done all the same")
                 return
             if label.source == "goal":
                 labels.remove(label)
@@ -183,8 +183,8 @@ class OursLearner:
         doubted = ASKED_AGAIN + self.missed - DOUBT_AFTER
         for phrase, labels in list(self.memory.labels.items()) if self.missed >= DOUBT_AFTER else []:
             for label in [each for each in labels if each.source in ("sentence", "answer") and each.weight < doubted]:
-                rest = [each for each in labels if each is not label]
-                if self._synthesiser.best(phrase, rest).means == self.memory.meanings[phrase]:
+                other_labels = [each for each in labels if each is not label]
+                if self._synthesiser.best(phrase, other_labels).means == self.memory.meanings[phrase]:
                     continue
                 if self._question(phrase, label.objects, self.memory.states[label.state]) == label.holds:
                     label.weight += 1.0
@@ -196,8 +196,8 @@ class OursLearner:
     def _disbelieve(self, phrase: Phrase, label: Label) -> None:
         turn = self.memory.dialogue[label.turn]
         turn.believed = False
-        asked = f"{self.memory.dialogue[label.turn - 1].text} " if label.source == "answer" else ""
-        self.memory.disbelieved.append(asked + turn.text)
+        question_text = f"{self.memory.dialogue[label.turn - 1].text} " if label.source == "answer" else ""
+        self.memory.disbelieved.append(question_text + turn.text)
         action, *objects = turn.about.split() or [""]
         variables = dict(zip(objects, ("?a", "?b"), strict=False))
         key = (action, phrase, tuple(variables.get(name, name) for name in label.objects))
@@ -212,13 +212,13 @@ class OursLearner:
         """Return objects, now, for which rivals disagree most evenly; None when they agree on all that is here."""
         evaluator = Evaluator(state, self.setting.given)
         trees = [means, *rivals]
-        best, asked = 0, None
+        best, best_objects = 0, None
         for objects in itertools.permutations(state.names, phrase.arguments):
             binding = dict(zip(("?a", "?b"), objects, strict=False))
-            held = sum(evaluator.truth(tree, binding) for tree in trees)  # type: ignore[arg-type]
-            if min(held, len(trees) - held) > best:
-                best, asked = min(held, len(trees) - held), objects
-        return asked
+            count_true = sum(evaluator.truth(tree, binding) for tree in trees)  # type: ignore[arg-type]
+            if min(count_true, len(trees) - count_true) > best:
+                best, best_objects = min(count_true, len(trees) - count_true), objects
+        return best_objects
 
     def _ask(self, phrase: Phrase, objects: tuple[str, ...], state: Perceived) -> None:
         holds = self._question(phrase, objects, state)
@@ -228,8 +228,8 @@ class OursLearner:
     def _question(self, phrase: Phrase, objects: tuple[str, ...], state: Perceived) -> bool:
         """Ask whether a complaint is right of objects in a state; returns whether its predicate holds."""
         text = phrase.text
-        for place, name in enumerate(objects, start=1):
-            text = text.replace(f"<{place}>", name)
+        for number, name in enumerate(objects, start=1):
+            text = text.replace(f"<{number}>", name)
         wrong = self.teacher.answer(state, phrase.text, objects)
         self.memory.questions += 1
         self.memory.dialogue.append(Turn("robot", f"Is it so that {text}?"))
@@ -241,16 +241,16 @@ class OursLearner:
     def explore(self, state: Perceived) -> Atom | None:
         """Return the action in the situation that was tried least, of those that nothing is known against."""
         stated = self.memory.preconditions()
-        held = self.memory.see(state)
-        unexplained = self._unexplained(stated)
+        atoms = self.memory.see(state)
+        unexplained = self._unexplained_refusals(stated)
         best: list[Atom] = []
         fewest = 10**9
         for name in self.actions:
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 action = (name, *objects)
                 binding = dict(zip(("?a", "?b"), objects, strict=False))
-                wanted = {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())}
-                if not wanted <= held:
+                preconditions = {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())}
+                if not preconditions <= atoms:
                     continue
                 situation = self._situation(state, action)
                 count = self._tried[situation] - unexplained[situation]
@@ -267,30 +267,32 @@ class OursLearner:
         without one precondition that no action changes and that does not hold: it may be what the teacher was wrong
         about. Left out is what can be tried here and was, MOST_TRIES times, in such a situation."""
         done = {transition.action[0] for transition in self.memory.transitions}
-        held, changing = self.memory.see(state), self._changing()
-        said = self._said()
+        atoms, changing = self.memory.see(state), self._changing()
+        stated_counts = self._stated_counts()
         for name in self.actions:
-            known = {atom: count for (action, atom), count in said.items() if action == name}
+            times_stated = {atom: count for (action, atom), count in stated_counts.items() if action == name}
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 action = (name, *objects)
-                wanted = {_bound(atom, objects): count for atom, count in known.items()}
-                lacking = {atom: wanted[atom] for atom in wanted if atom not in held}
+                times_of_bound = {_bound(atom, objects): count for atom, count in times_stated.items()}
+                lacking = {atom: times_of_bound[atom] for atom in times_of_bound if atom not in atoms}
                 doubted = [atom for atom in lacking if atom[0] not in changing]
-                rest = frozenset(wanted) - set(doubted)
-                if self.seeking[action, rest] >= MOST_TRIES or (rest <= held and not self.little_tried(state, action)):
+                remaining = frozenset(times_of_bound) - set(doubted)
+                if self.seeking[action, remaining] >= MOST_TRIES or (
+                    remaining <= atoms and not self.little_tried(state, action)
+                ):
                     continue
                 if name not in done and not doubted:
-                    yield (0, 0), action, rest
+                    yield (0, 0), action, remaining
                 elif self.missed >= DOUBT_AFTER and len(doubted) == 1:
-                    yield (1 + (name in done), lacking[doubted[0]]), action, rest
+                    yield (1 + (name in done), lacking[doubted[0]]), action, remaining
 
-    def _said(self) -> Counter[tuple[str, Atom]]:
+    def _stated_counts(self) -> Counter[tuple[str, Atom]]:
         """Return action and precondition -> how often it was named."""
         names = self.memory.names()
-        said: Counter[tuple[str, Atom]] = Counter()
+        counts: Counter[tuple[str, Atom]] = Counter()
         for (action, phrase, variables), count in self.memory.stated.items():
-            said[action, (names[phrase], *variables)] += count
-        return said
+            counts[action, (names[phrase], *variables)] += count
+        return counts
 
     def doubtful(self, state: Perceived) -> Atom | None:
         """Return an action to try against what was said, which may be wrong: the one with the least against it.
@@ -298,46 +300,46 @@ class OursLearner:
         Of an action that was never allowed, whose preconditions were never seen to hold together and were said but
         once; and, once DOUBT_AFTER episodes went amiss, of any: first those that speak against nothing but what no
         action changes, then those that were named least, and were tried least in such a situation."""
-        held, changing, said = self.memory.see(state), self._changing(), self._said()
+        atoms, changing, stated_counts = self.memory.see(state), self._changing(), self._stated_counts()
         done = {transition.action[0] for transition in self.memory.transitions}
-        found: list[tuple[tuple[int, ...], Atom]] = []
+        weighted: list[tuple[tuple[int, ...], Atom]] = []
         for name in self.actions:
-            wanted = [(atom, count) for (action, atom), count in said.items() if action == name]
-            never = name not in done and not self._seen_together(name, [atom for atom, _ in wanted])
-            if not wanted or not (never or self.missed >= DOUBT_AFTER):
+            preconditions = [(atom, count) for (action, atom), count in stated_counts.items() if action == name]
+            never = name not in done and not self._held_together(name, [atom for atom, _ in preconditions])
+            if not preconditions or not (never or self.missed >= DOUBT_AFTER):
                 continue
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
-                against = [entry for entry in wanted if _bound(entry[0], objects) not in held]
+                against = [entry for entry in preconditions if _bound(entry[0], objects) not in atoms]
                 tried = (name, *objects)
                 if not against:
                     continue
                 if self.missed >= DOUBT_AFTER:
                     fixed = sum(atom[0] in changing for atom, _ in against)
                     weight = sum(count for _, count in against) + self._tried[self._situation(state, tried)]
-                    found.append(((weight, fixed), tried))
+                    weighted.append(((weight, fixed), tried))
                 elif max(count for _, count in against) == 1:
-                    found.append(((len(against),), tried))
-        fewest = [tried for weight, tried in found if weight == min(found)[0]]
+                    weighted.append(((len(against),), tried))
+        fewest = [tried for weight, tried in weighted if weight == min(weighted)[0]]
         return fewest[int(self.random.integers(len(fewest)))] if fewest else None
 
     def _changing(self) -> set[str]:
         """Return the predicates that some action was seen to change."""
-        seen = {number: self.memory.see(self.memory.states[number]) for number in self._ends()}
+        atoms_of_state = {number: self.memory.see(self.memory.states[number]) for number in self._ends()}
         return {
             atom[0]
             for transition in self.memory.transitions
-            for atom in seen[transition.before] ^ seen[transition.after]
+            for atom in atoms_of_state[transition.before] ^ atoms_of_state[transition.after]
         }
 
     def _ends(self) -> set[int]:
         return {number for each in self.memory.transitions for number in (each.before, each.after)}
 
-    def _seen_together(self, name: str, wanted: list[Atom]) -> bool:
+    def _held_together(self, name: str, wanted: list[Atom]) -> bool:
         """Whether all of what was named for an action held at once, for some objects, in a state that was seen."""
         for state in self.memory.states:
-            held = self.memory.see(state)
+            atoms_held = self.memory.see(state)
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
-                if all(_bound(atom, objects) in held for atom in wanted):
+                if all(_bound(atom, objects) in atoms_held for atom in wanted):
                     return True
         return False
 
@@ -347,19 +349,19 @@ class OursLearner:
         if action is None:
             return False
         situation = self._situation(state, action)
-        return self._tried[situation] <= self._unexplained(self.memory.preconditions())[situation]
+        return self._tried[situation] <= self._unexplained_refusals(self.memory.preconditions())[situation]
 
-    def _unexplained(self, stated: Mapping[str, frozenset[Atom]]) -> Counter[tuple[str, ...]]:
+    def _unexplained_refusals(self, stated: Mapping[str, frozenset[Atom]]) -> Counter[tuple[str, ...]]:
         """Return how often an action was refused in a situation though all that was named for it held: nothing was
         said, or what is no longer believed. Such an action is tried again, until it was tried MOST_TRIES times."""
-        found: Counter[tuple[str, ...]] = Counter()
+        tries: Counter[tuple[str, ...]] = Counter()
         predicates = self.memory.predicates()
         for situation, action, state in self._refusals:
             evaluator = Evaluator(state, predicates)
-            wanted = (_bound(atom, action[1:]) for atom in stated.get(action[0], ()))
-            if self._tried[situation] < MOST_TRIES and all(map(evaluator.holds, wanted)):
-                found[situation] += 1
-        return found
+            preconditions = (_bound(atom, action[1:]) for atom in stated.get(action[0], ()))
+            if self._tried[situation] < MOST_TRIES and all(map(evaluator.holds, preconditions)):
+                tries[situation] += 1
+        return tries
 
     def little_tried(self, state: Perceived, action: Atom | None) -> bool:
         """Whether an action was tried less than MOST_TRIES times in such a situation."""
@@ -369,9 +371,9 @@ class OursLearner:
         """Return what matters of a state for an action, as far as one can see: what kind of things they are, whether
         something is held, what rests on or within what."""
         if self._facts[0] is not state:
-            held = self.setting.held
+            holding_predicate = self.setting.held
             evaluator = Evaluator(state, self.setting.given)
-            full = any(evaluator.holds((held, name)) for name in state.names)
+            full = any(evaluator.holds((holding_predicate, name)) for name in state.names)
             self._facts = (state, full, {name: self.setting.facts(state, name) for name in state.names})
         _, full, facts = self._facts
         return (action[0], f"full:{full}", *(fact for name in action[1:] for fact in facts[name]))

@@ -26,7 +26,7 @@ CATEGORIES = ("food", "can", "coaster", "shelf", "cup", "pot", "basket", "placem
 """The categories that perception knows."""
 GREATER, SMALLER = ("wide", "large", "larger", "greater", "tall", "high"), ("small", "smaller", "less", "narrow")
 _REASON = re.compile(r" so you| because |, thus| as it|, only| and can")
-"""Where a reason or a consequence begins."""
+"""Words with which a reason or a consequence begins."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -47,10 +47,10 @@ class Phrase:
     def concepts(self) -> frozenset[str]:
         """What its words point at; categories as `category:food`."""
         words = self.words
-        found = {name for name, pointing in CONCEPTS.items() if words & set(pointing)}
-        if found & {"width", "height"}:
-            found.discard("size")
-        return frozenset(found | {f"category:{word}" for word in CATEGORIES if word in words})
+        concepts_named = {name for name, pointing in CONCEPTS.items() if words & set(pointing)}
+        if concepts_named & {"width", "height"}:
+            concepts_named.discard("size")
+        return frozenset(concepts_named | {f"category:{word}" for word in CATEGORIES if word in words})
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -75,19 +75,21 @@ class Phrase:
         bare = re.sub(r"object <\d>|<\d>|,.*| as it.*| because.*| so you.*| thus.*", " ", self.text)
         words = [word for word in re.findall(r"[a-z]+", bare) if word not in ("the", "a", "an", "is", "does", "object")]
         if self.denies:
-            kept = [word for word in words if word not in ("not", "can", "you", "t", "haven", "has", "been", "yet")]
-            return "_".join(kept) or "as_wanted"
+            name_words = [
+                word for word in words if word not in ("not", "can", "you", "t", "haven", "has", "been", "yet")
+            ]
+            return "_".join(name_words) or "as_wanted"
         return "not_" + "_".join(words)
 
 
 def phrase_of(sentence: str, names: Iterable[str]) -> tuple[Phrase, tuple[str, ...]]:
     """Return a correction's phrase and its objects, in the order in which they are named after the word `object`."""
-    known = set(names)
+    known_names = set(names)
     objects: list[str] = []
 
     def slot(match: re.Match[str]) -> str:
         name = match.group(1)
-        if name not in known:
+        if name not in known_names:
             return match.group(0)
         if name not in objects:
             objects.append(name)

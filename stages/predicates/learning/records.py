@@ -37,7 +37,7 @@ def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:
     """Return domain.json; `rest` are its fields that the memory does not hold."""
     names = memory.names()
     phrases = list(memory.meanings)
-    place = {phrase: number for number, phrase in enumerate(phrases)}
+    number_of_phrase = {phrase: number for number, phrase in enumerate(phrases)}
     return LearnedDomainFile(
         predicates=tuple(
             LearnedPredicate(name=each.name, arguments=each.arguments, means=text_of(each.means), said=say(each))
@@ -63,11 +63,11 @@ def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:
             for phrase in phrases
         ),
         preconditions=tuple(
-            StatedPrecondition(action=action, phrase=place[phrase], variables=variables, times=times)
+            StatedPrecondition(action=action, phrase=number_of_phrase[phrase], variables=variables, times=times)
             for (action, phrase, variables), times in memory.stated.items()
         ),
         goals=tuple(
-            GoalMeaning(text=text, phrase=place[phrase], places=places)
+            GoalMeaning(text=text, phrase=number_of_phrase[phrase], places=places)
             for text, entries in memory.goals.items()
             for phrase, places in entries
         ),
@@ -90,7 +90,7 @@ def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:
 
 def _seen_state(state: State) -> SeenState:
     return SeenState(
-        objects={name: SeenObject(**vars(seen)) for name, seen in state.objects.items()},
+        objects={name: SeenObject(**vars(seen_object)) for name, seen_object in state.objects.items()},
         gripper_x=state.gripper_x,
         gripper_y=state.gripper_y,
         opening=state.opening,
@@ -112,7 +112,7 @@ def _seen_room(state: RoomState) -> SeenRoom:
 def _states_of(document: LearnedDomainFile) -> list[Perceived]:
     kitchens = [
         State(
-            {name: Seen(**seen.model_dump()) for name, seen in state.objects.items()},
+            {name: Seen(**seen_object.model_dump()) for name, seen_object in state.objects.items()},
             state.gripper_x,
             state.gripper_y,
             state.opening,
@@ -145,19 +145,21 @@ def memory_of(document: LearnedDomainFile, where: str) -> Memory:
     memory = ThesisMemory(setting) if document.learner.startswith(THESIS) else Memory(setting)
     memory.states = _states_of(document)
     phrases = [Phrase(each.text, each.arguments) for each in document.phrases]
-    for phrase, heard in zip(phrases, document.phrases, strict=True):
-        if heard.predicate not in predicates:
-            raise _refuse(where, f"there is no predicate {heard.predicate!r}")
-        if predicates[heard.predicate].arguments != heard.arguments:
-            raise _refuse(where, f"{heard.predicate} is not about {heard.arguments} objects")
-        predicate = predicates[heard.predicate]
-        given = setting.given.get(heard.predicate)
-        memory.meanings[phrase] = (predicate.name, *predicate.variables) if given == predicate else predicate.means
-        for example in heard.examples:
-            if example.state >= len(memory.states) or len(example.objects) != heard.arguments:
-                raise _refuse(where, f"an example of {heard.text!r} names no state, or other objects")
+    for phrase, entry in zip(phrases, document.phrases, strict=True):
+        if entry.predicate not in predicates:
+            raise _refuse(where, f"there is no predicate {entry.predicate!r}")
+        if predicates[entry.predicate].arguments != entry.arguments:
+            raise _refuse(where, f"{entry.predicate} is not about {entry.arguments} objects")
+        predicate = predicates[entry.predicate]
+        given_predicate = setting.given.get(entry.predicate)
+        memory.meanings[phrase] = (
+            (predicate.name, *predicate.variables) if given_predicate == predicate else predicate.means
+        )
+        for example in entry.examples:
+            if example.state >= len(memory.states) or len(example.objects) != entry.arguments:
+                raise _refuse(where, f"an example of {entry.text!r} names no state, or other objects")
             if not set(example.objects) <= set(memory.states[example.state].names):
-                raise _refuse(where, f"an example of {heard.text!r} names objects that its state has not")
+                raise _refuse(where, f"an example of {entry.text!r} names objects that its state has not")
             memory.labels[phrase].append(Label(**example.model_dump()))
     for stated in document.preconditions:
         phrase = _phrase(phrases, stated.phrase, where)

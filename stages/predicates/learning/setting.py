@@ -64,12 +64,12 @@ def _kitchen_facts(state: Perceived, name: str) -> tuple[str, ...]:
 
     assert isinstance(state, State)
     evaluator = Evaluator(state, KITCHEN.given)
-    others = [other for other in state.names if other != name]
+    others = [neighbour for neighbour in state.names if neighbour != name]
     facts = (
         evaluator.holds(("in_gripper", name)),
-        any(evaluator.holds(("rests_on", other, name)) for other in others),
-        any(evaluator.holds(("within", name, other)) for other in others),
-        any(evaluator.holds(("within", other, name)) for other in others),
+        any(evaluator.holds(("rests_on", neighbour, name)) for neighbour in others),
+        any(evaluator.holds(("within", name, neighbour)) for neighbour in others),
+        any(evaluator.holds(("within", neighbour, name)) for neighbour in others),
         state.objects[name].water > 0,
     )
     return (f"{state.category(name)}:{''.join('01'[fact] for fact in facts)}",)
@@ -156,6 +156,7 @@ ROOM_GIVEN = _predicates(
 )
 """What the hand holds, the links of the contact graph, and two relations of boxes."""
 _HALF_OPEN: Tree = ("less", ("openness", "?x"), 0.5)
+"""A door is less than half open."""
 _NARROW: Tree = ("less", ("width", "?x"), ("hand_opening",))
 ROOM = Setting(
     name="room",
@@ -190,4 +191,5 @@ ROOM = Setting(
     ),
     tells_apart=True,
 )
+"""What a learner is given of a room."""
 SETTINGS = {setting.name: setting for setting in (KITCHEN, ROOM)}

@@ -16,6 +16,7 @@ VIOLATION = 6.0
 RIVAL = 0.5
 """Meanings within this of the cheapest are its rivals."""
 MOST_TRIED = 400
+"""Most meanings of a phrase that are compared with the labels, the cheapest first; by eye."""
 FOLLOWED = "accepted "
 """How the source of a label begins that followed from an action which was allowed."""
 
@@ -79,22 +80,22 @@ class Synthesiser:
     def best(self, phrase: Phrase, labels: list[Label]) -> Meaning:
         """Return the cheapest meaning; contradicted labels are paid for, so that one wrong sentence does not undo what
         many right ones say."""
-        found: list[tuple[float, Tree, tuple[int, ...]]] = []
+        priced: list[tuple[float, Tree, tuple[int, ...]]] = []
         least = float("inf")
         for cost, tree in candidates(phrase, self._margins(phrase, labels), self.setting)[:MOST_TRIED]:
             if cost > least + RIVAL:
                 break
             violated = tuple(
-                place
-                for place, label in enumerate(labels)
+                index
+                for index, label in enumerate(labels)
                 if self.truth(tree, label.state, label.objects) != label.holds
             )
-            whole = cost + VIOLATION * _against([labels[place] for place in violated])
-            least = min(least, whole)
-            found.append((whole, tree, violated))
-        found.sort(key=lambda entry: (entry[0], str(entry[1])))
-        cost, tree, violated = found[0]
-        rivals = tuple(other for whole, other, _ in found[1:] if whole <= cost + RIVAL)
+            total_cost = cost + VIOLATION * _against([labels[index] for index in violated])
+            least = min(least, total_cost)
+            priced.append((total_cost, tree, violated))
+        priced.sort(key=lambda entry: (entry[0], str(entry[1])))
+        cost, tree, violated = priced[0]
+        rivals = tuple(rival for total_cost, rival, _ in priced[1:] if total_cost <= cost + RIVAL)
         return Meaning(tree, cost, violated, rivals)
 
     def _margins(self, phrase: Phrase, labels: list[Label]) -> dict[str, list[float]]:
@@ -108,7 +109,7 @@ class Synthesiser:
                 value = state.number(label.objects[0], measure) if label.objects else state.of_scene(measure)
                 values[label.holds].add(round(value, 3))
             if values[True] and values[False] and not values[True] & values[False]:
-                both = sorted([(v, True) for v in values[True]] + [(v, False) for v in values[False]])
-                changes = [(a + b) / 2 for (a, x), (b, y) in zip(both, both[1:], strict=False) if x != y]
+                ordered = sorted([(v, True) for v in values[True]] + [(v, False) for v in values[False]])
+                changes = [(a + b) / 2 for (a, x), (b, y) in zip(ordered, ordered[1:], strict=False) if x != y]
                 margins[measure] = [round(value, 3) for value in changes[:2]]
         return margins

@@ -37,7 +37,7 @@ ROUNDS = 3
 EXPLORING = 0.5
 """Probability of an action by chance in training."""
 MOST_EXAMPLES = 6
-"""That a correction is shown."""
+"""Most examples that a correction is shown; by eye."""
 NEVER: Tree = ("not", ("at_most", 0.0, 0.0))
 """What a predicate means that nobody could write: it never holds."""
 
@@ -69,12 +69,12 @@ class ThesisLearner(OursLearner):
 
     def _phrase_of(self, sentence: str, state: Perceived) -> tuple[Phrase, tuple[str, ...]]:
         """Return what the Reasoner makes of a sentence; taken literally where it names what is not there."""
-        given = {
+        facts = {
             "sentence": sentence,
             "objects": list(state.names),
             "complaints": [phrase.text for phrase in self.memory.labels],
         }
-        reply = self._spoken("reasoner", REASONER, given, Reasoned)
+        reply = self._ask_model("reasoner", REASONER, facts, Reasoned)
         if reply is None or not set(reply.objects) <= set(state.names):
             return phrase_of(sentence, state.names)
         return Phrase(reply.complaint, len(reply.objects)), tuple(reply.objects)
@@ -84,18 +84,21 @@ class ThesisLearner(OursLearner):
         labels = self.memory.labels[phrase]
         means = self.memory.meanings.get(phrase)
         if means is None:
-            means = self._written("coder", CODER, phrase, {"complaint": phrase.text, **self._words(phrase)}) or NEVER
+            means = (
+                self._write_expression("coder", CODER, phrase, {"complaint": phrase.text, **self._words(phrase)})
+                or NEVER
+            )
         for _ in range(ROUNDS):
             wrong = [each for each in labels if self._synthesiser.truth(means, each.state, each.objects) != each.holds]
             if not wrong:
                 break
-            given = {
+            facts = {
                 "complaint": phrase.text,
                 "expression": text_of(means),
                 **self._words(phrase),
                 "examples": [self._example(label) for label in (*wrong, *labels)[:MOST_EXAMPLES]],
             }
-            better = self._written("corrector", CORRECTOR, phrase, given)
+            better = self._write_expression("corrector", CORRECTOR, phrase, facts)
             if better is None or better == means:
                 break
             means = better
@@ -104,10 +107,10 @@ class ThesisLearner(OursLearner):
     def reconsider(self) -> None:
         """The thesis's learner asks nothing again."""
 
-    def _written(self, who: str, task: str, phrase: Phrase, given: dict[str, Any]) -> Tree | None:
+    def _write_expression(self, who: str, task: str, phrase: Phrase, given: dict[str, Any]) -> Tree | None:
         """Return an expression that passes every check, None when none came in ROUNDS tries."""
         for _ in range(ROUNDS):
-            reply = self._spoken(who, task, given, Coded)
+            reply = self._ask_model(who, task, given, Coded)
             if reply is None:
                 return None
             try:
@@ -125,7 +128,7 @@ class ThesisLearner(OursLearner):
     def _words(self, phrase: Phrase) -> dict[str, Any]:
         words = self.setting.words
         return {
-            "variables": [f"?{chr(97 + place)}" for place in range(phrase.arguments)],
+            "variables": [f"?{chr(97 + index)}" for index in range(phrase.arguments)],
             "of_object": list(words.of_object),
             "of_scene": list(words.of_scene),
             "given": {name: text_of(each.means) for name, each in self.setting.given.items()},
@@ -146,7 +149,7 @@ class ThesisLearner(OursLearner):
             "scene": {call: round(state.of_scene(call), 3) for call in words.of_scene},
         }
 
-    def _spoken(self, who: str, task: str, given: dict[str, Any], model: type[Any]) -> Any:
+    def _ask_model(self, who: str, task: str, given: dict[str, Any], model: type[Any]) -> Any:
         """Return a reply, None where the language model gave none that can be read."""
         try:
             return self.chat.ask(
@@ -159,14 +162,14 @@ class ThesisLearner(OursLearner):
 
     def explore(self, state: Perceived) -> Atom | None:
         """Return, by chance, an action that nothing is known against."""
-        stated, held = self.memory.preconditions(), self.memory.see(state)
-        found = []
+        stated, atoms = self.memory.preconditions(), self.memory.see(state)
+        applicable = []
         for name in self.actions:
             for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 binding = dict(zip(("?a", "?b"), objects, strict=False))
-                if {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())} <= held:
-                    found.append((name, *objects))
-        return found[int(self.random.integers(len(found)))] if found else None
+                if {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())} <= atoms:
+                    applicable.append((name, *objects))
+        return applicable[int(self.random.integers(len(applicable)))] if applicable else None
 
     def worth_trying(self, state: Perceived) -> Iterator[tuple[tuple[int, ...], Atom, frozenset[Atom]]]:
         """It seeks out nothing."""
@@ -204,12 +207,12 @@ CORRECTOR = (
 def stand_in(request: Request) -> str:
     """Answer as the word list does: no language model. The cheapest meaning of the grammar for the Coder; for the
     Corrector the next one after that which was wrong."""
-    task, given = request.messages[0].text, objects_in(request.messages[1].text)[0]
+    task, facts = request.messages[0].text, objects_in(request.messages[1].text)[0]
     if "You are the reasoner" in task:
-        phrase, objects = phrase_of(given["sentence"], given["objects"])
+        phrase, objects = phrase_of(facts["sentence"], facts["objects"])
         return json.dumps({"complaint": phrase.text, "objects": list(objects)})
-    phrase = Phrase(given["complaint"], len(given["variables"]))
+    phrase = Phrase(facts["complaint"], len(facts["variables"]))
     meanings = [text_of(tree) for _, tree in candidates(phrase, {})]
-    before = given.get("expression")
-    place = meanings.index(before) + 1 if before in meanings else 0
-    return json.dumps({"expression": meanings[min(place, len(meanings) - 1)]})
+    before = facts.get("expression")
+    next_number = meanings.index(before) + 1 if before in meanings else 0
+    return json.dumps({"expression": meanings[min(next_number, len(meanings) - 1)]})

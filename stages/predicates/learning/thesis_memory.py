@@ -19,11 +19,11 @@ class ThesisMemory(Memory):
 
     def predicates(self) -> dict[str, Predicate]:
         """Return what was learned, each with its negation."""
-        found = super().predicates()
+        by_name = super().predicates()
         for name in self.names().values():
-            each = found[name]
-            found[f"no-{name}"] = Predicate(f"no-{name}", each.arguments, ("not", (name, *each.variables)))
-        return found
+            each = by_name[name]
+            by_name[f"no-{name}"] = Predicate(f"no-{name}", each.arguments, ("not", (name, *each.variables)))
+        return by_name
 
     def used(self) -> dict[str, int]:
         """Return the predicates that plans are made with."""

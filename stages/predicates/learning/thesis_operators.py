@@ -16,6 +16,7 @@ from scenewright.stages.kit.tasks.strips import Atom, Domain, Schema
 from scenewright.stages.predicates.learning.operators import Transition
 
 FALL = 1e-5
+"""Fall of the log-likelihood that counts as none."""
 MOST_OTHERS = 2
 """Objects beside the action's that one lifted transition may speak of."""
 Case = tuple[frozenset[Atom], frozenset[Atom], frozenset[Atom]]
@@ -38,18 +39,24 @@ def search_operators(
             cases[transition.action[0]].append(case)
     schemas = []
     for action in sorted(cases):
-        kept: dict[frozenset[Atom], Effect] = {}
-        named = stated.get(action, frozenset())
+        effect_of_preconditions: dict[frozenset[Atom], Effect] = {}
+        stated_atoms = stated.get(action, frozenset())
         for before in dict.fromkeys(case[0] for case in cases[action]):
-            dropped = _dropped(before, named, cases[action])
+            dropped = _drop_irrelevant(before, stated_atoms, cases[action])
             effect = usual_effect(dropped, cases[action])
-            kept = {each: own for each, own in kept.items() if not (dropped <= each and own == effect)}
-            if not any(each <= dropped and own == effect for each, own in kept.items()):
-                kept[dropped] = effect
-        for number, (preconditions, (add, delete)) in enumerate(kept.items()):
-            wanted = preconditions | delete
-            variables = {term for atom in (*wanted, *add) for term in atom[1:]} | {"?a"}
-            if not {term for atom in add for term in atom[1:]} <= {term for atom in wanted for term in atom[1:]} | {
+            effect_of_preconditions = {
+                each: earlier_effect
+                for each, earlier_effect in effect_of_preconditions.items()
+                if not (dropped <= each and earlier_effect == effect)
+            }
+            if not any(
+                each <= dropped and earlier_effect == effect for each, earlier_effect in effect_of_preconditions.items()
+            ):
+                effect_of_preconditions[dropped] = effect
+        for number, (preconditions, (add, delete)) in enumerate(effect_of_preconditions.items()):
+            required = preconditions | delete
+            variables = {term for atom in (*required, *add) for term in atom[1:]} | {"?a"}
+            if not {term for atom in add for term in atom[1:]} <= {term for atom in required for term in atom[1:]} | {
                 "?a",
                 "?b",
             }:
@@ -59,7 +66,7 @@ def search_operators(
                 Schema(
                     f"{action}-{number + 1}",
                     parameters,
-                    tuple(sorted(wanted)),
+                    tuple(sorted(required)),
                     tuple(sorted(add)),
                     tuple(sorted(delete)),
                 )
@@ -94,18 +101,18 @@ def lifted(action: Atom, before: frozenset[Atom], after: frozenset[Atom]) -> Cas
 def likelihood(preconditions: frozenset[Atom], cases: Sequence[Case]) -> float:
     """Return the negative entropy of the effects of the cases that preconditions cover, not normalised."""
     counted = Counter(case[1:] for case in cases if preconditions <= case[0])
-    whole = sum(counted.values())
-    return sum(count * math.log(count / whole) for count in counted.values())
+    total = sum(counted.values())
+    return sum(count * math.log(count / total) for count in counted.values())
 
 
-def _dropped(before: frozenset[Atom], named: frozenset[Atom], cases: Sequence[Case]) -> frozenset[Atom]:
+def _drop_irrelevant(before: frozenset[Atom], named: frozenset[Atom], cases: Sequence[Case]) -> frozenset[Atom]:
     """Return a state's atoms without those that make no difference to what follows."""
-    kept = before
+    remaining = before
     mine = next(case for case in cases if case[0] == before)
     inside = {"?a", "?b"} | {term for atom in (*mine[1], *mine[2]) for term in atom[1:]}
     order = sorted(before - named, key=lambda atom: (-len(set(atom[1:]) - inside), atom))
     for atom in order:
-        fewer = kept - {atom}
-        if likelihood(fewer, cases) >= likelihood(kept, cases) - FALL:
-            kept = fewer
-    return kept
+        fewer = remaining - {atom}
+        if likelihood(fewer, cases) >= likelihood(remaining, cases) - FALL:
+            remaining = fewer
+    return remaining

@@ -19,9 +19,9 @@ from scenewright.stages.predicates.truth import true_predicates, truth_of
 from scenewright.stages.predicates.world.catalogue import DomainSetup, kitchen_file
 
 HALVINGS = 7
-"""Of the way between a state where a predicate holds and one where it does not."""
+"""Halvings of the way between a state where a predicate holds and one where it does not; by eye."""
 DRAWS = 30
-"""Of a state on the other side of a predicate."""
+"""Draws of a state on the other side of a predicate; by eye."""
 Case = tuple[State, tuple[str, ...], bool]
 """A state, objects, and whether the teacher's predicate holds of them."""
 
@@ -47,9 +47,9 @@ def drawn_state(setup: DomainSetup, random: np.random.Generator) -> State:
         objects[name] = Seen(x, y, width, height, kind.category, water)
     if random.random() < 0.5:
         return State(objects, -40.0 + 70.0 * random.random(), 25.0, 5.0 * random.random(), 0.0)
-    held = objects[list(objects)[int(random.random() * len(objects))]]
-    tips = held.y + held.height - min(2.0, held.height)
-    return State(objects, held.x, tips, held.width, 0.1 + 0.9 * random.random())
+    held_object = objects[list(objects)[int(random.random() * len(objects))]]
+    tips = held_object.y + held_object.height - min(2.0, held_object.height)
+    return State(objects, held_object.x, tips, held_object.width, 0.1 + 0.9 * random.random())
 
 
 def between(one: State, two: State, share: float) -> State:
@@ -94,17 +94,17 @@ def cases_of(name: str, domain: str, count: int, seed: int) -> list[Case]:
     for number, state in enumerate(states):
         names = list(state.objects)
         chosen = random.permutation(len(names))[: true_predicates()[name].arguments]
-        objects = tuple(names[place] for place in chosen.tolist())
+        objects = tuple(names[index] for index in chosen.tolist())
         holds = _holds(name, state, objects)
         for _ in range(DRAWS if number % 2 else 0):
-            other = states[int(random.random() * count)]
-            if _holds(name, other, objects) != holds:
+            other_state = states[int(random.random() * count)]
+            if _holds(name, other_state, objects) != holds:
                 low, high = 0.0, 1.0
                 for _ in range(HALVINGS):
                     middle = (low + high) / 2
-                    same = _holds(name, between(state, other, middle), objects) == holds
+                    same = _holds(name, between(state, other_state, middle), objects) == holds
                     low, high = (middle, high) if same else (low, middle)
-                state = between(state, other, low if random.random() < 0.5 else high)
+                state = between(state, other_state, low if random.random() < 0.5 else high)
                 break
         cases.append((state, objects, _holds(name, state, objects)))
     return cases
@@ -126,13 +126,13 @@ def balanced_accuracy(cases: Sequence[Case], means: Tree, given: Mapping[str, Pr
 
 def accuracies(memory: Memory, domain: str, count: int, seed: int) -> dict[str, float]:
     """Return, by the teacher's predicate, how right the worst meaning of a phrase about it is."""
-    found: dict[str, float] = {}
+    lowest: dict[str, float] = {}
     for phrase, means in memory.meanings.items():
         name = truth_of(domain).meant_by(phrase.text)
         if name is not None:
             value = balanced_accuracy(drawn_cases(name, domain, count, seed), means, KITCHEN_GIVEN)
-            found[name] = min(value, found.get(name, 1.0))
-    return dict(sorted(found.items()))
+            lowest[name] = min(value, lowest.get(name, 1.0))
+    return dict(sorted(lowest.items()))
 
 
 @cache

@@ -38,9 +38,9 @@ def allowed_accuracy(
     true = allowing(true_domain(truth), truth_of(truth).atoms, actions)
     right: dict[bool, list[bool]] = {True: [], False: []}
     for state in states:
-        said = learned(state)
+        allowed = learned(state)
         for action, may in true(state).items():
-            right[may].append(said[action] == may)
+            right[may].append(allowed[action] == may)
     shares = [sum(each) / len(each) for each in right.values() if each]
     return sum(shares) / len(shares)
 
@@ -49,10 +49,10 @@ def expected_share(domain: Domain, see: Abstraction, done: Sequence[Done]) -> fl
     """Return the share of actions after which exactly that was seen which some operator that applied expected."""
     met = 0
     for before, action, after in done:
-        atoms, seen = see(before), see(after)
+        atoms, state_after = see(before), see(after)
         problem = Problem("now", dict.fromkeys(before.names, ""), atoms, frozenset())
         met += any(
-            action_atom(each) == action and each.preconditions <= atoms and apply_action(atoms, each) == seen
+            action_atom(each) == action and each.preconditions <= atoms and apply_action(atoms, each) == state_after
             for each in ground(domain, problem)
         )
     return met / len(done)

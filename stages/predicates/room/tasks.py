@@ -20,6 +20,7 @@ ROBOT = "panda"
 ITEMS, SUPPORTS, CONTAINERS = 4, 3, 2
 """Most things of each kind in a task: rooms have dozens, and what is learned is about pairs of them."""
 WALK, LITERALS, TRIES = 6, 2, 200
+"""Most actions of the walk whose end a goal is taken from, most literals of a goal, and most tries; by eye."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,12 @@ class RoomTask(Task):
 def read_rooms(path: Path) -> list[RoomState]:
     """Return what is perceived of the scenes of a folder: an interactive scene, the `room` of a ground truth, or a
     folder of these, by name. Raises BadInput where there is none, or one with nothing to pick up or put things on."""
-    found = [path] if (path / "scene.json").is_file() else sorted(each.parent for each in path.glob("**/scene.json"))
-    if not found:
+    folders = [path] if (path / "scene.json").is_file() else sorted(each.parent for each in path.glob("**/scene.json"))
+    if not folders:
         raise BadInput(f"{path}: no scene.json there or below", hint="give what `urdf` or `synthesize` wrote")
     robot = load_robot(ROBOT)
     rooms = []
-    for folder in found:
+    for folder in folders:
         scene = InteractiveSceneFile.read(folder / "scene.json")
         state = perceive(scene.bodies, ContactGraphFile.read(folder / "graph.json"), robot)
         if not _kinds(state)[0] or not _kinds(state)[1]:
@@ -60,8 +61,8 @@ def _kinds(state: RoomState) -> tuple[list[str], list[str], list[str]]:
     """Return the names of items that the hand can take, of what carries things, and of what has doors."""
     items = [name for name, body in state.bodies.items() if body.width < state.hand_opening and not body.doors]
     doors = [name for name, body in state.bodies.items() if body.doors]
-    rest = [name for name, body in state.bodies.items() if name not in (*items, *doors) and body.surface > 0.05]
-    return items, rest, doors
+    surfaces = [name for name, body in state.bodies.items() if name not in (*items, *doors) and body.surface > 0.05]
+    return items, surfaces, doors
 
 
 def room_tasks(rooms: list[RoomState], count: int, seed: int) -> list[RoomTask]:
@@ -73,7 +74,7 @@ def room_tasks(rooms: list[RoomState], count: int, seed: int) -> list[RoomTask]:
 def _task(room: RoomState, number: int, random: np.random.Generator) -> RoomTask:
     for _ in range(TRIES):
         state = _some(room, random)
-        goal = _walked(state, random)
+        goal = _walk_goal(state, random)
         if goal:
             objects = {name: body.middle[:2] for name, body in state.bodies.items()}
             return RoomTask(f"{ROOM}/{number + 1}", objects, goal, int(random.integers(2**31)), state)
@@ -85,7 +86,7 @@ def _some(room: RoomState, random: np.random.Generator) -> RoomState:
     kinds = _kinds(room)
     names: set[str] = set()
     for kind, most in zip(kinds, (ITEMS, SUPPORTS, CONTAINERS), strict=True):
-        names |= {kind[place] for place in random.permutation(len(kind))[:most].tolist()}
+        names |= {kind[index] for index in random.permutation(len(kind))[:most].tolist()}
     names |= {room.supported.get(name, room.contained.get(name, name)) for name in sorted(names & set(kinds[0]))}
     bodies: dict[str, Body] = {}
     for name in sorted(names):
@@ -94,12 +95,12 @@ def _some(room: RoomState, random: np.random.Generator) -> RoomState:
     return replace(
         room,
         bodies=bodies,
-        supported={one: two for one, two in room.supported.items() if one in bodies and two in bodies},
-        contained={one: two for one, two in room.contained.items() if one in bodies and two in bodies},
+        supported={upper: lower for upper, lower in room.supported.items() if upper in bodies and lower in bodies},
+        contained={upper: lower for upper, lower in room.contained.items() if upper in bodies and lower in bodies},
     )
 
 
-def _walked(state: RoomState, random: np.random.Generator) -> tuple[Atom, ...]:
+def _walk_goal(state: RoomState, random: np.random.Generator) -> tuple[Atom, ...]:
     """Return what a walk with the teacher's operators made true, up to LITERALS of it."""
     truth = truth_of(ROOM)
     start = truth.atoms(state)
@@ -110,8 +111,8 @@ def _walked(state: RoomState, random: np.random.Generator) -> tuple[Atom, ...]:
         if not possible:
             break
         atoms = apply_action(atoms, possible[int(random.integers(len(possible)))])
-    new = sorted(atom for atom in atoms - start if atom[0] in truth.file.goals)
-    if not new or any(atom[0] == "holding" for atom in atoms):
+    new_atoms = sorted(atom for atom in atoms - start if atom[0] in truth.file.goals)
+    if not new_atoms or any(atom[0] == "holding" for atom in atoms):
         return ()
-    kept = random.permutation(len(new))[: int(random.integers(1, LITERALS + 1))]
-    return tuple(new[place] for place in sorted(kept.tolist()))
+    drawn = random.permutation(len(new_atoms))[: int(random.integers(1, LITERALS + 1))]
+    return tuple(new_atoms[index] for index in sorted(drawn.tolist()))

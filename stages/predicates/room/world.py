@@ -10,11 +10,13 @@ from scenewright.stages.kit.predicates.room import Body, RoomState
 from scenewright.stages.kit.tasks.strips import Atom
 
 OPEN, SHUT = 1.0, 0.0
+"""Openness of a door that is open, and of one that is shut."""
 HALF_OPEN = 0.5
+"""Openness from which on a door counts as open."""
 DRAWS, CLEARANCE = 60, 0.01
 """Places that are tried on a top; distance kept from what stands there [m]."""
 CARRIED = (0.3, 0.0, 1.1)
-"""Where what is held is, before the robot [m]."""
+"""Place of what is held, before the robot [m]; by eye."""
 
 
 class RoomWorld:
@@ -62,10 +64,10 @@ class RoomWorld:
             return f"{name} is not in the hand"
         if carrier.surface <= 0.0 or carrier.along(2, -1.0) > state.reach[1]:
             return f"nothing can be put on {under}"
-        place = self._free_place(state.bodies[name], under)
-        if place is None:
+        middle = self._free_place(state.bodies[name], under)
+        if middle is None:
             return f"there is no room on {under}"
-        put = replace(state.bodies[name], middle=place)
+        put = replace(state.bodies[name], middle=middle)
         self._state = replace(
             state, bodies={**state.bodies, name: put}, supported={**state.supported, name: under}, held=""
         )
@@ -81,12 +83,12 @@ class RoomWorld:
         slack = [max(0.0, (carrier.edges[axis] - body.edges[axis]) / 2) for axis in (0, 1)]
         for _ in range(DRAWS):
             x, y = (carrier.middle[axis] + float(self._random.uniform(-1, 1)) * slack[axis] for axis in (0, 1))
-            near = (
-                abs(x - other.middle[0]) < (body.edges[0] + other.edges[0]) / 2 + CLEARANCE
-                and abs(y - other.middle[1]) < (body.edges[1] + other.edges[1]) / 2 + CLEARANCE
-                for other in others
+            overlaps = (
+                abs(x - neighbour.middle[0]) < (body.edges[0] + neighbour.edges[0]) / 2 + CLEARANCE
+                and abs(y - neighbour.middle[1]) < (body.edges[1] + neighbour.edges[1]) / 2 + CLEARANCE
+                for neighbour in others
             )
-            if not any(near):
+            if not any(overlaps):
                 return x, y, height
         return None
 
@@ -107,12 +109,12 @@ class RoomWorld:
         return ""
 
     def _open(self, name: str) -> str:
-        return self._turned(name, OPEN)
+        return self._turn_door(name, OPEN)
 
     def _close(self, name: str) -> str:
-        return self._turned(name, SHUT)
+        return self._turn_door(name, SHUT)
 
-    def _turned(self, name: str, openness: float) -> str:
+    def _turn_door(self, name: str, openness: float) -> str:
         body = self._state.bodies[name]
         if self._state.held:
             return "the hand is full"

@@ -122,6 +122,6 @@ class SimulatedTeacher:
     def _say(self, atom: Atom, kind: Literal["lacks", "unmet"]) -> str:
         texts = getattr(self._truth.file.predicates[atom[0]], kind)
         text = texts[0] if self.wording == "plain" else texts[int(self._random.integers(len(texts)))]
-        for place, name in enumerate(atom[1:], start=1):
-            text = text.replace(f"<{place}>", name)
+        for number, name in enumerate(atom[1:], start=1):
+            text = text.replace(f"<{number}>", name)
         return str(text)

@@ -20,6 +20,7 @@ from scenewright.stages.kit.tasks.strips import Atom
 from scenewright.stages.predicates.truth import truth_of
 
 LARGEST_DIALOGUE, LONGEST_ANSWER = 16 * 2**20, 1000
+"""Largest file of a dialogue [bytes] and longest answer [characters]; by eye."""
 YES, NO = ("yes", "y", "ja", "true"), ("no", "n", "nein", "false")
 HINT = "the teacher.jsonl of an earlier run, or --teacher terminal in a terminal"
 
@@ -33,15 +34,15 @@ class Asked(Model):
 
 def read_dialogue(path: Path) -> list[Asked]:
     """Read a dialogue. Raises BadInput naming the line that is none."""
-    found = []
+    questions = []
     for number, line in enumerate(file_content(path, LARGEST_DIALOGUE, hint=HINT).split(b"\n"), start=1):
         if not line.strip():
             continue
         try:
-            found.append(Asked.model_validate_json(line))
+            questions.append(Asked.model_validate_json(line))
         except ValidationError:
             raise BadInput(f"{path}, line {number}: no question and answer", hint=HINT) from None
-    return found
+    return questions
 
 
 class TerminalTeacher:
@@ -62,43 +63,43 @@ class TerminalTeacher:
 
     def correct(self, state: Perceived, action: Atom) -> str:
         """Ask what keeps an action from being done."""
-        return self._asked(f"Why can't I {_action(action)}? (a sentence; say `object NAME` for objects)")
+        return self._next_answer(f"Why can't I {_action(action)}? (a sentence; say `object NAME` for objects)")
 
     def satisfied(self, state: Perceived, goal: tuple[Atom, ...]) -> bool:
         """Ask whether all is as wanted."""
-        return self._yes(f"Is it done: {self._wanted(goal)}?")
+        return self._yes(f"Is it done: {self._goal_text(goal)}?")
 
     def unmet(self, state: Perceived, goal: tuple[Atom, ...]) -> str:
         """Ask what is not as wanted."""
-        return self._asked(f"What is missing of it: {self._wanted(goal)}? (a sentence)")
+        return self._next_answer(f"What is missing of it: {self._goal_text(goal)}? (a sentence)")
 
     def answer(self, state: Perceived, phrase: str, objects: tuple[str, ...]) -> bool:
         """Ask whether a phrase is right of objects."""
-        for place, name in enumerate(objects, start=1):
-            phrase = phrase.replace(f"<{place}>", name)
+        for number, name in enumerate(objects, start=1):
+            phrase = phrase.replace(f"<{number}>", name)
         return self._yes(f"Is it so that {phrase}?")
 
-    def _wanted(self, goal: tuple[Atom, ...]) -> str:
+    def _goal_text(self, goal: tuple[Atom, ...]) -> str:
         return " and ".join(map(truth_of(self.domain).goal_phrase, goal))
 
     def _yes(self, question: str) -> bool:
         text = question
         while True:
-            answer = self._asked(text).lower().strip(" .!")
+            answer = self._next_answer(text).lower().strip(" .!")
             if answer in YES or answer in NO:
                 return answer in YES
             text = f"{question} (yes or no)"
 
-    def _asked(self, question: str) -> str:
+    def _next_answer(self, question: str) -> str:
         if self._at < len(self._earlier):
-            asked = self._earlier[self._at]
-            if asked.question != question:
+            earlier = self._earlier[self._at]
+            if earlier.question != question:
                 raise BadInput(
-                    f"dialogue, question {self._at + 1}: {asked.question[:60]!r} was asked then, "
+                    f"dialogue, question {self._at + 1}: {earlier.question[:60]!r} was asked then, "
                     f"{question[:60]!r} is now",
                     hint="replay it with the seed, tasks and scene of then",
                 )
-            answer = asked.answer
+            answer = earlier.answer
         elif self._ask is None:
             raise BadInput(
                 f"dialogue: it ends before question {self._at + 1}, {question[:80]!r}", hint="continue it in a terminal"

@@ -22,14 +22,17 @@ from scenewright.stages.predicates.world.kitchen import (
 )
 
 CLEARANCE = 2.0
-"""Between things on the table."""
+"""Gap between things on the table [units]; by eye."""
 TRIES = 5
+"""Tries to find a free place on a thing; by eye."""
 SAMPLES = 400
-"""Of a place on the table, before there is said to be none."""
+"""Places on the table that are drawn before there is said to be none; by eye."""
 EPSILON = 0.1
-"""Between what is let go and what it falls on."""
+"""Gap between what is let go and what it falls on [units]; by eye."""
 FAUCET_SECONDS, FAUCET_RATE = 6.0, 0.2
+"""Time that the faucet runs [s], and its drops a step on average; by eye."""
 ENOUGH_DROPS = 5
+"""Drops with which a container counts as filled; by eye."""
 POURED_INTO = ("cup", "pot")
 ARITY = {
     "pick_up": 1,
@@ -40,6 +43,7 @@ ARITY = {
     "get_water_from_faucet": 1,
     "pour_water_from_first_to_second": 2,
 }
+"""Action -> number of its objects."""
 
 
 def pick_up(kitchen: Kitchen, a: Thing) -> str:
@@ -51,7 +55,9 @@ def pick_up(kitchen: Kitchen, a: Thing) -> str:
         return f"{a.name} does not fit between the fingers"
     tips = top - kitchen.grip_depth(a)
     outer = (left - FINGER - MARGIN, tips, right + FINGER + MARGIN, 100.0)
-    blocking = next((other for other in kitchen.things.values() if other is not a and _touches(other, outer)), None)
+    blocking = next(
+        (neighbour for neighbour in kitchen.things.values() if neighbour is not a and _touches(neighbour, outer)), None
+    )
     if blocking is not None:
         return f"{blocking.name} is in the way of the fingers"
     kitchen.open_to(right - left + 2 * MARGIN)
@@ -66,9 +72,11 @@ def place_on_table(kitchen: Kitchen, a: Thing) -> str:
     """Put `a` down on a free place of the table."""
     if kitchen.held is not a:
         return f"{a.name} is not in the hand"
-    taken = [(box[0], box[2]) for box in (other.box() for other in kitchen.things.values() if other is not a)]
+    occupied = [
+        (box[0], box[2]) for box in (neighbour.box() for neighbour in kitchen.things.values() if neighbour is not a)
+    ]
     try:
-        x = free_place(kitchen.random, a.kind.width / 2, taken)
+        x = free_place(kitchen.random, a.kind.width / 2, occupied)
     except ValueError as error:
         return str(error)
     return _let_go(kitchen, a, x, 0.0)
@@ -84,7 +92,7 @@ def place_first_on_second(kitchen: Kitchen, a: Thing, b: Thing) -> str:
         slack = min(0.2, abs(right - left - a.kind.width) / 4 + 0.02)
         x = (left + right) / 2 + float(kitchen.random.uniform(-slack, slack))
         region = (x - half, top + 0.01, x + half, 100.0)
-        if not any(_touches(other, region) for other in kitchen.things.values() if other not in (a, b)):
+        if not any(_touches(neighbour, region) for neighbour in kitchen.things.values() if neighbour not in (a, b)):
             return _let_go(kitchen, a, x, top)
     return f"no free place on {b.name} in {TRIES} tries"
 
@@ -98,7 +106,7 @@ def place_first_in_second(kitchen: Kitchen, a: Thing, b: Thing) -> str:
     low, high = left + wall + half + EPSILON, right - wall - half - EPSILON
     if low > high:
         return f"{a.name} does not fit into {b.name}"
-    inside = [other.box() for other in kitchen.things.values() if other not in (a, b)]
+    inside = [neighbour.box() for neighbour in kitchen.things.values() if neighbour not in (a, b)]
     best, x = -1.0, (low + high) / 2
     for _ in range(TRIES):
         tried = float(kitchen.random.uniform(low, high))
@@ -154,7 +162,9 @@ def push_plate_on_object(kitchen: Kitchen, a: Thing, b: Thing) -> str:
     start = left - FINGER - EPSILON if side > 0 else right + FINGER + EPSILON
     height = bottom + b.kind.height + EPSILON
     region = (start - FINGER, height, start + FINGER, 100.0)
-    blocking = next((other for other in kitchen.things.values() if other is not a and _touches(other, region)), None)
+    blocking = next(
+        (neighbour for neighbour in kitchen.things.values() if neighbour is not a and _touches(neighbour, region)), None
+    )
     if blocking is not None:
         return f"{blocking.name} is in the way of the fingers"
     kitchen.open_to(0.0)

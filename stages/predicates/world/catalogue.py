@@ -51,9 +51,9 @@ class KitchenFile(Model):
     @model_validator(mode="after")
     def _objects_are_known(self) -> KitchenFile:
         for name, domain in self.domains.items():
-            for thing in (*domain.objects, *domain.more):
-                if thing not in self.objects:
-                    raise ValueError(f"domain {name}: there is no object {thing!r}")
+            for object_name in (*domain.objects, *domain.more):
+                if object_name not in self.objects:
+                    raise ValueError(f"domain {name}: there is no object {object_name!r}")
         return self
 
 

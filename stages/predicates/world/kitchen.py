@@ -16,24 +16,35 @@ from scenewright.stages.predicates.state import LARGEST_OPENING, TABLE_LEFT, TAB
 from scenewright.stages.predicates.world.catalogue import Kind
 
 STEP = 0.01
+"""Time step of the physics [s]."""
 GRAVITY = -10.0
+"""Acceleration of gravity [units/s^2]; by eye."""
 SPEED, PUSH_SPEED = 5.0, 0.6
-"""Of the gripper, and of one that pushes [units/s]."""
+"""Speed of the gripper, and of one that pushes [units/s]; by eye."""
 FINGER = 0.6
+"""Width of a finger [units]; by eye."""
 FINGER_HEIGHT = 2.0
+"""Height of a finger [units]; by eye."""
 HOME_X, HOME_Y = 0.0, 25.0
+"""Place of the gripper at the beginning [units]; by eye."""
 SINK_X, SINK_WIDTH, SINK_DEPTH = 31.0, 12.0, 10.0
+"""Middle of the sink, its width and its depth [units]; by eye."""
 FAUCET_HEIGHT = 15.0
+"""Height of the faucet [units]; by eye."""
 DROP_RADIUS = 0.12
+"""Radius of a drop [units]; by eye."""
 DROP_DENSITY = 0.5
+"""Density of a drop; by eye."""
 DENSITY = {"block": 0.05, "container": 0.5, "plate": 0.2, "mat": 0.5}
+"""Shape -> density; by eye."""
 FRICTION = {"block": 1.0, "container": 1.0, "plate": 0.1, "mat": 0.1}
+"""Shape -> friction; by eye."""
 RAMP = 100
 """Steps in which the gripper takes up speed while there is water, so that none slops over."""
 FRAME_EVERY = 40
 """Steps between pictures of a motion."""
 MARGIN = 0.05
-"""Between fingers and what they are about to close on."""
+"""Gap between fingers and what they are about to close on [units]; by eye."""
 
 
 def _paces(steps: int, ramp: int) -> np.ndarray:
@@ -154,14 +165,14 @@ class Kitchen:
     def move(self, x: float, y: float, speed: float = SPEED) -> None:
         """Move fingers, and what they hold, to (x, y) in a straight line."""
         distance = math.hypot(x - self.x, y - self.y)
-        whole = max(1, math.ceil(distance / (speed * STEP)))
-        paces = _paces(whole, RAMP if self.held and self.drops else 0)
-        way = ((x - self.x) / paces.sum() / STEP, (y - self.y) / paces.sum() / STEP)
+        step_count = max(1, math.ceil(distance / (speed * STEP)))
+        paces = _paces(step_count, RAMP if self.held and self.drops else 0)
+        velocity = ((x - self.x) / paces.sum() / STEP, (y - self.y) / paces.sum() / STEP)
         moving = [*self.fingers, *([self.held.body] if self.held else [])]
         self._wake()
         for pace in paces.tolist():
             for body in moving:
-                body.velocity = (way[0] * pace, way[1] * pace)
+                body.velocity = (velocity[0] * pace, velocity[1] * pace)
             self._step()
         for body in moving:
             body.velocity = (0, 0)
@@ -222,7 +233,7 @@ class Kitchen:
             return 0
         left, bottom, right, top = thing.box()
         places = (body.position for body, _ in self.drops)
-        return sum(left < place.x < right and bottom < place.y < top for place in places)
+        return sum(left < drop.x < right and bottom < drop.y < top for drop in places)
 
     def state(self) -> State:
         """Return what the perception calls say now."""
@@ -261,25 +272,25 @@ class Kitchen:
     def drain(self) -> None:
         """Take away drops that fell beside."""
         boxes = [thing.box() for thing in self.things.values() if thing.kind.shape == "container"]
-        kept = []
+        remaining = []
         for body, shape in self.drops:
             x, y = body.position
             if any(box[0] <= x <= box[2] and box[1] <= y <= box[3] for box in boxes):
-                kept.append((body, shape))
+                remaining.append((body, shape))
             else:
                 self.space.remove(body, shape)
-        self.drops = kept
+        self.drops = remaining
 
     def pour_over(self, x: float, y: float, side: int) -> None:
         """Turn what is held about the upper corner on `side` (1: right), kept above (x, y), and back again."""
         assert self.held is not None
-        thing = self.held
-        w, h = thing.kind.width / 2, thing.kind.height / 2
-        body = thing.body
+        poured = self.held
+        w, h = poured.kind.width / 2, poured.kind.height / 2
+        body = poured.body
         self._wake()
         self._solid_fingers(False)
-        for way in (np.linspace(0.0, 2.3, 700), np.linspace(2.3, 0.0, 300)):
-            for angle in way.tolist():
+        for angles in (np.linspace(0.0, 2.3, 700), np.linspace(2.3, 0.0, 300)):
+            for angle in angles.tolist():
                 turned = -side * angle
                 corner = pymunk.Vec2d(side * w, h).rotated(turned)
                 dip = max(0.0, 2 * h * math.cos(angle))
@@ -288,7 +299,7 @@ class Kitchen:
                 body.angular_velocity = (turned - body.angle) / STEP
                 self._step()
         body.velocity, body.angular_velocity, body.angle = (0, 0), 0.0, 0.0
-        self.x, self.y = body.position.x, body.position.y + h - self.grip_depth(thing)
+        self.x, self.y = body.position.x, body.position.y + h - self.grip_depth(poured)
         self._put_fingers()
         self._solid_fingers(True)
 

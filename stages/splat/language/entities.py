@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 NONE = -1
+"""Number that stands for no entity."""
 REACH = 0.05
 """A Gaussian farther from every surface than this is of none [m]."""
 MOST = 0.5
@@ -27,8 +28,8 @@ def nearest_entities(means: np.ndarray, surfaces: Sequence[np.ndarray]) -> np.nd
 
 def entity_of(owners: np.ndarray) -> int:
     """Return the entity that at least MOST of a piece's Gaussians are of, by their owners (K,); NONE: there is none."""
-    known = owners[owners != NONE]
-    if not len(known):
+    known_owners = owners[owners != NONE]
+    if not len(known_owners):
         return NONE
-    best = int(np.bincount(known).argmax())
+    best = int(np.bincount(known_owners).argmax())
     return best if (owners == best).mean() >= MOST else NONE

@@ -12,15 +12,23 @@ import torch
 from torch import nn
 
 GRIDS = ((16, 128), (128, 512))
+"""Coarsest and finest cells along each side of the two hash grids."""
 LEVELS = 12
+"""Levels of each grid."""
 ENTRIES = 2**16
+"""Entries of a level's table: 2^16, where the thesis has 2^19 (docs/SPLATS.md)."""
 NUMBERS = 4
+"""Numbers of an entry."""
 HIDDEN, LAYERS = 256, 3
+"""Width of the network's layers, and their number."""
 PRIMES = (1, 2654435761, 805459861)
+"""Factors of the spatial hash (Mueller et al. 2022)."""
 CORNERS = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
+"""The corners (8, 3) of a cell."""
 INNER = (1.0, 99.0)
 """Percentiles of the Gaussians' centres between which space is not contracted."""
 CHUNK = 32768
+"""Places that are asked for at once: memory, not results, depends on it. By eye."""
 
 
 class HashGrid(nn.Module):
@@ -47,10 +55,10 @@ class HashGrid(nn.Module):
         hashed = corner[..., 0] * PRIMES[0] ^ corner[..., 1] * PRIMES[1] ^ corner[..., 2] * PRIMES[2]
         row = (hashed & (self.entries - 1)) + torch.arange(levels)[None, :, None] * self.entries
         weight = torch.where(self.corners.bool(), part[:, :, None, :], 1 - part[:, :, None, :]).prod(-1)
-        found = nn.functional.embedding_bag(
+        embedded = nn.functional.embedding_bag(
             row.reshape(-1, 8), self.table, per_sample_weights=weight.reshape(-1, 8), mode="sum"
         )
-        return found.reshape(len(places), levels * self.numbers)
+        return embedded.reshape(len(places), levels * self.numbers)
 
 
 class Space:
@@ -79,11 +87,11 @@ class LanguageField(nn.Module):
         self.space = Space(centers)
         self.grid = HashGrid(entries, numbers)
         inputs = [self.grid.width + 1, *[HIDDEN] * layers]
-        made: list[nn.Module] = []
+        modules: list[nn.Module] = []
         for before, after in zip(inputs[:-1], inputs[1:], strict=True):
-            made += [nn.Linear(before, after), nn.ReLU()]
+            modules += [nn.Linear(before, after), nn.ReLU()]
         self.width = width
-        self.network = nn.Sequential(*made, nn.Linear(HIDDEN, width))
+        self.network = nn.Sequential(*modules, nn.Linear(HIDDEN, width))
 
     def forward(self, places: torch.Tensor, sizes: torch.Tensor) -> torch.Tensor:
         """Return (N, width) of places (N, 3) and sizes (N,)."""
@@ -95,9 +103,9 @@ class LanguageField(nn.Module):
 
     def vectors(self, places: np.ndarray, size: float) -> np.ndarray:
         """Return (N, width) float32 of places (N, 3) at one size."""
-        found = []
+        vectors_of_parts = []
         with torch.inference_mode():
             for start in range(0, len(places), CHUNK):
                 part = torch.from_numpy(np.ascontiguousarray(places[start : start + CHUNK], np.float32))
-                found.append(self(part, torch.full((len(part),), float(size))).numpy())
-        return np.concatenate(found) if found else np.zeros((0, self.width), np.float32)
+                vectors_of_parts.append(self(part, torch.full((len(part),), float(size))).numpy())
+        return np.concatenate(vectors_of_parts) if vectors_of_parts else np.zeros((0, self.width), np.float32)

@@ -22,7 +22,9 @@ from scenewright.stages.splat.language.field import LanguageField
 from scenewright.stages.splat.language.pyramid import Level
 
 DELTA = 1.25
+"""Difference from which on the Huber loss is linear."""
 FIRST_RATE, LAST_RATE = 2.5e-3, 1e-3
+"""Rates of learning at the first and the last step."""
 SAMPLES = 3072
 """Pixels of all pictures in a step."""
 SMALLER = 0.25
@@ -71,17 +73,17 @@ def learn(field: LanguageField, lessons: list[Lesson], steps: int, random: np.ra
     for step in range(steps):
         for group in optimizer.param_groups:
             group["lr"] = FIRST_RATE * (LAST_RATE / FIRST_RATE) ** (step / max(1, steps - 1))
-        places, sizes, wanted = [], [], []
+        places, sizes, target_vectors = [], [], []
         for which in random.choice(filled, 6):
             lesson = lessons[which]
             at = random.integers(0, len(lesson.places), per_picture)
             level = random.integers(0, len(lesson.metres), per_picture)
             places.append(lesson.places[at])
             sizes.append(lesson.metres[level] * lesson.depths[at])
-            wanted.append(lesson.vectors[at, level])
-        found = field(torch.from_numpy(np.concatenate(places)), torch.from_numpy(np.concatenate(sizes)))
-        target = torch.from_numpy(np.concatenate(wanted).astype(np.float32))
-        loss = torch.nn.functional.huber_loss(found, target, delta=DELTA, reduction="none").sum(dim=1).mean()
+            target_vectors.append(lesson.vectors[at, level])
+        predicted = field(torch.from_numpy(np.concatenate(places)), torch.from_numpy(np.concatenate(sizes)))
+        target = torch.from_numpy(np.concatenate(target_vectors).astype(np.float32))
+        loss = torch.nn.functional.huber_loss(predicted, target, delta=DELTA, reduction="none").sum(dim=1).mean()
         optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         optimizer.step()

@@ -18,7 +18,7 @@ LEAST_SIDE = 12
 MARGIN = 1.25
 """Side of a square over that of what is seen of the region."""
 MOST_POINTS = 200
-"""Of a region that are looked for."""
+"""Most points of a region that are looked for; by eye."""
 LEAST_SEEN = 0.25
 """Share of the points that a look shows, at least."""
 BEHIND = (0.03, 0.02)
@@ -59,14 +59,14 @@ def looks(regions: Sequence[np.ndarray], sights: Iterable[Sight], encoder: Encod
     owner = np.repeat(np.arange(len(regions)), [len(points) for points in thinned])
     points = np.concatenate(thinned) if thinned else np.zeros((0, 3))
     sizes = np.bincount(owner, minlength=len(regions))
-    kept = [_Kept() for _ in regions]
+    looks_of_region = [_Kept() for _ in regions]
     for sight in sights:
-        _look(sight, points, owner, sizes, kept, encoder.side)
-    crops = [crop for each in kept for crop in each.crops]
-    counts = np.array([len(each.crops) for each in kept], int)
+        _look(sight, points, owner, sizes, looks_of_region, encoder.side)
+    crops = [crop for each in looks_of_region for crop in each.crops]
+    counts = np.array([len(each.crops) for each in looks_of_region], int)
     vectors = np.zeros((len(regions), encoder.width), np.float32)
     if crops:
-        weights = np.sqrt([score for each in kept for score in each.scores])
+        weights = np.sqrt([score for each in looks_of_region for score in each.scores])
         np.add.at(
             vectors, np.repeat(np.arange(len(regions)), counts), encoder.pictures(np.stack(crops)) * weights[:, None]
         )
@@ -82,15 +82,18 @@ def _look(sight: Sight, points: np.ndarray, owner: np.ndarray, sizes: np.ndarray
     inside = (local[:, 2] > 0.1) & (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
     at = np.flatnonzero(inside)
     r, c = rows[at].astype(int), columns[at].astype(int)
-    there = sight.depth[r, c]
-    seen = (there == 0) | (z[at] < there + BEHIND[0] + BEHIND[1] * there)
-    at, r, c = at[seen], r[seen], c[seen]
+    depth_there = sight.depth[r, c]
+    visible = (depth_there == 0) | (z[at] < depth_there + BEHIND[0] + BEHIND[1] * depth_there)
+    at, r, c = at[visible], r[visible], c[visible]
     counts = np.bincount(owner[at], minlength=len(sizes))
     order = np.argsort(owner[at], kind="stable")
     starts = np.concatenate([[0], np.cumsum(counts)])
     for which in np.flatnonzero((counts >= 3) & (counts >= LEAST_SEEN * sizes)):
-        own = order[starts[which] : starts[which + 1]]
-        low, high = (int(r[own].min()), int(c[own].min())), (int(r[own].max()), int(c[own].max()))
+        of_region = order[starts[which] : starts[which + 1]]
+        low, high = (
+            (int(r[of_region].min()), int(c[of_region].min())),
+            (int(r[of_region].max()), int(c[of_region].max())),
+        )
         extent = max(high[0] - low[0], high[1] - low[1]) + 1
         score = float(extent) * counts[which] / sizes[which]
         length = int(min(max(MARGIN * extent, LEAST_SIDE), camera.height, camera.width))

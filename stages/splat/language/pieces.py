@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 SEEN = 0.15
 """Opacity from which on a Gaussian belongs to a surface."""
 NEIGHBOURS = 10
+"""Nearest Gaussians that one may be joined with; by eye."""
 SMOOTH = 16
 """Neighbours whose plane is a Gaussian's normal."""
 REACH = 3.0
@@ -21,9 +22,11 @@ REACH = 3.0
 GRANULARITIES = (0.15, 0.6, 2.0)
 """How readily pieces join: the constant k of the method."""
 SMALLEST = 6
+"""Gaussians that a piece needs; by eye."""
 COLOR, BEND = 1.0, 0.7
 """Weights of a difference of colour (sRGB, length) and of 1 - |cosine| of normals."""
 FIRST_HARMONIC = 0.28209479177387814
+"""Value of the first spherical harmonic, 1 / (2 sqrt(pi))."""
 
 
 def pieces(gaussians: Gaussians) -> np.ndarray:
@@ -38,22 +41,25 @@ def pieces(gaussians: Gaussians) -> np.ndarray:
     colors = np.clip(gaussians.harmonics[solid, 0] * FIRST_HARMONIC + 0.5, 0, 1)
     tree = cKDTree(means)
     count = min(SMOOTH, len(solid) - 1)
-    distances, near = tree.query(means, count + 1)
-    around = means[near] - means[near].mean(axis=1, keepdims=True)
+    distances, neighbours = tree.query(means, count + 1)
+    around = means[neighbours] - means[neighbours].mean(axis=1, keepdims=True)
     normals = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))[1][:, :, 0]
-    colors = np.median(colors[near[:, :6]], axis=1)
-    few = min(NEIGHBOURS, count)
-    first = np.repeat(np.arange(len(solid)), few)
-    second, apart = near[:, 1 : few + 1].reshape(-1), distances[:, 1 : few + 1].reshape(-1)
-    usual = np.maximum(np.median(distances[:, 1 : few + 1], axis=1), 1e-4)
-    kept = apart < REACH * np.minimum(usual[first], usual[second])
-    first, second = first[kept], second[kept]
+    colors = np.median(colors[neighbours[:, :6]], axis=1)
+    neighbour_count = min(NEIGHBOURS, count)
+    first = np.repeat(np.arange(len(solid)), neighbour_count)
+    second, apart = (
+        neighbours[:, 1 : neighbour_count + 1].reshape(-1),
+        distances[:, 1 : neighbour_count + 1].reshape(-1),
+    )
+    usual = np.maximum(np.median(distances[:, 1 : neighbour_count + 1], axis=1), 1e-4)
+    is_close = apart < REACH * np.minimum(usual[first], usual[second])
+    first, second = first[is_close], second[is_close]
     bend = 1.0 - np.abs(np.einsum("ni,ni->n", normals[first], normals[second]))
     weights = COLOR * np.linalg.norm(colors[first] - colors[second], axis=1) + BEND * bend
     order = np.argsort(weights, kind="stable")
     first, second, weights = first[order], second[order], weights[order]
     for row, granularity in enumerate(GRANULARITIES):
-        roots = _joined(first, second, weights, len(solid), granularity, SMALLEST)
+        roots = _join_pieces(first, second, weights, len(solid), granularity, SMALLEST)
         result[row, solid] = np.unique(roots, return_inverse=True)[1]
     return result
 
@@ -67,7 +73,7 @@ def _root(parents: np.ndarray, k: int) -> int:
 
 
 @njit(cache=True)
-def _joined(
+def _join_pieces(
     first: np.ndarray, second: np.ndarray, weights: np.ndarray, count: int, granularity: float, smallest: int
 ) -> np.ndarray:
     """Return the root of every one of `count` nodes; edges ascend in weight."""

@@ -9,10 +9,11 @@ import numpy as np
 from scenewright.stages.kit.open_words.encoder import Encoder
 
 LEVELS = 7
+"""Number of sizes of squares."""
 SMALLEST, LARGEST = 0.10, 0.45
 """Sides of the squares, over the height of the picture."""
 STRIDE = 0.5
-"""From one square to the next, over the side."""
+"""Way from one square to the next, over the side."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +61,14 @@ def pyramid(color: np.ndarray, encoder: Encoder, smallest: float = SMALLEST, lar
             for left in lefts:
                 crop = color[top : top + side, left : left + side]
                 crops.append(cv2.resize(crop, (encoder.side, encoder.side), interpolation=cv2.INTER_AREA))
-    vectors, found, at = encoder.pictures(np.stack(crops)), [], 0
+    vectors, levels, at = encoder.pictures(np.stack(crops)), [], 0
     for share, side, tops, lefts in plans:
         count = len(tops) * len(lefts)
-        own = vectors[at : at + count].reshape(len(tops), len(lefts), -1)
+        vectors_of_level = vectors[at : at + count].reshape(len(tops), len(lefts), -1)
         middles = tuple(starts + (side - 1) / 2 for starts in (tops, lefts))
-        found.append(Level(share, (middles[0], middles[1]), own))
+        levels.append(Level(share, (middles[0], middles[1]), vectors_of_level))
         at += count
-    return found
+    return levels
 
 
 def _starts(length: int, side: int) -> np.ndarray:

@@ -16,8 +16,9 @@ from scenewright.stages.splat.views import PosedView
 SPACING = 4
 """A Gaussian is set in each unexplained square of so many pixels."""
 WIDTH = 0.5
-"""Its standard deviation, over the spacing."""
+"""Standard deviation of a new Gaussian, over the spacing; by eye."""
 OPACITY = 0.7
+"""Opacity of a new Gaussian; by eye."""
 COVERED = 0.6
 """Alpha from which on a pixel counts as explained, unless what is shown lies behind the measured depth."""
 
@@ -59,3 +60,4 @@ METHOD = Method(
     visible_alone=True,
     carried=True,
 )
+"""Our method's constants (docs/SPLATS.md)."""

@@ -11,13 +11,14 @@ from scenewright.stages.splat.seeding import Seeds, at_pixels
 from scenewright.stages.splat.views import PosedView
 
 PIXELS, DEVIATION, OPACITY = 500, 0.02, 0.2
+"""Pixels with depth at which a new picture seeds Gaussians, their standard deviation [m] and their opacity."""
 
 
 def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random: np.random.Generator) -> Seeds:
     """Return a Gaussian of 2 cm at each of 500 random pixels with depth."""
     depth = np.zeros(view.color.shape[:2], np.float32) if view.depth is None else view.depth
-    known = np.argwhere(depth > 0)
-    pixels = known[np.sort(random.permutation(len(known))[:PIXELS])]
+    with_depth = np.argwhere(depth > 0)
+    pixels = with_depth[np.sort(random.permutation(len(with_depth))[:PIXELS])]
     gaussians = at_pixels(view, pixels, depth, np.full(len(pixels), DEVIATION), OPACITY, camera_from_world)
     return Seeds(gaussians, np.zeros(len(pixels), bool))
 
@@ -38,3 +39,4 @@ METHOD = Method(
     visible_alone=False,
     carried=False,
 )
+"""The thesis's constants (docs/SPLATS.md)."""

@@ -109,10 +109,10 @@ def judged(arm: str, case: str, seed: int, truth: TrueView, answer: NeedleEstima
         return Estimate(**common, **errors, swapped=False, mahalanobis=-1.0)
     to_tip, to_swage = np.linalg.norm(pose.tip - true.tip), np.linalg.norm(pose.tip - true.swage)
     swapped = bool(to_swage < to_tip)
-    named = pose.swapped() if swapped else pose
+    pose_of_named_ends = pose.swapped() if swapped else pose
     mahalanobis = -1.0
     if np.isfinite(answer.covariance).all():
-        step = difference(named, true)
+        step = difference(pose_of_named_ends, true)
         mahalanobis = float(step @ np.linalg.solve(answer.covariance, step))
     return Estimate(
         **common,
@@ -121,7 +121,11 @@ def judged(arm: str, case: str, seed: int, truth: TrueView, answer: NeedleEstima
         tip_error_mm=1000.0 * float(to_tip),
         swage_error_mm=1000.0 * float(np.linalg.norm(pose.swage - true.swage)),
         end_error_mm=1000.0
-        * float(max(np.linalg.norm(named.tip - true.tip), np.linalg.norm(named.swage - true.swage))),
+        * float(
+            max(
+                np.linalg.norm(pose_of_named_ends.tip - true.tip), np.linalg.norm(pose_of_named_ends.swage - true.swage)
+            )
+        ),
         swapped=swapped,
         mahalanobis=mahalanobis,
     )

@@ -9,7 +9,7 @@ from scenewright.stages.kit.measurement.proportions import wilson_interval
 from scenewright.stages.suture.evaluation.judgement import Estimate
 
 ARMS = ("thesis", "ours")
-"""In this order; any others come after."""
+"""Estimators in the order in which they are shown; any others come after."""
 OF_TIME = ("cpu_seconds", "hertz")
 INSIDE_95 = 12.592
 """The 95 % point of chi-squared with 6 degrees of freedom."""
@@ -34,6 +34,7 @@ MEASURES: dict[str, Callable[[list[Estimate]], float]] = {
     "cpu_seconds": lambda records: _median(r.seconds for r in records),
     "hertz": lambda records: 1.0 / max(_median(r.seconds for r in records), 1e-9),
 }
+"""Name of a figure -> what computes it from the estimates of a case."""
 
 
 def _values(numbers: Iterable[float]) -> list[float]:

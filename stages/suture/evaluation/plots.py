@@ -13,6 +13,7 @@ from scenewright.stages.suture.evaluation.needle_figures import by_arm
 from scenewright.stages.suture.motion.constants import THROWS
 
 COLORS = {"thesis": SERIES_COLORS[4], "ours": SERIES_COLORS[0]}
+"""Arm -> colour of its bars; other arms get the colours that are left."""
 
 
 def histogram(path: Path, runs: Sequence[SutureRun]) -> None:

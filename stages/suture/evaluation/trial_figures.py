@@ -9,6 +9,7 @@ from scenewright.schemas.suture_trial import SutureRun
 from scenewright.stages.kit.measurement.bootstrap import Interval, bootstrap_interval
 
 SEED_OF_INTERVALS, DRAWS = 0, 2000
+"""Seed of the bootstrap, and the number of its draws."""
 KINDS = "IEHT"
 Pairs = Sequence[tuple[str, str]]
 PAIRS = (("ours", "thesis"), ("ours_supervised", "thesis_supervised"))
@@ -52,7 +53,7 @@ def metrics(runs: Sequence[SutureRun], pairs: Pairs = PAIRS) -> dict[str, float]
         def ratio(rows: np.ndarray) -> np.ndarray:
             return np.asarray(values[rows].sum(axis=-1) / np.maximum(below[rows].sum(axis=-1), 1e-9))
 
-        figures.update(_bounded(f"{arm}/trials/{name}", interval_of(ratio, len(values))))
+        figures.update(_interval_entries(f"{arm}/trials/{name}", interval_of(ratio, len(values))))
 
     for arm, group in groups.items():
         rows = list(group.values())
@@ -66,9 +67,9 @@ def metrics(runs: Sequence[SutureRun], pairs: Pairs = PAIRS) -> dict[str, float]
         put(arm, "full_wound_rate", (thrown >= 6).astype(float))
         put(arm, "seconds_per_suture", seconds, tried)
         put(arm, "seconds_per_completed", seconds, thrown)
-        asked = np.array([run.interventions for run in rows], dtype=float)
-        if asked.sum() > 0:
-            put(arm, "sutures_to_intervention", thrown, asked)
+        interventions = np.array([run.interventions for run in rows], dtype=float)
+        if interventions.sum() > 0:
+            put(arm, "sutures_to_intervention", thrown, interventions)
         for kind in KINDS:
             figures[f"{arm}/trials/errors_{kind.lower()}"] = float(sum(run.errors.count(kind) for run in rows))
         figures[f"{arm}/trials/seen_right_share"] = sum(run.right for run in rows) / max(1, sum(r.looks for r in rows))
@@ -98,11 +99,11 @@ def ratios(arm: str, ours: dict[int, SutureRun], rival: dict[int, SutureRun]) ->
         def ratio(rows: np.ndarray, above: np.ndarray = above, below: np.ndarray = below) -> np.ndarray:
             return _over(above[:, rows].sum(axis=-1), below[:, rows].sum(axis=-1))
 
-        figures.update(_bounded(f"{arm}/trials/{name}", interval_of(ratio, len(seeds))))
+        figures.update(_interval_entries(f"{arm}/trials/{name}", interval_of(ratio, len(seeds))))
     return figures
 
 
-def _bounded(at: str, interval: Interval) -> dict[str, float]:
+def _interval_entries(at: str, interval: Interval) -> dict[str, float]:
     return {at: interval.value, f"{at}_low": interval.low, f"{at}_high": interval.high}
 
 

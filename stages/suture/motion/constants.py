@@ -12,15 +12,21 @@ APPROACH_OFFSET = 0.010
 EXTRACTION_ADVANCE = 0.015
 """Travel [m] towards that point before the jaws close at extraction; at handover it is the offset."""
 EXTRACTION_TURN = radians(80.0)
+"""Turn about the circle's normal by which the needle is drawn out [rad]."""
 MOVED = 0.020
 """An end that moved less than this [m] was not extracted."""
 RETRIES = 5
+"""Most retries of a handover."""
 HANDOVER_OFFSET = 0.005
 """Random horizontal offsets of handover retries stay below this [m]."""
 NORMAL_SAMPLES = 10
+"""Looks whose mean normal is the needle's."""
 CORRECTION_TURN = pi / 2
+"""Turn between the two looks of the pose correction [rad]."""
 THROWS = 6
+"""Sutures of a trial, after which it ends."""
 INTERVENTIONS = 2
+"""Interventions that a trial may need before it ends."""
 
 
 @dataclass(frozen=True)

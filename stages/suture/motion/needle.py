@@ -11,11 +11,15 @@ from scenewright.stages.kit.geometry.transforms import transform_from
 from scenewright.stages.suture.rig import NEEDLE_RADIUS
 
 SAMPLES = 121
+"""Points along the needle's arc."""
 ARC = np.linspace(0.0, np.pi, SAMPLES)
+"""Angle of each point from the tip (0) to the swage (pi) [rad]."""
 ARC_POINTS = NEEDLE_RADIUS * np.column_stack([np.cos(ARC), np.sin(ARC), np.zeros(SAMPLES)])
 ARC_TANGENTS = np.column_stack([-np.sin(ARC), np.cos(ARC), np.zeros(SAMPLES)])
 TIP, SWAGE = ARC_POINTS[0], ARC_POINTS[-1]
+"""The needle's two ends (3,) in its own frame [m]."""
 UP_THE_WOUND = np.array([0.0, 1.0, 0.0])
+"""Direction (3,) along the wound in the world frame."""
 
 
 def about(axis: np.ndarray, angle: float) -> np.ndarray:

@@ -12,6 +12,7 @@ from scenewright.stages.suture.motion.constants import APPROACH_OFFSET, CORRECTI
 from scenewright.stages.suture.motion.needle import UP_THE_WOUND, turned
 
 STEPS = 20
+"""Poses of one motion; by eye."""
 
 
 def jaws(direction: np.ndarray) -> np.ndarray:

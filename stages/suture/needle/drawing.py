@@ -10,11 +10,14 @@ from scenewright.stages.suture.needle.observation import NeedleEstimate
 from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 GREEN, YELLOW, RED, WHITE, VIOLET = (80, 220, 80), (250, 220, 40), (250, 60, 40), (255, 255, 255), (190, 110, 255)
+"""Colours (RGB) of truth, answer, abstention, text and outlines, and of outlines of thread."""
 Color = tuple[int, int, int]
 CHI_95 = 5.99
 """Squared 95 % radius of two degrees of freedom."""
 PANEL_WIDTH, PANEL_HEIGHT, MARGIN, FOOT = 720, 600, 25, 46
+"""Size of one eye's panel, the room around the needle, and the height of the line of text below [px]; by eye."""
 ARC = np.linspace(0.0, np.pi, 90)
+"""Angles [rad] at which the needle is drawn."""
 
 
 def draw_eyes(

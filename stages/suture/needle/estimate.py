@@ -17,12 +17,16 @@ from scenewright.stages.suture.needle.windows import EyeMask, needle_masks, wind
 from scenewright.stages.suture.rig import NeedlePose, StereoRig
 
 FEWEST_PIXELS = 30
+"""Pixels of needle that each eye has to see; by eye."""
 STARTS, MIRRORED, FINALISTS = 14, 3, 6
+"""Starts that are fitted, the best of them that are also tried mirrored, and outlines that are fitted closely; by
+eye."""
 NEAR_STARTS, NEAR_FINALISTS = 2, 2
-"""Where a needle that hardly moved is looked for again."""
+"""The same where a needle that hardly moved is looked for again: starts, and outlines that are fitted closely."""
 COARSE_LEVELS, NARROW_LEVELS = ((3.0, 5), (1.5, 3)), ((1.5, 4), (0.7, 8))
 """Widths of the outline [px], and the most steps with each."""
 POLISH = 4
+"""Most steps of the last fit of an outline; by eye."""
 SAMPLED = 90
 """Pixels of each mask on which starts are scored."""
 SAME, ALIKE = (0.001, np.radians(15.0)), (0.0003, np.radians(3.0))
@@ -30,21 +34,25 @@ SAME, ALIKE = (0.001, np.radians(15.0)), (0.0003, np.radians(3.0))
 TOLERANCE = (0.001, np.radians(10.0))
 """What a robot needs of the centre [m] and of the plane [rad] to grasp the needle."""
 BASIN = (0.003, np.radians(20.0))
-"""Other outlines within this [m], [rad] of the best one are in its covariance."""
+"""Other outlines within this [m], [rad] of the best one are in its covariance; by eye."""
 VARIANCE = 0.36
-"""Of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they should."""
+"""Variance of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they
+should."""
 LEAST_PROBABILITY = 0.45
-"""Of being within TOLERANCE, below which the pose is not answered."""
+"""Probability of being within TOLERANCE, below which the pose is not answered."""
 LEAST_PRESENCE = 0.5
 """Probability that there is a needle, below which none is answered: no needle is then the likelier explanation."""
 MOST_OF_IT = 0.8
-"""Of the probability, about one pose: what is not known then is where in its neighbourhood the needle is."""
+"""Share of the probability that one pose must have about it: what is not known then is where in its neighbourhood the
+needle is."""
 LEAST_SEEN = 0.1
+"""Share of the needle's arc that each eye has to see where it best fits; by eye."""
 SECOND_PIXELS, SECOND_SEEN = 150, 0.5
 """A second needle leaves so many pixels of mask in either eye, and each eye sees so much of its arc."""
 MOST_SURE = 1.0 - 1e-5
-"""Of tip and swage: the evidence is no better than that."""
+"""Highest probability of which end is the tip: the evidence is no better than that."""
 DRAWS = 200
+"""Poses drawn from the covariance to tell the chance of being within TOLERANCE; by eye."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +102,8 @@ def estimate(
     answer = _answer(rivals, presence_probability(features), np.random.default_rng(seed))
     answer = replace(answer, presence_features=tuple(features.tolist()))
     if not answer.abstained:
-        rest = left_over(observation.rig, eyes, sheets, rivals[0].outline)
-        return replace(answer, abstained=_second_needle(observation, rivals[0], rest, seed))
+        rest_masks = left_over(observation.rig, eyes, sheets, rivals[0].outline)
+        return replace(answer, abstained=_second_needle(observation, rivals[0], rest_masks, seed))
     return answer
 
 
@@ -145,22 +153,22 @@ def _hypotheses(
     coarse = [fit_outline(rig, sheets, pose, still, COARSE_LEVELS) for pose in begun]
     coarse.sort(key=lambda outline: outline.misfit)
     for outline in coarse[:MIRRORED]:
-        coarse.append(fit_outline(rig, sheets, _mirrored(outline.pose), still, COARSE_LEVELS))
-    ordered = [rival.outline for rival in _weighed(rig, eyes, sheets, coarse)]
-    return _weighed(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered, NEAR_FINALISTS if near else FINALISTS)))
+        coarse.append(fit_outline(rig, sheets, _mirror_in_depth(outline.pose), still, COARSE_LEVELS))
+    ordered = [rival.outline for rival in _weigh(rig, eyes, sheets, coarse)]
+    return _weigh(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered, NEAR_FINALISTS if near else FINALISTS)))
 
 
 def _finalists(coarse: list[Outline], most: int) -> list[Outline]:
     """Return the best few outlines, none of them like another with tip and swage exchanged or not."""
-    kept: list[Outline] = []
+    finalists: list[Outline] = []
     for outline in coarse:
         if NEAREST < outline.pose.centre[2] < FARTHEST and not any(
-            _near(either_way(outline.pose, other.pose)[0], SAME) for other in kept
+            _near(either_way(outline.pose, finalist.pose)[0], SAME) for finalist in finalists
         ):
-            kept.append(outline)
-        if len(kept) == most:
+            finalists.append(outline)
+        if len(finalists) == most:
             break
-    return kept
+    return finalists
 
 
 def _fine(rig: StereoRig, sheets: tuple[Sheet, Sheet], finalists: list[Outline]) -> list[Outline]:
@@ -175,7 +183,7 @@ def _fine(rig: StereoRig, sheets: tuple[Sheet, Sheet], finalists: list[Outline])
     return outlines
 
 
-def _weighed(
+def _weigh(
     rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outlines: list[Outline]
 ) -> list[Hypothesis]:
     """Return the outlines with their probabilities among each other, most probable first."""
@@ -201,7 +209,7 @@ def _tolerable(steps: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return (np.linalg.norm(steps[:, :3], axis=1) < TOLERANCE[0]) & (tilts < TOLERANCE[1])
 
 
-def _mirrored(pose: NeedlePose) -> NeedlePose:
+def _mirror_in_depth(pose: NeedlePose) -> NeedlePose:
     """Return the pose mirrored in depth about its centre: one eye cannot tell them apart, and two near eyes hardly."""
     sight = pose.centre / np.linalg.norm(pose.centre)
     x, y = (axis - 2.0 * (axis @ sight) * sight for axis in pose.camera_from_needle[:3, :2].T)
@@ -243,15 +251,15 @@ def _answer(rivals: list[Hypothesis], presence: float, random: np.random.Generat
     chances = [_chance(rival, rivals, draws) for rival in rivals]
     chance = max(chances)
     # rivals are ordered: of those about one place the likeliest says where on its circle the needle lies
-    best = next(rival for rival, own in zip(rivals, chances, strict=True) if own >= 0.9 * chance)
-    about = [other for other in rivals if _about(best.pose, other.pose)]
-    along = sum(other.probability for other in about if best.pose.normal @ other.pose.normal > 0)
-    everything = sum(other.probability for other in about)
+    best = next(rival for rival, rival_chance in zip(rivals, chances, strict=True) if rival_chance >= 0.9 * chance)
+    about = [candidate for candidate in rivals if _about(best.pose, candidate.pose)]
+    along = sum(candidate.probability for candidate in about if best.pose.normal @ candidate.pose.normal > 0)
+    everything = sum(candidate.probability for candidate in about)
     pose = best.pose if 2.0 * along >= everything else best.pose.swapped()
     sure = max(along, everything - along) / everything
     why = _why_abstain(best, chance, presence, about)
-    near = [other for other in about if _near(either_way(best.pose, other.pose)[0], BASIN)]
-    covariance = _covariance(best, rivals if why else near)
+    in_basin = [candidate for candidate in about if _near(either_way(best.pose, candidate.pose)[0], BASIN)]
+    covariance = _covariance(best, rivals if why else in_basin)
     return NeedleEstimate(pose, covariance, float(np.clip(sure, 0.5, MOST_SURE)), why)
 
 
@@ -275,22 +283,22 @@ def _chance(hypothesis: Hypothesis, rivals: list[Hypothesis], draws: np.ndarray)
 def _covariance(best: Hypothesis, others: list[Hypothesis]) -> np.ndarray:
     """Return the covariance (6, 6) about the best pose of what `others` (the best among them) say together."""
     total = np.zeros((6, 6))
-    for other in others:
-        step, _ = either_way(best.pose, other.pose)
-        total += other.probability * (other.covariance() + np.outer(step, step))
-    return total / sum(other.probability for other in others)
+    for outline in others:
+        step, _ = either_way(best.pose, outline.pose)
+        total += outline.probability * (outline.covariance() + np.outer(step, step))
+    return total / sum(outline.probability for outline in others)
 
 
 def _why_abstain(best: Hypothesis, chance: float, presence: float, about: list[Hypothesis]) -> str:
     """Return why the pose should not be used, or nothing."""
     if presence < LEAST_PRESENCE:
         return f"What both eyes show is hardly a needle: the best outline is one with {100 * presence:.0f} %."
-    seen = float(best.evidence.seen.mean(axis=1).min())
-    if seen < LEAST_SEEN:
-        return f"One eye sees {100 * seen:.0f} % of the needle where it best fits."
+    least_seen = float(best.evidence.seen.mean(axis=1).min())
+    if least_seen < LEAST_SEEN:
+        return f"One eye sees {100 * least_seen:.0f} % of the needle where it best fits."
     if chance >= LEAST_PROBABILITY:
         return ""
-    if sum(other.probability for other in about) < MOST_OF_IT:
+    if sum(rival.probability for rival in about) < MOST_OF_IT:
         return f"Different poses explain what both eyes see; the likeliest is right with {100 * chance:.0f} %."
     covariance = _covariance(best, about)
     shift = 1000.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))

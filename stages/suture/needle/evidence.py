@@ -32,6 +32,7 @@ COVERED = 2.0
 LEAST_WIDTH = 1.3
 """Masks need not show a wire thinner than this [px]."""
 MOST_LEFT_OVER = 150
+"""Pixels of left-over mask from which on more of them say nothing; by eye."""
 WEIGHTS = np.array([-0.071, -0.076, -0.039, -0.043, -0.072, -0.030, 1.296, -0.148, -0.230, 0.696, -0.502, 0.183, 0.321])
 """Log-weights: of a pixel of misfit but for the lost; of a pixel of mask that is left over (at most MOST_LEFT_OVER); of
 a pixel's misfit for mask lost by one eye, or by both as in tissue; of a piece that one eye alone misses; of the
@@ -41,13 +42,16 @@ at the tip, or passes by the swage, or by the tip."""
 WIDTH_SIGMA = 0.8
 """Standard deviation [px] of the mask's width along a piece."""
 TAPERED = np.flatnonzero((ANGLES[:-1] < TAPER_ANGLE) | (ANGLES[1:] > np.pi - TAPER_ANGLE))
+"""Numbers of the pieces of the outline that taper, at both ends."""
 BEYOND = np.linspace(0.0005, 0.0035, 7)
-"""Where beyond an end thread is looked for [m], along the arc's tangent."""
+"""Distances beyond an end at which thread is looked for [m], along the arc's tangent."""
 AROUND = 0.0025
-"""On a circle of this radius [m] about an end, thread that begins there is seen once, and thread that passes by twice:
-it is tied to the swage, whichever way it leaves it, and may cross the tip."""
+"""Radius [m] of a circle about an end: thread that begins there crosses it once, and thread that passes by twice. It is
+tied to the swage, whichever way it leaves it, and may cross the tip."""
 ANGLES_AROUND = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
+"""Angles [rad] of the circle about an end."""
 ON_UNIT_CIRCLE = np.stack([np.cos(ANGLES_AROUND), np.sin(ANGLES_AROUND)], axis=1)
+"""The same as points (128, 2)."""
 CLOSE = 3
 """Thread within so many pixels of a place counts; mask farther than this from the outline is not the needle's."""
 
@@ -71,9 +75,11 @@ class Evidence:
     @property
     def terms(self) -> np.ndarray:
         """What WEIGHTS (13,) weigh."""
-        rest = self.misfit - self.lost - self.hidden
-        left = min(self.left_over, MOST_LEFT_OVER)
-        return np.array([rest, left, self.lost, self.hidden, self.missing, self.taper, *self.threads])
+        explained_misfit = self.misfit - self.lost - self.hidden
+        capped_left_over = min(self.left_over, MOST_LEFT_OVER)
+        return np.array(
+            [explained_misfit, capped_left_over, self.lost, self.hidden, self.missing, self.taper, *self.threads]
+        )
 
     @property
     def log_weight(self) -> float:
@@ -169,14 +175,14 @@ def _threads(rig: StereoRig, eye: EyeMask, outline: Outline, which: int) -> np.n
 
 def _crossings(thread: np.ndarray, middle: np.ndarray, radius: float) -> int:
     """Return how often thread (h, w) bool crosses a circle about a place (column, row) [px]."""
-    there = np.zeros(len(ON_UNIT_CIRCLE), dtype=bool)
+    on_thread = np.zeros(len(ON_UNIT_CIRCLE), dtype=bool)
     # two circles, as a line of pixels may slip through one
     for reach in (radius, radius + 1.0):
         columns, rows = np.round(middle + reach * ON_UNIT_CIRCLE).astype(int).T
         inside = (columns >= 0) & (rows >= 0) & (columns < thread.shape[1]) & (rows < thread.shape[0])
-        there[inside] |= thread[rows[inside], columns[inside]]
-    there |= np.roll(there, 1) & np.roll(there, -1)
-    return int((there & ~np.roll(there, 1)).sum())
+        on_thread[inside] |= thread[rows[inside], columns[inside]]
+    on_thread |= np.roll(on_thread, 1) & np.roll(on_thread, -1)
+    return int((on_thread & ~np.roll(on_thread, 1)).sum())
 
 
 def left_over(
@@ -188,9 +194,11 @@ def left_over(
     for which, (eye, s) in enumerate(zip(eyes, sheets, strict=True)):
         _, pixels = trace(arc, s.corner, which)
         draw(pixels, GROWTH, CLOSE + 0.5, 1, s.drawn, s.piece)
-        rest = s.free & ~((s.piece >= 0) & (s.drawn <= CLOSE))
+        unexplained = s.free & ~((s.piece >= 0) & (s.drawn <= CLOSE))
         s.piece[:] = -1
-        whole = np.zeros((rig.height, rig.width), dtype=bool)
-        whole[eye.row : eye.row + rest.shape[0], eye.column : eye.column + rest.shape[1]] = rest
-        rests.append(whole)
+        full_mask = np.zeros((rig.height, rig.width), dtype=bool)
+        full_mask[eye.row : eye.row + unexplained.shape[0], eye.column : eye.column + unexplained.shape[1]] = (
+            unexplained
+        )
+        rests.append(full_mask)
     return rests[0], rests[1]

@@ -37,7 +37,7 @@ def moved(pose: NeedlePose, step: np.ndarray) -> NeedlePose:
     return NeedlePose(matrix)
 
 
-def _carried(estimate: NeedleEstimate, motion: np.ndarray, steps: int) -> tuple[NeedlePose, np.ndarray]:
+def _carry_to_last(estimate: NeedleEstimate, motion: np.ndarray, steps: int) -> tuple[NeedlePose, np.ndarray]:
     """Return an estimate's pose and covariance in the last frame, `steps` frames later."""
     assert estimate.pose is not None
     rotation = np.kron(np.eye(2), motion[:3, :3])
@@ -66,14 +66,14 @@ def fuse(frames: list[tuple[NeedleEstimate, np.ndarray]]) -> NeedleEstimate:
     usable = []
     for age, (estimate, motion) in enumerate(reversed(frames)):
         if estimate.pose is not None and np.isfinite(estimate.covariance).all():
-            usable.append((*_carried(estimate, motion, age), estimate))
+            usable.append((*_carry_to_last(estimate, motion, age), estimate))
     if not usable:
         return NeedleEstimate.none("No frame shows the needle.")
     groups = []
     for pose, covariance, _ in usable:
         agreeing = []
-        for index, (other, other_covariance, _) in enumerate(usable):
-            step, exchanged = either_way(pose, other)
+        for index, (other_pose, other_covariance, _) in enumerate(usable):
+            step, exchanged = either_way(pose, other_pose)
             if step @ np.linalg.solve(covariance + other_covariance, step) < AGREES:
                 agreeing.append((index, exchanged))
         # sure frames count for more than unsure ones, which agree with anything
@@ -99,8 +99,8 @@ def _average(
         information[:] = 0.0
         pull, odds = np.zeros(6), 0.0
         for index, exchanged in agreeing:
-            other, covariance, estimate = usable[index]
-            step = difference(pose, other.swapped() if exchanged else other)
+            other_pose, covariance, estimate = usable[index]
+            step = difference(pose, other_pose.swapped() if exchanged else other_pose)
             distance = float(step @ np.linalg.solve(covariance, step))
             weight = np.linalg.inv(covariance) / (1.0 + distance / 12.0)
             information += weight

@@ -41,7 +41,7 @@ class NeedleObservation:
                 "Check the calibration's baseline and the order of the eyes."
             )
         size = (self.rig.height, self.rig.width)
-        named = {
+        arrays = {
             "left needle mask": self.left_mask,
             "right needle mask": self.right_mask,
             "disparity": self.disparity,
@@ -50,7 +50,7 @@ class NeedleObservation:
             "left mask of what hides": self.left_hidden,
             "right mask of what hides": self.right_hidden,
         }
-        for name, array in named.items():
+        for name, array in arrays.items():
             if array is not None and array.shape != size:
                 raise BadInput(
                     f"The {name} is {array.shape} but the rig's images are {size} (rows, columns). "

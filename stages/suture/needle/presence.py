@@ -21,7 +21,9 @@ EDGE_ON = 0.25
 """Quarter turns from edge-on beyond which it makes no difference."""
 FEATURES = ("filled_least", "own", "facing")
 WEIGHTS = np.array([6.8, 16.79, 19.1])
+"""Weights (3,) of FEATURES, fitted on rendered tuning views (`python -m benchmarks.training.needle_presence`)."""
 BIAS = -23.27
+"""Constant of the logistic function, fitted with WEIGHTS."""
 
 
 def presence_features(rig: StereoRig, sheets: tuple[Sheet, Sheet], outline: Outline) -> np.ndarray:
@@ -32,31 +34,31 @@ def presence_features(rig: StereoRig, sheets: tuple[Sheet, Sheet], outline: Outl
     a needle).
     """
     arc = arc_at(rig, outline.pose.camera_from_needle, outline.shift)
-    inside, filled, own, patches = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
+    inside, filled, explained, patches = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
     for eye, sheet in enumerate(sheets):
         _, pixels = trace(arc, sheet.corner, eye)
         draw(pixels, arc.growth, COVERED + 0.5, 1, sheet.drawn, sheet.piece)
-        near = (sheet.piece >= 0) & (sheet.drawn <= COVERED)
-        within = near & (sheet.drawn <= 0.0) & ~sheet.silent
+        covered = (sheet.piece >= 0) & (sheet.drawn <= COVERED)
+        within = covered & (sheet.drawn <= 0.0) & ~sheet.silent
         sheet.piece[:] = -1
         inside[eye], filled[eye] = within.sum(), (within & sheet.free).sum()
-        own[eye], patches[eye] = _explained(sheet.free, near)
+        explained[eye], patches[eye] = _explained_pixels(sheet.free, covered)
     return np.array(
         [
             (filled / np.maximum(inside, 1.0)).min(),
-            own.sum() / max(patches.sum(), 1.0),
+            explained.sum() / max(patches.sum(), 1.0),
             min(outline.pose.degrees_from_edge_on() / 90.0, EDGE_ON),
         ]
     )
 
 
-def _explained(mask: np.ndarray, near: np.ndarray) -> tuple[float, float]:
+def _explained_pixels(mask: np.ndarray, near: np.ndarray) -> tuple[float, float]:
     """Return the pixels of the patches of `mask` that the outline touches, near it and altogether."""
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
-    own = np.bincount(labels[mask & near], minlength=count)
-    whole = np.bincount(labels[mask], minlength=count)
-    touched = own >= FEWEST
-    return float(own[touched].sum()), float(whole[touched].sum())
+    covered_count = np.bincount(labels[mask & near], minlength=count)
+    patch_size = np.bincount(labels[mask], minlength=count)
+    touched = covered_count >= FEWEST
+    return float(covered_count[touched].sum()), float(patch_size[touched].sum())
 
 
 def presence_probability(features: np.ndarray) -> float:

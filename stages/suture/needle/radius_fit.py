@@ -39,7 +39,7 @@ STARTS, AT_A_RADIUS, REFINED = 6, 2, 8
 """Outlines begun with at each radius of the grid, and those of them that are kept; outlines from which the best radius
 is sought."""
 WIDTHS = (0.06, 0.02, 0.01)
-"""Half of what a parabola spans, as a share of the radius: the last one's curvature is the information."""
+"""Half of what each parabola spans, as a share of the radius: the last one's curvature is the information."""
 CALIBRATED = 1.45
 """Deviations are larger than the fit's by this, so that two of them held 95 % of the errors in 79 tuning views (seeds
 300 to 379, spoiled masks): lumps in masks err together over more pixels than VARIANCE counts."""
@@ -101,15 +101,17 @@ def fitted_radius(observation: NeedleObservation, seed: int = 0) -> Radius | Non
     if min(int(mask.sum()) for mask in (observation.left_mask, observation.right_mask)) == 0:
         return None
     sheets, eyes = _sheets(observation), windows(observation)
-    found: list[_Fit] = []
+    fits: list[_Fit] = []
     for metres in map(float, TRIED):
         rig = as_if_usual(observation.rig, metres)
         begun = starts(rig, eyes, np.empty((0, 3)), STARTS, SAMPLED, np.random.default_rng(seed))
-        here = [_Fit(fit_outline(rig, sheets, pose, np.zeros(2), COARSE_LEVELS), metres) for pose in begun]
-        found += _different(sorted(here, key=_misfit), SAME)[:AT_A_RADIUS]
-    found.sort(key=_misfit)
-    refined = [_refined(observation.rig, eyes, sheets, fit) for fit in _different(found, SAME)[:REFINED]]
-    return _spread(_different(sorted((fit for fit in refined if fit), key=lambda fit: -fit.log_weight), ALIKE))
+        fits_of_radius = [_Fit(fit_outline(rig, sheets, pose, np.zeros(2), COARSE_LEVELS), metres) for pose in begun]
+        fits += _different(sorted(fits_of_radius, key=_misfit), SAME)[:AT_A_RADIUS]
+    fits.sort(key=_misfit)
+    refined = [_refine(observation.rig, eyes, sheets, fit) for fit in _different(fits, SAME)[:REFINED]]
+    return _radius_with_spread(
+        _different(sorted((fit for fit in refined if fit), key=lambda fit: -fit.log_weight), ALIKE)
+    )
 
 
 @dataclass(frozen=True)
@@ -134,15 +136,15 @@ def _misfit(fit: _Fit) -> float:
 
 def _different(fits: list[_Fit], limits: tuple[float, float]) -> list[_Fit]:
     """Return the fits, of those within limits [m], [rad] of each other the first."""
-    kept: list[_Fit] = []
+    distinct: list[_Fit] = []
     for fit in fits:
-        steps = (either_way(fit.pose, other.pose)[0] for other in kept)
+        steps = (either_way(fit.pose, earlier.pose)[0] for earlier in distinct)
         if not any(np.linalg.norm(step[:3]) < limits[0] and np.linalg.norm(step[3:]) < limits[1] for step in steps):
-            kept.append(fit)
-    return kept
+            distinct.append(fit)
+    return distinct
 
 
-def _spread(rivals: list[_Fit]) -> Radius | None:
+def _radius_with_spread(rivals: list[_Fit]) -> Radius | None:
     """Return the likeliest one's radius; its variance is that of all about it, each with its probability."""
     if not rivals:
         return None
@@ -161,14 +163,14 @@ def together(radii: Sequence[Radius]) -> Radius:
     order = np.argsort(metres)
     upto = np.cumsum(weights[order])
     middle = metres[order][np.searchsorted(upto, 0.5 * upto[-1])]
-    kept = np.abs(metres - middle) <= OUTLYING * deviations
-    metres, deviations, weights = metres[kept], deviations[kept], weights[kept]
+    inlying = np.abs(metres - middle) <= OUTLYING * deviations
+    metres, deviations, weights = metres[inlying], deviations[inlying], weights[inlying]
     alone = float(np.mean(deviations**2))
     mean = float(weights @ metres / weights.sum())
     return Radius(mean, float(np.sqrt(SHARED * alone + (1.0 - SHARED) / weights.sum())))
 
 
-def _refined(rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], fit: _Fit) -> _Fit | None:
+def _refine(rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], fit: _Fit) -> _Fit | None:
     """Return the fit with the least misfit about a radius; None where the misfit has no least there.
 
     Radius and growth of the masks are fitted together, by the misfit's second differences and the prior of the growth
@@ -201,12 +203,12 @@ def _parabola(at: Callable[[float, float], Outline], growth: float, width: float
     """Return first (2,) and second differences (2, 2) of the misfit with the growth's prior, in units of `width` of the
     radius and of GROWTH_STEP."""
     middle = at(1.0, growth).misfit
-    less, more = at(1.0 - width, growth).misfit, at(1.0 + width, growth).misfit
+    narrower, wider = at(1.0 - width, growth).misfit, at(1.0 + width, growth).misfit
     thin, thick = at(1.0, growth - GROWTH_STEP).misfit, at(1.0, growth + GROWTH_STEP).misfit
     prior = 2.0 * VARIANCE * (GROWTH_STEP / GROWTH_SIGMA) ** 2
-    slope = np.array([0.5 * (more - less), 0.5 * (thick - thin) + prior * (growth - GROWTH) / GROWTH_STEP])
-    across = at(1.0 + width, growth + GROWTH_STEP).misfit - more - thick + middle
-    bend = np.array([[more - 2.0 * middle + less, across], [across, thick - 2.0 * middle + thin + prior]])
+    slope = np.array([0.5 * (wider - narrower), 0.5 * (thick - thin) + prior * (growth - GROWTH) / GROWTH_STEP])
+    across = at(1.0 + width, growth + GROWTH_STEP).misfit - wider - thick + middle
+    bend = np.array([[wider - 2.0 * middle + narrower, across], [across, thick - 2.0 * middle + thin + prior]])
     if np.linalg.det(bend) <= 0.0:
         # far from the least the misfit is no bowl: the growth stays as it is
         return np.array([slope[0], 0.0]), np.diag([bend[0, 0], prior])

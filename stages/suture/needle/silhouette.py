@@ -20,12 +20,17 @@ from scenewright.stages.suture.needle.windows import EyeMask
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 PIECES = 45
+"""Pieces of the outline along the arc; by eye."""
 ANGLES = np.linspace(0.0, np.pi, PIECES + 1)
+"""Angles [rad] of the pieces' ends, from the tip (0) to the swage (pi)."""
 WIRE_RADIUS, TIP_RADIUS, TAPER_ANGLE = 0.0005, 0.00004, 0.7
-"""Of the needle's data sheet: half the wire's and the tip's thickness [m]; the taper runs over 8.4 mm [rad]."""
+"""Half the wire's and the tip's thickness [m] of the needle's data sheet; the taper runs over 8.4 mm [rad]."""
 ALONG = np.clip(ANGLES / TAPER_ANGLE, 0.0, 1.0)
+"""Share of the taper at each of ANGLES, 1 from its end on."""
 RADII = TIP_RADIUS + (WIRE_RADIUS - TIP_RADIUS) * (1.0 - (1.0 - ALONG) ** 1.6)
+"""Half the wire's thickness [m] at each of ANGLES; the power of the taper is by eye."""
 ON_CIRCLE = NEEDLE_RADIUS * np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+"""Points (PIECES + 1, 2) of the arc in the needle's plane [m]."""
 GROWTH = 0.03
 """Masks are wider than the wire by this on either side [px]."""
 CALIBRATION_SIGMA = 0.3
@@ -39,7 +44,7 @@ HIDDEN_WEIGHT = 0.5
 LARGEST_STEP, LEAST_GAIN = 0.4, 0.05
 """A step turns by no more than this [rad]; steps that gain less [px] are the last."""
 OFF_BY = 0.8
-"""Where drawn and found outline are off by this [px] a polishing step counts them half: lumps are not the wire."""
+"""Distance [px] between drawn and found outline that a polishing step counts half: lumps are not the wire."""
 UNDETERMINED = np.diag([1.0 / 0.06**2] * 3 + [1.0 / 3.0**2] * 3 + [0.0] * 2)
 """Holds what the masks do not determine, in units of 60 mm and 3 rad."""
 
@@ -91,7 +96,7 @@ def sheet_of(eye: EyeMask) -> Sheet:
     outside, inside = (cv2.distanceTransform(part, cv2.DIST_L2, 3) for part in (1 - mask, mask))
     signed = np.where(eye.mask, 0.5 - inside, outside - 0.5).astype(np.float32)
     weight = np.where(eye.mask, 1.0, LOST_WEIGHT + (1.0 - LOST_WEIGHT) / (1.0 + (signed / LOST_DISTANCE) ** 2))
-    silent = eye.hidden | _grown(eye.thread, 3)
+    silent = eye.hidden | _dilate(eye.thread, 3)
     weight[silent & ~eye.mask] = 0.0
     weight[eye.hidden & eye.mask] = HIDDEN_WEIGHT
     free = eye.mask & ~eye.hidden
@@ -100,7 +105,7 @@ def sheet_of(eye: EyeMask) -> Sheet:
     return Sheet(signed, weight.astype(np.float32), free, silent, eye.corner, total, drawn, piece)
 
 
-def _grown(mask: np.ndarray, side: int) -> np.ndarray:
+def _dilate(mask: np.ndarray, side: int) -> np.ndarray:
     """Return the mask grown by a square of `side` [px]."""
     return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)) > 0)
 
@@ -245,7 +250,7 @@ def _misfit(
 
 
 @numba.njit(cache=True)
-def _stepped(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float) -> Arc:
+def _take_step(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float) -> Arc:
     """Return the needle after a damped Gauss-Newton step of pose and shift."""
     step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)) + UNDETERMINED, gradient)
     angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
@@ -263,7 +268,7 @@ def _stepped(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float)
 
 
 @numba.njit(cache=True)
-def _fitted(
+def _fit_to_masks(
     arc: Arc, sheets: tuple[Sheet, Sheet], levels: tuple[tuple[float, int], ...], polish: int
 ) -> tuple[Arc, float, np.ndarray]:
     """Return the needle moved onto the masks, its misfit and the information (8, 8)."""
@@ -273,11 +278,11 @@ def _fitted(
         damping = 1e-3
         cost = _misfit(arc, sheets, tau, 0.0, matrix, gradient)
         for _ in range(steps):
-            trial = _stepped(arc, matrix, gradient, damping)
-            there, slope = np.empty((8, 8)), np.empty(8)
-            gain = cost - _misfit(trial, sheets, tau, 0.0, there, slope)
+            trial = _take_step(arc, matrix, gradient, damping)
+            trial_matrix, trial_gradient = np.empty((8, 8)), np.empty(8)
+            gain = cost - _misfit(trial, sheets, tau, 0.0, trial_matrix, trial_gradient)
             if gain > 0.0:
-                arc, cost, matrix, gradient = trial, cost - gain, there, slope
+                arc, cost, matrix, gradient = trial, cost - gain, trial_matrix, trial_gradient
                 damping = max(damping / 5.0, 1e-4)
                 if gain < LEAST_GAIN:
                     break
@@ -287,7 +292,7 @@ def _fitted(
                     break
     for _ in range(polish):
         _misfit(arc, sheets, tau, OFF_BY, matrix, gradient)
-        arc = _stepped(arc, matrix, gradient, 0.0)
+        arc = _take_step(arc, matrix, gradient, 0.0)
     if polish:
         cost = _misfit(arc, sheets, tau, 0.0, np.empty((8, 8)), np.empty(8))
     return arc, cost, matrix
@@ -318,5 +323,5 @@ def fit_outline(
     `levels` are widths of the logistic function [px] and the most steps with each; `polish` steps at the last of them
     count less what is off by much. The information is the polished one's, the misfit the plain one's.
     """
-    arc, cost, information = _fitted(arc_at(rig, pose.camera_from_needle, shift, growth), sheets, levels, polish)
+    arc, cost, information = _fit_to_masks(arc_at(rig, pose.camera_from_needle, shift, growth), sheets, levels, polish)
     return Outline(NeedlePose(arc.pose), arc.shift, cost, information)

@@ -19,9 +19,13 @@ from scenewright.stages.suture.needle.windows import EyeMask
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 NEAREST, FARTHEST = 0.04, 0.80
+"""Depths [m] between which a needle may lie; by eye."""
 TRIPLES = 6000
+"""Triples of points through which circles are laid; by eye."""
 SCORED_ROWS, SCORED_DISPARITY = 1200, 300
+"""Circles that are scored, of those through points of rows and of those through points of the disparity; by eye."""
 LONGEST_RUN = 16
+"""Longest run of mask in a row that is taken for the wire's width [px]; by eye."""
 DIFFERENT = np.radians(12.0), 0.0025, np.radians(60.0)
 """Two starts differ if their planes [rad], centres [m] or the directions of their arcs' middles [rad] do by this."""
 CLOSE = 3.0
@@ -47,17 +51,17 @@ def starts(
         (_row_circles(rig, eyes, random), SCORED_ROWS),
         (_circles_through(points, np.ones(len(points)), TRIPLES, random), SCORED_DISPARITY),
     ):
-        scored, posed = _scored(rig, eyes, distances, pixels, centres[:most], normals[:most])
+        scored, posed = _score_halves(rig, eyes, distances, pixels, centres[:most], normals[:most])
         scores.append(scored)
         poses.append(posed)
     ordered = np.concatenate(poses)[np.argsort(-np.concatenate(scores), kind="stable")]
-    kept: list[np.ndarray] = []
+    distinct: list[np.ndarray] = []
     for pose in ordered:
-        if all(_differ(pose, other) for other in kept):
-            kept.append(pose)
-        if len(kept) == count:
+        if all(_differ(pose, earlier) for earlier in distinct):
+            distinct.append(pose)
+        if len(distinct) == count:
             break
-    return [NeedlePose(pose) for pose in kept]
+    return [NeedlePose(pose) for pose in distinct]
 
 
 def _differ(pose: np.ndarray, other: np.ndarray) -> bool:
@@ -217,7 +221,7 @@ def _score(centre: np.ndarray, normal: np.ndarray, masks: _BothMasks, pose: np.n
             best, at = window, station
     explained = 0.0
     for eye in range(2):
-        near = 0
+        near_pixels = 0
         reach = (width + CLOSE) ** 2
         for index in range(len(pixels[eye])):
             for k in range(half):
@@ -225,9 +229,9 @@ def _score(centre: np.ndarray, normal: np.ndarray, masks: _BothMasks, pose: np.n
                 du = columns[eye, station] - pixels[eye][index, 0]
                 dv = rows[eye, station] - pixels[eye][index, 1]
                 if du * du + dv * dv < reach:
-                    near += 1
+                    near_pixels += 1
                     break
-        explained += near / max(len(pixels[eye]), 1)
+        explained += near_pixels / max(len(pixels[eye]), 1)
     turn = 2 * np.pi * at / count
     for i in range(3):
         pose[i, 0] = np.cos(turn) * u[i] + np.sin(turn) * v[i]
@@ -242,7 +246,7 @@ def _scores(centres: np.ndarray, normals: np.ndarray, masks: _BothMasks, poses: 
         scores[index] = _score(centres[index], normals[index], masks, poses[index])
 
 
-def _scored(
+def _score_halves(
     rig: StereoRig,
     eyes: tuple[EyeMask, EyeMask],
     distances: tuple[np.ndarray, np.ndarray],

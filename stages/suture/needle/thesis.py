@@ -18,8 +18,11 @@ from scenewright.stages.suture.rig import NeedlePose
 from scipy.spatial.transform import Rotation
 
 PLANE_THRESHOLD = 0.0010
+"""Distance of an inlier from the plane [m]; by eye."""
 CIRCLE_THRESHOLD = 0.0010
+"""Distance of an inlier from the circle [m]; by eye."""
 ROUNDS = 400
+"""Rounds of each RANSAC; by eye."""
 
 
 def thesis_estimate(observation: NeedleObservation, seed: int = 0) -> NeedleEstimate:

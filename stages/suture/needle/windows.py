@@ -9,6 +9,7 @@ import numpy as np
 from scenewright.stages.suture.needle.observation import NeedleObservation
 
 MARGIN = 40
+"""Room around the mask in the window [px]; by eye."""
 
 
 @dataclass(frozen=True)

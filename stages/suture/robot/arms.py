@@ -14,8 +14,9 @@ from scenewright.stages.kit.geometry.transforms import inverse, rotation_between
 from scenewright.stages.suture.robot.inverse import reachable
 
 REMOTE_CENTRES = {"right": np.array([-0.12, 0.0, 0.15]), "left": np.array([0.12, 0.0, 0.15])}
+"""Arm -> its remote centre in the world frame [m]; the thesis does not say where its arms stand."""
 AIM = np.array([0.0, 0.0, 0.02])
-"""Where a tool at rest points [m]."""
+"""Point at which a tool at rest points [m]."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from scenewright.stages.suture.robot.psm import (
 )
 
 SMALLEST = 1e-9
+"""Lengths below this [m] have no direction."""
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -52,10 +53,10 @@ def branches(base_from_tip: np.ndarray, flips: tuple[bool, ...] = (False, True))
             pitch_point = yaw_point - PITCH_TO_YAW * link
             reach = np.linalg.norm(pitch_point, axis=-1)
             reach = np.where(reach > SMALLEST, reach, np.nan)
-            for way in (1.0, -1.0):
-                shaft = way * pitch_point / reach[..., None]
+            for sign in (1.0, -1.0):
+                shaft = sign * pitch_point / reach[..., None]
                 for flip in flips:
-                    branches.append(_branch(wrist, link, yaw_axis, shaft, way * reach, flip))
+                    branches.append(_branch(wrist, link, yaw_axis, shaft, sign * reach, flip))
     return np.stack(branches, axis=-2)
 
 
@@ -101,12 +102,12 @@ def reachable(base_from_tip: np.ndarray) -> np.ndarray:
 
 def follow(poses: np.ndarray, start: np.ndarray) -> np.ndarray | None:
     """Return joints (N, 6) along poses (N, 4, 4), each the solution nearest to the one before; None where none is."""
-    here = np.asarray(start, dtype=float)
+    joints = np.asarray(start, dtype=float)
     path = []
     for pose in poses:
         choices = solutions(pose)
         if not len(choices):
             return None
-        here = choices[np.argmin(np.abs(choices - here).max(axis=-1))]
-        path.append(here)
+        joints = choices[np.argmin(np.abs(choices - joints).max(axis=-1))]
+        path.append(joints)
     return np.array(path)

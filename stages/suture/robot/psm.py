@@ -12,20 +12,32 @@ from __future__ import annotations
 import numpy as np
 
 REMOTE_CENTRE_TO_CARRIAGE = 0.4318
+"""Distance from the remote centre to the carriage's zero along the tool [m] (`psm.json`)."""
 TOOL_LENGTH = 0.4162
+"""Length of the tool's shaft [m] (`psm.json`)."""
 PITCH_TO_YAW = 0.0091
+"""Distance between the wrist's axes [m] (large needle driver 400006)."""
 YAW_TO_TIP = 0.0102
+"""Distance from the wrist's yaw axis to the control point [m] (large needle driver 400006)."""
 
 ALPHA = np.array([np.pi / 2, -np.pi / 2, np.pi / 2, 0.0, -np.pi / 2, -np.pi / 2])
+"""Twist of each row [rad], modified Denavit-Hartenberg."""
 LINK_LENGTH = np.array([0.0, 0.0, 0.0, 0.0, 0.0, PITCH_TO_YAW])
+"""Link length of each row [m]."""
 ANGLE_OFFSET = np.array([np.pi / 2, -np.pi / 2, 0.0, 0.0, -np.pi / 2, -np.pi / 2])
+"""Offset of each joint's angle [rad]."""
 LINK_OFFSET = np.array([0.0, 0.0, -REMOTE_CENTRE_TO_CARRIAGE, TOOL_LENGTH, 0.0, 0.0])
+"""Link offset of each row [m]."""
 PRISMATIC = 2
+"""Index of the joint that slides."""
 LOWER = np.array([-1.588, -0.925025, 0.0, -4.53786, -1.39626, -1.39626])
+"""Lower joint limits (6,) [rad], of the insertion [m]."""
 UPPER = np.array([1.588, 0.925025, 0.24, 4.53786, 1.39626, 1.39626])
+"""Upper joint limits (6,) [rad], of the insertion [m]."""
 WRIST_FROM_TIP = np.array(
     [[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, YAW_TO_TIP], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
+"""Pose (4, 4) of the tip frame in the frame of the last joint."""
 
 
 def link_transforms(joints: np.ndarray) -> np.ndarray:

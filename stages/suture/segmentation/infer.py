@@ -13,6 +13,7 @@ from scenewright.stages.suture.segmentation.checkpoint import BUNDLED, load_netw
 from scenewright.stages.suture.segmentation.model import STRIDE, SutureNetwork
 
 THRESHOLD = 0.5
+"""Probability above which a pixel is mask."""
 SMALLEST_NEEDLE, SMALLEST_THREAD, SMALLEST_DRIVER = 25, 8, 200
 """Pieces of mask of fewer pixels are taken out."""
 
@@ -81,6 +82,6 @@ def normalised(pictures: torch.Tensor) -> torch.Tensor:
 def without_specks(mask: np.ndarray, smallest: int) -> np.ndarray:
     """Return the mask (H, W) bool without its 8-connected pieces of fewer than `smallest` pixels."""
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    kept = statistics[:, cv2.CC_STAT_AREA] >= smallest
-    kept[0] = False
-    return kept[labels]
+    is_large = statistics[:, cv2.CC_STAT_AREA] >= smallest
+    is_large[0] = False
+    return is_large[labels]

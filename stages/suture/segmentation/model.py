@@ -39,7 +39,7 @@ class SutureNetwork(nn.Module):
             _block(before, after) for before, after in zip((12, *widths[:-1]), widths, strict=True)
         )
         self.up = nn.ModuleList(
-            _convolution(below + own, own) for own, below in zip(widths[:-1], widths[1:], strict=True)
+            _convolution(below + width, width) for width, below in zip(widths[:-1], widths[1:], strict=True)
         )
         self.answer = nn.Conv2d(widths[0], 4 * len(CLASSES), 1)
         nn.init.constant_(self.answer.bias, -3.0)  # type: ignore[arg-type]

@@ -9,8 +9,11 @@ from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
 DEGREE = 3
+"""Degree of the splines."""
 ROUNDS = 5
+"""Rounds in which samples are weighed anew; by eye."""
 FLAT = 1e-9
+"""Added to the information's diagonal, so that what nothing determines can be solved."""
 
 
 @dataclass(frozen=True)
@@ -58,15 +61,15 @@ def fitted(
         # a straight line is free of the prior: far too weak a one keeps the system regular without samples
         information[np.diag_indices(size)] += FLAT
         right = design.T @ (weights * trust * values)
-        coefficients = _solved(information, right[:, None])[:, 0]
+        coefficients = _solve_banded(information, right[:, None])[:, 0]
         residuals = (values - design @ coefficients) * np.sqrt(weights)
         if np.isfinite(scale):
             trust = 1.0 / (1.0 + (residuals / scale) ** 2)
-    covariance = _solved(information, np.eye(size))
+    covariance = _solve_banded(information, np.eye(size))
     return FittedSpline(BSpline(knots, coefficients, DEGREE), covariance, residuals)
 
 
-def _solved(information: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solve_banded(information: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return the solution (N, K) of the symmetric system whose matrix has DEGREE diagonals on either side."""
     bands = np.zeros((DEGREE + 1, len(information)))
     for offset in range(min(DEGREE + 1, len(information))):

@@ -19,15 +19,21 @@ NEAREST, FARTHEST = 0.06, 0.8
 ROWS = 2.0
 """Places up to so many rows away are considered."""
 ROW_SIGMA = 0.7
+"""Standard deviation of the rows between both eyes [px]; by eye."""
 EVERY = 2
 """One in so many points of the path is matched."""
 MOST_PLACES = 24
+"""Most places of the right eye that are considered for one point; by eye."""
 CARRIED = 8
+"""Cheapest places of a point from which one goes on to the next; by eye."""
 UNSEEN_COST = 2.5
+"""Cost of a point that the right eye does not see; by eye."""
 SLOPE, LEAST_STEP = 0.5, 0.5
+"""Change of the disparity that costs nothing [px/px of path], and what is added to it [px]; by eye."""
 SLOPE_IN_GAPS, GAP = 0.1, 16.0
-"""The disparity changes by about SLOPE px a px of path and LEAST_STEP more; over steps longer than GAP px by less."""
+"""The same over what a step is longer than GAP [px]; by eye."""
 HIGHEST_STEP_COST = 60.0
+"""Highest cost of a change of the disparity; by eye."""
 LARGEST_LEAN = 2.0
 """Rows that do not quite agree are made up for along the right eye's line where it leans less than so many columns a
 row."""
@@ -48,9 +54,9 @@ def places_of(stretches: Sequence[Stretch]) -> Places:
         if len(stretch.points) >= 3:
             points.append(stretch.points)
             directions.append(directions_of(stretch.points))
-    every, ways = np.concatenate(points), np.concatenate(directions)
+    every, tangents = np.concatenate(points), np.concatenate(directions)
     order = np.argsort(every[:, 1], kind="stable")
-    return Places(every[order], ways[order])
+    return Places(every[order], tangents[order])
 
 
 def directions_of(points: np.ndarray, reach: int = 3) -> np.ndarray:
@@ -117,12 +123,14 @@ def _candidates(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return disparities (K,), costs (K,) and numbers (K,) of the places where the row of `point` meets the thread."""
     rows = point[1] - places.points[first:end, 1]
-    ways = places.directions[first:end]
-    lean = ways[:, 0] * np.sign(ways[:, 1]) / np.maximum(np.abs(ways[:, 1]), 1e-3)
+    tangents = places.directions[first:end]
+    lean = tangents[:, 0] * np.sign(tangents[:, 1]) / np.maximum(np.abs(tangents[:, 1]), 1e-3)
     shift = np.where(np.abs(lean) < LARGEST_LEAN, rows * lean, 0.0)
     disparity = point[0] - (places.points[first:end, 0] + shift)
     cost = (rows / ROW_SIGMA) ** 2
-    kept = np.flatnonzero((disparity >= least) & (disparity <= most))
-    if len(kept) > MOST_PLACES:
-        kept = kept[np.argsort(cost[kept], kind="stable")[:: max(len(kept) // (2 * MOST_PLACES), 1)][:MOST_PLACES]]
-    return disparity[kept], cost[kept], kept + first
+    possible = np.flatnonzero((disparity >= least) & (disparity <= most))
+    if len(possible) > MOST_PLACES:
+        possible = possible[
+            np.argsort(cost[possible], kind="stable")[:: max(len(possible) // (2 * MOST_PLACES), 1)][:MOST_PLACES]
+        ]
+    return disparity[possible], cost[possible], possible + first

@@ -17,17 +17,19 @@ FIRST_GAP = 90.0
 GAP_UNIT, HIGHEST_COST = 45.0, 3.2
 """A gap costs its length in this unit [px] and its two turns [rad]; it is bridged up to the highest cost."""
 BLUNT = 7.0
-"""Over gaps shorter than this [px] the gap's own direction says nothing."""
+"""Length of a gap [px] below which its own direction says nothing; by eye."""
 CUT, MARGIN = 4.0, 8.0
-"""To begin in a strand's middle counts as so much farther away [px]; of beginnings that are so much [px] alike the one
-with the longest thread is taken, in doubt if another one's is longer than RIVAL of it."""
+"""Extra distance of a beginning in a strand's middle, and distance within which beginnings are alike [px]: of these the
+one with the longest thread is taken, in doubt if another one's is longer than RIVAL of it."""
 RIVAL = 0.3
+"""Length of another way, as a share of the best one's, from which on the start is in doubt; by eye."""
 FOLD, FOLD_COST = 40, 1.8
 """A strand whose first so many points lie beside the path's end, or that begins beside the path's last points, may go
 on from there: the thread turned back on itself."""
 CLEAR = 0.5
 """The next way must cost so much more, or the gap is in doubt."""
 DIRECTION_OVER = 14
+"""Points of a line's end from which its direction is taken; by eye."""
 
 
 @dataclass(frozen=True)
@@ -56,32 +58,32 @@ def followed(strands: Sequence[Strand], start: np.ndarray | None) -> Path | None
     if start is None:
         longest = max(range(len(free)), key=lambda index: free[index].length)
         first = free.pop(longest)
-        chain, gaps, doubtful = _continued(first, free)
-        back, gaps_before, doubtful_before = _continued(chain[0].reversed(), free)
+        chain, gaps, doubtful = _continue_strand(first, free)
+        back, gaps_before, doubtful_before = _continue_strand(chain[0].reversed(), free)
         chain = [strand.reversed() for strand in reversed(back)] + chain[1:]
         return _path(chain, free, gaps_before[::-1] + gaps, doubtful + doubtful_before, 0.0)
-    ways = []
+    candidates = []
     for first, others, gap in _beginnings(free, np.asarray(start, dtype=float)):
-        chain, gaps, doubtful = _continued(first, others)
-        ways.append((sum(strand.length for strand in chain), _path(chain, others, gaps, doubtful, gap)))
-    if not ways:
+        chain, gaps, doubtful = _continue_strand(first, others)
+        candidates.append((sum(strand.length for strand in chain), _path(chain, others, gaps, doubtful, gap)))
+    if not candidates:
         return None
-    ways.sort(key=lambda way: -way[0])
-    best = ways[0][1]
-    return replace(best, doubtful_start=len(ways) > 1 and ways[1][0] > RIVAL * ways[0][0])
+    candidates.sort(key=lambda way: -way[0])
+    best = candidates[0][1]
+    return replace(best, doubtful_start=len(candidates) > 1 and candidates[1][0] > RIVAL * candidates[0][0])
 
 
 def _path(chain: list[Strand], others: list[Strand], gaps: list[float], doubtful: int, start_gap: float) -> Path:
     """Return the path over the chain's strands with its gaps filled; `others` are the strands that it leaves."""
-    points, seen = [chain[0].points], [np.ones(len(chain[0].points), dtype=bool)]
+    points, visible = [chain[0].points], [np.ones(len(chain[0].points), dtype=bool)]
     for strand in chain[1:]:
         bridge = _bridge(points[-1], strand.points)
         points += [bridge, strand.points]
-        seen += [np.zeros(len(bridge), dtype=bool), np.ones(len(strand.points), dtype=bool)]
+        visible += [np.zeros(len(bridge), dtype=bool), np.ones(len(strand.points), dtype=bool)]
     crossings = sum(len(strand.doubts) for strand in chain)
     left_over = sum(strand.length for strand in others)
-    whole = np.concatenate(points), np.concatenate(seen)
-    return Path(*whole, tuple(gaps), doubtful, crossings, start_gap, False, left_over)
+    points_and_visible = np.concatenate(points), np.concatenate(visible)
+    return Path(*points_and_visible, tuple(gaps), doubtful, crossings, start_gap, False, left_over)
 
 
 def _beginnings(free: list[Strand], start: np.ndarray) -> list[tuple[Strand, list[Strand], float]]:
@@ -96,30 +98,30 @@ def _beginnings(free: list[Strand], start: np.ndarray) -> list[tuple[Strand, lis
         last = len(distances) - 1
         places += [(float(distances[0]), index, 0, 1), (float(distances[last]), index, last, -1)]
         if MARGIN < middle < last - MARGIN:
-            places += [(float(distances[middle]) + CUT, index, middle, way) for way in (1, -1)]
-    nearest = min(place[0] for place in places)
+            places += [(float(distances[middle]) + CUT, index, middle, step) for step in (1, -1)]
+    nearest = min(beginning[0] for beginning in places)
     beginnings = []
-    for distance, index, place, way in sorted(places):
+    for distance, index, cut_index, step in sorted(places):
         if distance > min(nearest + MARGIN, FIRST_GAP):
             break
         strand = free[index]
-        if way > 0:
-            doubts = tuple(doubt - place for doubt in strand.doubts if doubt >= place)
-            first = Strand(strand.points[place:], doubts)
+        if step > 0:
+            doubts = tuple(doubt - cut_index for doubt in strand.doubts if doubt >= cut_index)
+            first = Strand(strand.points[cut_index:], doubts)
         else:
-            first = Strand(strand.points[: place + 1], tuple(d for d in strand.doubts if d <= place)).reversed()
+            first = Strand(strand.points[: cut_index + 1], tuple(d for d in strand.doubts if d <= cut_index)).reversed()
         if first.length >= SHORTEST:
-            beginnings.append((first, [other for k, other in enumerate(free) if k != index], distance))
+            beginnings.append((first, [other_strand for k, other_strand in enumerate(free) if k != index], distance))
     return beginnings
 
 
-def _continued(first: Strand, free: list[Strand]) -> tuple[list[Strand], list[float], int]:
+def _continue_strand(first: Strand, free: list[Strand]) -> tuple[list[Strand], list[float], int]:
     """Return the strand and those that continue it, the gaps between them [px], and how many gaps are in doubt; what is
     used is taken out of `free`."""
     chain, gaps, doubtful = [first], list[float](), 0
     while True:
         ranked = sorted(
-            (_cost(chain[-1].points, turned.points), index, side)
+            (_joining_cost(chain[-1].points, turned.points), index, side)
             for index, strand in enumerate(free)
             for side, turned in enumerate((strand, strand.reversed()))
         )
@@ -141,7 +143,7 @@ def _heading(points: np.ndarray) -> np.ndarray:
     return np.asarray(direction / max(float(np.linalg.norm(direction)), 1e-9))
 
 
-def _cost(before: np.ndarray, after: np.ndarray) -> float:
+def _joining_cost(before: np.ndarray, after: np.ndarray) -> float:
     """Return what it costs to go on from one line's end to another's beginning."""
     gap = after[0] - before[-1]
     distance = float(np.linalg.norm(gap))

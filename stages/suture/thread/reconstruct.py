@@ -21,27 +21,41 @@ from scenewright.stages.suture.thread.strands import strands
 CENTRE_SIGMA = 0.35
 """Standard deviation [px] of a skeleton's point across the line; its errors are alike over CORRELATED pixels."""
 CORRELATED = 4.0
+"""Pixels of a line over which its errors are alike; by eye."""
 ROW_ERROR = 0.2
 """Standard deviation [px] between the eyes' rows: calibration."""
 COLUMN_ERROR = 0.15
-"""The same along rows; it shifts the whole curve and is not made smaller by many samples."""
+"""Standard deviation [px] between the eyes' columns: it shifts the whole curve, and many samples do not make it
+smaller."""
 BEND = 110.0
 """Standard deviation of the thread's curvature [1/m]."""
 PATH_SPACING, DISPARITY_SPACING = 8.0, 16.0
 """Distances of the splines' knots [px]."""
 CAUCHY = 2.5
+"""Misfit, in standard deviations, from which on a sample counts less; by eye."""
 FEWEST = 10
+"""Matched points that a curve needs; by eye."""
 LEVEL = 0.15
-"""Where the line rises by less than this [rows a px of line] the rows say little of its disparity."""
+"""Rise of the line [rows a px of line] below which rows say little of its disparity."""
 POINTS_EVERY = 0.0005
+"""Distance between points of the curve [m]; by eye."""
 BORDER = 4.0
+"""Width of the picture's border, where a thread leaves it [px]; by eye."""
 DOUBTED_GAP = 40.0
+"""Length of a gap from which on a curve is in doubt [px]; by eye."""
 DOUBTED_LEFT_OVER = 0.012
+"""Length of thread beside the curve from which on it is in doubt [m]; by eye."""
 DOUBTED_SHARE = 0.15
+"""Share of a curve in gaps, or vaguely known, from which on it is in doubt; by eye."""
 DOUBTED_LEVEL = 0.012
+"""Length of a stretch along the rows from which on a curve is in doubt [m]; by eye."""
 DOUBTED_UNMATCHED = 0.25
+"""Share of points without a match from which on a curve is in doubt; by eye."""
 DOUBTED_DEVIATION, DOUBTED_SOMEWHERE = 0.002, 0.006
+"""Standard deviation of a point that is vaguely known, and one from which on a single point puts the curve in doubt
+[m]; by eye."""
 DOUBTED_CUT = 0.003
+"""Length left out at the end from which on a curve is in doubt [m]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +95,10 @@ def reconstruct_thread(
     start_pixel = None if begin is None else rig.left(begin[None])[0]
     path = followed(strands(stretches(left_mask)), start_pixel)
     if path is None:
-        near = ""
+        start_text = ""
         if start_pixel is not None:
-            near = f" near the start at column {start_pixel[0]:.0f}, row {start_pixel[1]:.0f}"
-        return ThreadCurve.none(f"The left eye sees no stretch of thread{near}.")
+            start_text = f" near the start at column {start_pixel[0]:.0f}, row {start_pixel[1]:.0f}"
+        return ThreadCurve.none(f"The left eye sees no stretch of thread{start_text}.")
     start_disparity = None if begin is None else rig.focal * rig.baseline / float(begin[2])
     places = places_of(stretches(right_mask))
     index, disparity, sine = matched(path.points, path.seen, places, rig, start_disparity)
@@ -120,16 +134,16 @@ def _curve(
     start_disparity: float | None,
 ) -> ThreadCurve:
     """Return the curve of a path and its matched disparities."""
-    pixels, seen = path.points, path.seen
+    pixels, visible = path.points, path.seen
     if start_pixel is not None:
         # the way from the swage to where the thread is first seen
-        pixels, seen, index = np.vstack([start_pixel, pixels]), np.concatenate([[False], seen]), index + 1
+        pixels, visible, index = np.vstack([start_pixel, pixels]), np.concatenate([[False], visible]), index + 1
     steps = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     end = float(along[-1])
     depth = rig.focal * rig.baseline / float(np.median(disparity))
     bend = BEND * depth / rig.focal
-    used = seen.copy()
+    used = visible.copy()
     deviations = np.full(len(pixels), CENTRE_SIGMA * np.sqrt(CORRELATED))
     if start_pixel is not None:
         used[0] = True
@@ -149,9 +163,9 @@ def _curve(
     last = float(places[-1])
     count = max(round(last * depth / rig.focal / POINTS_EVERY), 8)
     at = np.linspace(0.0, last, count + 1)
-    left = np.stack([line.spline(at) for line in lines], axis=1)
+    left_pixels = np.stack([line.spline(at) for line in lines], axis=1)
     shift = np.maximum(shifts.spline(at), rig.focal * rig.baseline / 2.0)
-    points = rig.triangulate(left, shift)
+    points = rig.triangulate(left_pixels, shift)
     in_depth = points[:, 2] / shift * np.hypot(shifts.deviation(at), COLUMN_ERROR)
     across = points[:, 2] / rig.focal * np.hypot(lines[0].deviation(at), lines[1].deviation(at))
     sight = np.linalg.norm(points, axis=1) / points[:, 2]
@@ -159,10 +173,10 @@ def _curve(
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     scale = depth / rig.focal
     level = _longest(rise < LEVEL, np.gradient(along)[index] * max(1.0, float(np.median(np.diff(index)))))
-    unmatched = 1.0 - len(index) / max(int(seen.sum()) / 2.0, 1.0)
+    unmatched = 1.0 - len(index) / max(int(visible.sum()) / 2.0, 1.0)
     vague = float((deviation > DOUBTED_DEVIATION).mean())
     cut = scale * (end - last)
-    leaves = _at_border(left[-1], rig) or _at_border(left[-1] - [shift[-1], 0.0], rig)
+    leaves = _at_border(left_pixels[-1], rig) or _at_border(left_pixels[-1] - [shift[-1], 0.0], rig)
     remarks = _remarks(path, _Doubts(scale, end, level, unmatched, vague, float(deviation.max()), cut, leaves))
     return ThreadCurve(points, deviation, length, "unsure" if remarks else "ok", remarks)
 
@@ -170,8 +184,8 @@ def _curve(
 def _longest(which: np.ndarray, lengths: np.ndarray) -> float:
     """Return the greatest sum of `lengths` over a run of `which`."""
     longest = run = 0.0
-    for here, length in zip(which, lengths, strict=True):
-        run = run + float(length) if here else 0.0
+    for inside, length in zip(which, lengths, strict=True):
+        run = run + float(length) if inside else 0.0
         longest = max(longest, run)
     return longest
 

@@ -18,6 +18,7 @@ SMOOTHING = 2.0
 AROUND_CENTRE = 4
 """The middle of the mask is sought in so many pixels on each side of a skeleton's pixel."""
 FARTHEST_MOVE = 1.0
+"""Farther than this a point is not moved across the line [px]; by eye."""
 AROUND = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 """(row, column) of the eight neighbours, clockwise from above."""
 
@@ -53,8 +54,8 @@ def thinned(mask: np.ndarray) -> np.ndarray:
             first = (nw | n).astype(int) + (ne | e) + (se | s) + (sw | w)
             second = (n | ne).astype(int) + (e | se) + (s | sw) + (w | nw)
             neighbours = np.minimum(first, second)
-            kept = ((n | ne | ~se) & e) if not odd else ((s | sw | ~nw) & w)
-            gone = (crossings == 1) & (neighbours >= 2) & (neighbours <= 3) & ~kept
+            protected = ((n | ne | ~se) & e) if not odd else ((s | sw | ~nw) & w)
+            gone = (crossings == 1) & (neighbours >= 2) & (neighbours <= 3) & ~protected
             if gone.any():
                 changed = True
                 flat[pixels[gone]] = False
@@ -69,10 +70,10 @@ def _links(skeleton: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
     number = np.full((skeleton.shape[0] + 2, skeleton.shape[1] + 2), -1)
     number[pixels[:, 0] + 1, pixels[:, 1] + 1] = np.arange(len(pixels))
     around = np.stack([number[pixels[:, 0] + 1 + r, pixels[:, 1] + 1 + c] for r, c in AROUND], axis=1)
-    there = around >= 0
+    has_neighbour = around >= 0
     for diagonal in (1, 3, 5, 7):
-        there[:, diagonal] &= ~there[:, diagonal - 1] & ~there[:, (diagonal + 1) % 8]
-    return pixels, [row[seen].tolist() for row, seen in zip(around, there, strict=True)]
+        has_neighbour[:, diagonal] &= ~has_neighbour[:, diagonal - 1] & ~has_neighbour[:, (diagonal + 1) % 8]
+    return pixels, [row[is_link].tolist() for row, is_link in zip(around, has_neighbour, strict=True)]
 
 
 def stretches(mask: np.ndarray) -> list[Stretch]:
@@ -89,13 +90,13 @@ def stretches(mask: np.ndarray) -> list[Stretch]:
         ]
         if not any(spurs):
             break
-        chains = _joined([chain for chain, spur in zip(chains, spurs, strict=True) if not spur])
+        chains = _join_chains([chain for chain, spur in zip(chains, spurs, strict=True) if not spur])
     result = []
     for chain in chains:
         ends = [chain[end] if degrees[chain[end]] > 1 and chain[0] != chain[-1] else -1 for end in (0, -1)]
         if chain[0] == chain[-1] and degrees[chain[0]] > 2:
             ends = [chain[0], chain[0]]
-        points = _smoothed(_centred(mask, _smoothed(pixels[chain][:, ::-1].astype(float)), pixels[chain]))
+        points = _smooth(_centre_on_mask(mask, _smooth(pixels[chain][:, ::-1].astype(float)), pixels[chain]))
         result.append(Stretch(points, *ends))
     return result
 
@@ -111,7 +112,7 @@ def _chains(links: list[list[int]]) -> list[list[int]]:
             chain = [node, begin]
             while len(links[chain[-1]]) == 2:
                 used[chain[-1]] = True
-                following = [other for other in links[chain[-1]] if other != chain[-2]]
+                following = [neighbour for neighbour in links[chain[-1]] if neighbour != chain[-2]]
                 chain.append(following[0])
             # each chain is met from both of its ends
             if (chain[0], chain[1]) <= (chain[-1], chain[-2]):
@@ -122,7 +123,7 @@ def _chains(links: list[list[int]]) -> list[list[int]]:
         ring = [begin]
         used[begin] = True
         while True:
-            following = [other for other in links[ring[-1]] if not used[other]]
+            following = [neighbour for neighbour in links[ring[-1]] if not used[neighbour]]
             if not following:
                 break
             ring.append(following[0])
@@ -131,7 +132,7 @@ def _chains(links: list[list[int]]) -> list[list[int]]:
     return chains
 
 
-def _joined(chains: list[list[int]]) -> list[list[int]]:
+def _join_chains(chains: list[list[int]]) -> list[list[int]]:
     """Return the chains with those joined that alone meet at a pixel since a spur was taken out there."""
     chains = [list(chain) for chain in chains]
     while True:
@@ -156,7 +157,7 @@ def _joined(chains: list[list[int]]) -> list[list[int]]:
         chains = [chain for index, chain in enumerate(chains) if index not in pair] + [before + after[1:]]
 
 
-def _centred(mask: np.ndarray, line: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+def _centre_on_mask(mask: np.ndarray, line: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Return the points (N, 2) of a line moved across it to the middle of the mask around their pixels (N, 2; row,
     column): thinning takes one side of an even width."""
     if len(line) < 5:
@@ -166,16 +167,18 @@ def _centred(mask: np.ndarray, line: np.ndarray, pixels: np.ndarray) -> np.ndarr
     count, sums = np.zeros(len(line)), np.zeros((len(line), 2))
     for row in reach:
         for column in reach:
-            there = padded[pixels[:, 0] + AROUND_CENTRE + row, pixels[:, 1] + AROUND_CENTRE + column]
-            count += there
-            sums += there[:, None] * (pixels[:, ::-1] + [column, row])
-    way = np.gradient(line, axis=0)
-    across = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+            in_mask = padded[pixels[:, 0] + AROUND_CENTRE + row, pixels[:, 1] + AROUND_CENTRE + column]
+            count += in_mask
+            sums += in_mask[:, None] * (pixels[:, ::-1] + [column, row])
+    tangent = np.gradient(line, axis=0)
+    across = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1) / np.maximum(
+        np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9
+    )
     move = ((sums / np.maximum(count, 1)[:, None] - line) * across).sum(axis=1)
     return np.asarray(line + np.where(np.abs(move) < FARTHEST_MOVE, move, 0.0)[:, None] * across)
 
 
-def _smoothed(points: np.ndarray) -> np.ndarray:
+def _smooth(points: np.ndarray) -> np.ndarray:
     """Return points (N, 2) smoothed along the line; the ends stay."""
     if len(points) < 5:
         return points

@@ -20,11 +20,14 @@ LONGEST_SHARED = 60.0
 REACH = 12
 """Pixels of a branch from which its direction is taken, beyond SKIPPED ones: thinning bends lines at crossings."""
 SKIPPED = 3
+"""Pixels next to a crossing that say nothing of a branch's direction; by eye."""
 LARGEST_TURN = np.radians(80.0)
+"""Turn at a crossing beyond which two branches are not one thread [rad]; by eye."""
 CLOSE = np.radians(14.0)
 """A pairing is in doubt if another one's turns sum up to less than this more."""
 MOST_BRANCHES = 8
-"""Of more branches the pairs are taken one after the other, the straightest first."""
+"""Branches of a crossing of which all pairs are tried; of more, pairs are taken one after the other, the straightest
+first."""
 
 End = tuple[int, int]
 """A stretch's number and which of its ends: 0 or 1."""
@@ -61,7 +64,7 @@ def outward(points: np.ndarray, end: int) -> np.ndarray:
 def strands(stretches: list[Stretch]) -> list[Strand]:
     """Return the strands that the stretches make, the longest first."""
     crossing, inner = _crossings(stretches)
-    shared = _shared(stretches, crossing, inner)
+    shared = _find_shared(stretches, crossing, inner)
     branches: dict[int, list[End]] = {}
     for index, stretch in enumerate(stretches):
         if index in inner or index in shared:
@@ -72,7 +75,7 @@ def strands(stretches: list[Stretch]) -> list[Strand]:
     onward: dict[End, tuple[End, bool, np.ndarray]] = {}
     for name, ends in branches.items():
         via = next((stretches[k].points for k, names in shared.items() if name in names), np.empty((0, 2)))
-        for incoming, outgoing, doubtful in _paired(stretches, ends):
+        for incoming, outgoing, doubtful in _pair_branches(stretches, ends):
             onward[incoming] = (outgoing, doubtful, _toward(via, stretches, incoming))
             onward[outgoing] = (incoming, doubtful, _toward(via, stretches, outgoing))
     outer = [index for index in range(len(stretches)) if index not in inner and index not in shared]
@@ -96,7 +99,7 @@ def _crossings(stretches: list[Stretch]) -> tuple[dict[int, int], set[int]]:
     return {node: root(node) for node in name}, inner
 
 
-def _shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int]) -> dict[int, tuple[int, int]]:
+def _find_shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int]) -> dict[int, tuple[int, int]]:
     """Return the stretches on which two threads lie, with the name of their joined crossing; `crossing` is changed:
     the forks at both ends of such a stretch become one crossing."""
     ends: dict[int, list[End]] = {}
@@ -106,16 +109,16 @@ def _shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int])
                 if node >= 0:
                     ends.setdefault(crossing[node], []).append((index, end))
     shared: dict[int, tuple[int, int]] = {}
-    taken: set[int] = set()
+    joined_ends: set[int] = set()
     for index, stretch in enumerate(stretches):
         if index in inner or stretch.first < 0 or stretch.last < 0 or stretch.length > LONGEST_SHARED:
             continue
         first, last = crossing[stretch.first], crossing[stretch.last]
-        if first == last or first in taken or last in taken:
+        if first == last or first in joined_ends or last in joined_ends:
             continue
         if all(_is_fork(stretches, ends[name], index) for name in (first, last)):
             shared[index] = (first, last)
-            taken |= {first, last}
+            joined_ends |= {first, last}
     for first, last in shared.values():
         for node, name in crossing.items():
             if name == last:
@@ -139,7 +142,7 @@ def _turn(incoming: np.ndarray, outgoing: np.ndarray) -> float:
     return float(np.arccos(np.clip(-(incoming @ outgoing), -1.0, 1.0)))
 
 
-def _paired(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, End, bool]]:
+def _pair_branches(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, End, bool]]:
     """Yield pairs of branches that are one thread, and whether that is in doubt."""
     directions = [outward(stretches[index].points, end) for index, end in ends]
     turns = np.array([[_turn(incoming, outgoing) for outgoing in directions] for incoming in directions])
@@ -158,7 +161,12 @@ def _paired(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, En
         return
     costs = sorted(_matchings(tuple(range(len(ends))), turns, alone), key=lambda matching: matching[0])
     best = costs[0][1]
-    doubtful = {pair for pair in best for cost, other in costs[1:] if cost - costs[0][0] < CLOSE and pair not in other}
+    doubtful = {
+        pair
+        for pair in best
+        for cost, other_pairs in costs[1:]
+        if cost - costs[0][0] < CLOSE and pair not in other_pairs
+    }
     for i, j in best:
         yield ends[i], ends[j], (i, j) in doubtful
 
@@ -170,13 +178,13 @@ def _matchings(
     if not free:
         yield 0.0, ()
         return
-    first, rest = free[0], free[1:]
-    for cost, pairs in _matchings(rest, turns, alone):
+    first, remaining = free[0], free[1:]
+    for cost, pairs in _matchings(remaining, turns, alone):
         yield cost + float(alone[first]), pairs
-    for other in rest:
-        if turns[first, other] < LARGEST_TURN:
-            for cost, pairs in _matchings(tuple(k for k in rest if k != other), turns, alone):
-                yield cost + float(turns[first, other]), ((first, other), *pairs)
+    for partner in remaining:
+        if turns[first, partner] < LARGEST_TURN:
+            for cost, pairs in _matchings(tuple(k for k in remaining if k != partner), turns, alone):
+                yield cost + float(turns[first, partner]), ((first, partner), *pairs)
 
 
 def _toward(via: np.ndarray, stretches: list[Stretch], end: End) -> np.ndarray:
@@ -184,8 +192,8 @@ def _toward(via: np.ndarray, stretches: list[Stretch], end: End) -> np.ndarray:
     if len(via) == 0:
         return via
     points = stretches[end[0]].points
-    place = points[0] if end[1] == 0 else points[-1]
-    return via if np.linalg.norm(via[0] - place) <= np.linalg.norm(via[-1] - place) else via[::-1]
+    end_point = points[0] if end[1] == 0 else points[-1]
+    return via if np.linalg.norm(via[0] - end_point) <= np.linalg.norm(via[-1] - end_point) else via[::-1]
 
 
 def _walks(
@@ -197,20 +205,20 @@ def _walks(
     for index, end in begins + [(index, 0) for index in outer]:
         if index in used:
             continue
-        parts, doubts, count = [], [], 0
-        here: End | None = (index, end)
-        while here is not None and here[0] not in used:
-            used.add(here[0])
-            points = stretches[here[0]].points
-            points = points if here[1] == 0 else points[::-1]
-            parts.append(points)
+        pieces, doubts, count = [], [], 0
+        entered: End | None = (index, end)
+        while entered is not None and entered[0] not in used:
+            used.add(entered[0])
+            points = stretches[entered[0]].points
+            points = points if entered[1] == 0 else points[::-1]
+            pieces.append(points)
             count += len(points)
-            leaving = (here[0], 1 - here[1])
-            here = None
+            leaving = (entered[0], 1 - entered[1])
+            entered = None
             if leaving in onward:
-                here, doubtful, via = onward[leaving]
+                entered, doubtful, via = onward[leaving]
                 if doubtful:
                     doubts.append(count - 1)
-                parts.append(via)
+                pieces.append(via)
                 count += len(via)
-        yield Strand(np.concatenate(parts), tuple(doubts))
+        yield Strand(np.concatenate(pieces), tuple(doubts))

@@ -43,15 +43,15 @@ def as_planned(belief: Belief, tool: np.ndarray) -> Seen:
 
 def mean_normal(looks: list[Seen]) -> np.ndarray:
     """Return the mean of estimated normals (3,), each turned to the side of +y first."""
-    total = np.sum([seen.normal if seen.normal @ UP_THE_WOUND > 0 else -seen.normal for seen in looks], axis=0)
+    total = np.sum([look.normal if look.normal @ UP_THE_WOUND > 0 else -look.normal for look in looks], axis=0)
     return total / np.linalg.norm(total)
 
 
 def middle_ends(looks: list[Seen], driver: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the medians (3,) of the far and of the near end, seen from the driver at (3,) [m]."""
     far, near = [], []
-    for seen in looks:
-        first, second = sorted((seen.tip, seen.swage), key=lambda end: -float(np.linalg.norm(end - driver)))
+    for look in looks:
+        first, second = sorted((look.tip, look.swage), key=lambda end: -float(np.linalg.norm(end - driver)))
         far.append(first)
         near.append(second)
     return np.median(far, axis=0), np.median(near, axis=0)

@@ -20,11 +20,15 @@ HOME = {
     "right": transform_from(jaws(np.array([0.5, 0.0, -0.85])), np.array([-0.050, 0.0, 0.055])),
     "left": transform_from(jaws(np.array([-0.5, 0.0, -0.85])), np.array([0.050, 0.0, 0.055])),
 }
+"""Arm -> pose (4, 4) of its tool at the beginning, world frame; by eye."""
 CORNER = transform_from(jaws(np.array([1.0, 0.0, 0.0])), np.array([-0.045, -0.030, 0.032]))
 """The lower, back, right corner: away from the cameras, on the right driver's side."""
 SHAFT, SHAFT_RADIUS = 0.06, 0.004
+"""Length of a tool's shaft that may touch, and its radius [m]; by eye."""
 TURNING_RADIUS = 0.02
+"""Way that a turn counts for in a motion's time [m/rad]; by eye."""
 SETTLING = 30
+"""Steps in which the thread comes to rest at the beginning; by eye."""
 CHECKED_EVERY = 5
 """Every so many poses of a path the arm is asked whether it reaches them, and at the last."""
 
@@ -80,15 +84,17 @@ class Bench:
         open across the thread, as in sweeping. `aside`: the clock goes on at once, and the driver's own next motion
         begins when it is there.
         """
-        asked = np.arange(len(path) - 1, -1, -CHECKED_EVERY)[::-1]
-        reached = ARMS[arm].reaches(path[asked])
+        checked = np.arange(len(path) - 1, -1, -CHECKED_EVERY)[::-1]
+        reached = ARMS[arm].reaches(path[checked])
         if not reached.all():
             self.stopped_short += 1
-            path = path[: asked[max(0, int(np.argmin(reached)) - 1)] + 1]
-        held = self.hold is not None and self.hold.arm == arm
-        needles = path @ self.hold.grip if held and self.hold else np.repeat(self.needle[None], len(path), axis=0)
+            path = path[: checked[max(0, int(np.argmin(reached)) - 1)] + 1]
+        holds_needle = self.hold is not None and self.hold.arm == arm
+        needles = (
+            path @ self.hold.grip if holds_needle and self.hold else np.repeat(self.needle[None], len(path), axis=0)
+        )
         swages = needles[:, :3, :3] @ SWAGE + needles[:, :3, 3]
-        if held:
+        if holds_needle:
             self._tug(float(np.linalg.norm(swages[-1] - self._anchor_or(swages[-1]))))
             if self.hold is None:
                 raise Failed("T", "taut thread pulled the needle out of the jaws")
@@ -112,10 +118,10 @@ class Bench:
     def look(self, place: str) -> Seen | None:
         """Return one estimate of the needle in the robot's frame as it believes it (with the hand-eye error)."""
         self.seconds += self.eyes.model.seconds_an_estimate
-        seen = self.eyes.look(self.needle, place)
-        if seen is None:
+        looked = self.eyes.look(self.needle, place)
+        if looked is None:
             return None
-        return Seen(seen.normal, seen.tip + self.hand_eye, seen.swage + self.hand_eye, seen.right)
+        return Seen(looked.normal, looked.tip + self.hand_eye, looked.swage + self.hand_eye, looked.right)
 
     def jaws(self, arm: str) -> np.ndarray:
         """Return the point (1, 3) [m] between a driver's jaws."""
@@ -210,10 +216,10 @@ class Bench:
             capsules[:, 2, 3:6] = path[:, :3, 3] + np.array([0.022, 0.0, 0.0])
             capsules[:, 2, 6] = 0.003
         first = swages if self.anchor is None else np.repeat(self.anchor[None], steps, axis=0)
-        rest = np.full(steps, self.thread.working)
+        rest_lengths = np.full(steps, self.thread.working)
         drape(
             self.rope,
-            rest,
+            rest_lengths,
             np.ascontiguousarray(first),
             np.ascontiguousarray(swages),
             self.anchor is not None,

@@ -31,8 +31,11 @@ COLORS = {
 MILLIMETRES = np.array([-1000.0, -1000.0, 1000.0])
 """Seen as by one who stands at the cameras, which look along -y: x runs to the left, away is up."""
 VIEWS = ((0, 2, "from the cameras"), (0, 1, "from above"))
+"""Axis across, axis up, and name of each view."""
 LIMITS = {0: (-72, 72), 1: (-76, 56), 2: (-4, 102)}
+"""Axis -> what of it is drawn [mm]."""
 ACROSS, SIDE = 6, 2.3
+"""Pictures in a row, and the side of one [inches]."""
 ORDER = "abcdefghijk"
 
 
@@ -56,8 +59,8 @@ def draw_strip(path: Path, frames: Mapping[str, np.ndarray], suture: int | None 
     )
     for axis in axes.flat:
         axis.axis("off")
-    for place, row in enumerate(rows):
-        band, column = divmod(place, ACROSS)
+    for number, row in enumerate(rows):
+        band, column = divmod(number, ACROSS)
         for line, (across, upwards, label) in enumerate(VIEWS):
             axis = axes[2 * band + line, column]
             _draw(axis, frames, int(row), across, upwards)
@@ -97,19 +100,21 @@ def whole_suture(frames: Mapping[str, np.ndarray]) -> np.ndarray:
     start = int(inserted[inserted < released[0]].max())
     after = np.flatnonzero(inserted > released[0])
     end = int(inserted[after[0]]) if len(after) else len(letters)
-    kept: dict[str, int] = {}
+    row_of_panel: dict[str, int] = {}
     for row in range(max(0, start - 1), end):
         panel = names[row]
-        wanted = row >= start or letters[row] == "a"
-        if wanted and letters[row] and letters[row] in ORDER and not (letters[row] == "a" and row > start):
-            kept[panel] = row
-    return np.array(sorted(kept.values(), key=lambda row: (ORDER.index(names[row][0]), row)))
+        in_suture = row >= start or letters[row] == "a"
+        if in_suture and letters[row] and letters[row] in ORDER and not (letters[row] == "a" and row > start):
+            row_of_panel[panel] = row
+    return np.array(sorted(row_of_panel.values(), key=lambda row: (ORDER.index(names[row][0]), row)))
 
 
 def _draw(axes: Any, frames: Mapping[str, np.ndarray], row: int, across: int, upwards: int) -> None:
     def line(points: np.ndarray, color: str, width: float) -> None:
-        shown = points * MILLIMETRES
-        axes.plot(shown[:, across], shown[:, upwards], color=color, linewidth=width, solid_capstyle="round")
+        in_millimetres = points * MILLIMETRES
+        axes.plot(
+            in_millimetres[:, across], in_millimetres[:, upwards], color=color, linewidth=width, solid_capstyle="round"
+        )
 
     axes.axis("on")
     if upwards == 2:

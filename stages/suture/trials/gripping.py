@@ -36,8 +36,8 @@ def close(tool: np.ndarray, needle: np.ndarray, world: World, random: np.random.
     deep = np.abs(points[:, 2]) <= world.jaw_half_depth
     between = np.abs(points[:, 1]) <= opening
     if not (level & deep & between).any():
-        near = np.abs(points[:, 1]) <= opening + 0.002
-        return Closing(None, 0.0, 0.0, bool((level & deep & near).any()))
+        within_jaws = np.abs(points[:, 1]) <= opening + 0.002
+        return Closing(None, 0.0, 0.0, bool((level & deep & within_jaws).any()))
     rows = np.flatnonzero(level & deep & between)
     row = int(rows[np.argmin(np.abs(points[rows, 2]) + np.abs(points[rows, 0]))])
     point, tangent = points[row], tool_from_needle[:3, :3] @ ARC_TANGENTS[row]
@@ -52,11 +52,13 @@ def close(tool: np.ndarray, needle: np.ndarray, world: World, random: np.random.
     rotation = about(normal, np.radians(world.closing_in_plane) * random.standard_normal()) @ rotation
     rotation = about(along, float(slip[0])) @ rotation
     middle = np.array([point[0], 0.0, point[2]])
-    held = transform_from(rotation @ tool_from_needle[:3, :3], rotation @ (tool_from_needle[:3, 3] - point) + middle)
+    tool_from_held = transform_from(
+        rotation @ tool_from_needle[:3, :3], rotation @ (tool_from_needle[:3, 3] - point) + middle
+    )
     flatness = abs(float(flat[0]))
     quality = (1.0 - 0.5 * abs(point[0]) / world.jaw_half_width) * (1.0 - 0.4 * abs(point[2]) / world.jaw_half_depth)
     shift = abs(float(point[1])) + NEEDLE_RADIUS * sine
-    return Closing(tool @ held, quality * (0.6 + 0.4 * flatness), shift, True)
+    return Closing(tool @ tool_from_held, quality * (0.6 + 0.4 * flatness), shift, True)
 
 
 def thread_between(tool: np.ndarray, rope: np.ndarray, world: World) -> bool:

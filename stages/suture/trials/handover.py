@@ -13,10 +13,11 @@ from scenewright.stages.suture.trials.places import PRESENTING, TAKING
 from scenewright.stages.suture.trials.policy import Coordination, Policy
 
 PLACE = np.array([0.010, 0.0, 0.045])
-"""Where the left driver presents the needle [m]."""
+"""Point at which the left driver presents the needle [m]; by eye."""
 RELEASED = 0.012
+"""Way back and up of the driver that let go [m]; by eye."""
 BEFORE_TAKING = np.array([-0.045, 0.0, 0.0])
-"""Where the right driver waits, seen from the place of handover [m]."""
+"""Point at which the right driver waits, seen from the place of handover [m]; by eye."""
 
 
 def hand_over(bench: Bench, policy: Policy) -> None:

@@ -13,7 +13,7 @@ from scenewright.stages.suture.trials.policy import Coordination
 from scenewright.stages.suture.trials.wound import entry, exit_, passage
 
 STAND_OFF = np.array([-0.008, 0.0, 0.0])
-"""From the place of insertion to where the push begins [m]."""
+"""Way from the place of insertion to where the push begins [m]; by eye."""
 
 
 def insert(bench: Bench, belief: Belief, coordination: Coordination) -> None:
@@ -25,14 +25,17 @@ def insert(bench: Bench, belief: Belief, coordination: Coordination) -> None:
     if bench.hold is None:
         raise Failed("H", "no needle in the right driver")
     rotation = belief.rotation
-    place = entry(bench.suture) - rotation @ belief.tip
+    insert_position = entry(bench.suture) - rotation @ belief.tip
     coordination.wait_at(bench, "left", beside_wound(bench.suture))
-    coordination.near_entry(bench, rotation, place)
-    bench.go("right", transform_from(rotation, place + STAND_OFF))
-    bench.go("right", transform_from(rotation, place))
-    centre = place + rotation @ belief.centre
+    coordination.near_entry(bench, rotation, insert_position)
+    bench.go("right", transform_from(rotation, insert_position + STAND_OFF))
+    bench.go("right", transform_from(rotation, insert_position))
+    centre = insert_position + rotation @ belief.centre
     tools = primitives.insertion(
-        transform_from(rotation, place), exit_(bench.suture) - entry(bench.suture), rotation @ belief.normal, centre
+        transform_from(rotation, insert_position),
+        exit_(bench.suture) - entry(bench.suture),
+        rotation @ belief.normal,
+        centre,
     )
     slip = np.radians(bench.world.insertion_slip) * bench.random.standard_normal()
     shares = np.concatenate([np.zeros(len(tools) // 2), np.linspace(0.0, 1.0, len(tools) - len(tools) // 2)])

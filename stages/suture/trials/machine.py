@@ -66,10 +66,10 @@ def run_trial(
     """
     world = world or World()
     model = model or perception_model(FOLDER / f"perception_{policy.perception}.toml")
-    given = np.random.default_rng([seed, 0])
-    length = float(given.uniform(world.thread_shortest, world.thread_longest))
-    hand_eye = world.hand_eye * given.standard_normal(3)
-    needle, hold = loaded(world, given)
+    random = np.random.default_rng([seed, 0])
+    length = float(random.uniform(world.thread_shortest, world.thread_longest))
+    hand_eye = world.hand_eye * random.standard_normal(3)
+    needle, hold = loaded(world, random)
     bench = Bench(
         world=world,
         eyes=eyes or Eyes(model, np.random.default_rng([seed, 2])),
@@ -97,7 +97,7 @@ def run_trial(
             if outcome.interventions >= policy.interventions:
                 break
             outcome.interventions += 1
-            recover(bench, policy, given, thrown)
+            recover(bench, policy, random, thrown)
             bench.record("supervisor")
     outcome.seconds = bench.seconds
     outcome.looks, outcome.right, outcome.abstained = bench.eyes.looks, bench.eyes.right, bench.eyes.abstained
@@ -133,15 +133,15 @@ def recover(bench: Bench, policy: Policy, random: np.random.Generator, thrown: i
     bench.tools = {name: pose.copy() for name, pose in HOME.items()}
     bench.tools["right"] = CORNER.copy()
     bench.needle, bench.hold = loaded(bench.world, random)
-    made = bench.suture - 1
-    bench.anchor = exit_(made) if made >= 0 else None
+    last_suture = bench.suture - 1
+    bench.anchor = exit_(last_suture) if last_suture >= 0 else None
     thread = bench.thread
-    thread.through = made + 1
-    if made >= 0:
-        wanted = cinch_length(made, policy.constants)
-        more = min(max(0.0, wanted - thread.working), max(0.0, thread.tail - LEFT_IN_FIRST_HOLE))
-        thread.working, thread.tail = thread.working + more, thread.tail - more
-        bench.tail_reckoned -= more
+    thread.through = last_suture + 1
+    if last_suture >= 0:
+        target_length = cinch_length(last_suture, policy.constants)
+        fed = min(max(0.0, target_length - thread.working), max(0.0, thread.tail - LEFT_IN_FIRST_HOLE))
+        thread.working, thread.tail = thread.working + fed, thread.tail - fed
+        bench.tail_reckoned -= fed
     elif thrown == 0:
         thread.working += max(0.0, thread.tail)
         thread.tail = 0.0

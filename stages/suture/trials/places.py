@@ -18,7 +18,7 @@ PRESENTING = about(UP_THE_WOUND, -np.pi / 4) @ GRASPING
 """The left driver's orientation in which a needle extracted as planned is taken by level jaws so that, these turned by
 90 degrees about y, it is ready for insertion."""
 BESIDE = np.array([0.030, 0.004, 0.020])
-"""From the exit to where the left driver is clear of the needle."""
+"""Way from the exit to where the left driver is clear of the needle [m]; by eye."""
 
 
 def beside_wound(suture: int) -> np.ndarray:

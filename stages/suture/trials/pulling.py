@@ -8,6 +8,7 @@ from scenewright.stages.suture.trials.bench import Bench
 from scenewright.stages.suture.trials.wound import exit_
 
 OUTWARDS = np.array([0.249, 0.548, 0.798]) / np.linalg.norm([0.249, 0.548, 0.798])
+"""Direction (3,) in which the needle is pulled from the wound, of unit length; by eye."""
 LONGEST_PULL = 0.115
 """How far [m] from the wound the left driver still reaches while it pulls."""
 

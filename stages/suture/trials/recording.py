@@ -11,7 +11,7 @@ from scenewright.stages.suture.robot.inverse import solutions
 
 ARM_ORDER = ("right", "left")
 KEPT_OF_A_MOTION = 8
-"""So many poses of each motion are kept, its last one always."""
+"""Poses of each motion that are kept, its last one always."""
 
 
 class Recorder:

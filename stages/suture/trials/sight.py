@@ -38,11 +38,12 @@ SIGHTS = {
     "pictures": "estimates of rendered pictures of the trial, masks by the network",
 }
 LOOKS_OF_A_TRIAL = 100_000
+"""Distance between the seeds of two trials: more than a trial has looks."""
 CALIBRATION_ERROR, DISPARITY_NOISE = 0.15, 1.0
 """[px], those of the needle benchmark."""
 BODIES = {"right": RIGHT_DRIVER, "left": LEFT_DRIVER}
 HELD_OPEN, OPEN = 0.05, 0.35
-"""Half the angle between jaws [rad]."""
+"""Half the angle between jaws that hold the needle, and between open ones [rad]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,10 @@ class TrialScene(NeedleScene):
 
     def tubes(self) -> Tubes:
         """Return every tube of the scene in the left camera's frame."""
-        parts = [chain(self.thread, np.full(len(self.thread), THREAD_RADIUS), THREAD)]
+        chains = [chain(self.thread, np.full(len(self.thread), THREAD_RADIUS), THREAD)]
         if self.drivers is not None:
-            parts.append(self.drivers)
-        return joined([needle_tube(self.pose), joined(parts).moved(self.camera_from_world)])
+            chains.append(self.drivers)
+        return joined([needle_tube(self.pose), joined(chains).moved(self.camera_from_world)])
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class LookingEyes:
 
     def look(self, needle: np.ndarray, place: str) -> Seen | None:
         """Return one estimate of a needle at its true pose (4, 4), in the world; None when it is abstained from."""
-        view = self._viewed(needle)
+        view = self._render_view(needle)
         self.looks += 1
         seed = LOOKS_OF_A_TRIAL * (self.seed + 1) + self.looks
         spoiled, random = spoiled_masks(view.left, view.right, seed)
@@ -123,7 +124,7 @@ class LookingEyes:
         pose = NeedlePose(world_from_camera @ answer.pose.camera_from_needle)
         return Seen(pose.normal, pose.tip, pose.swage, fate == "right")
 
-    def _viewed(self, needle: np.ndarray) -> StereoView:
+    def _render_view(self, needle: np.ndarray) -> StereoView:
         assert self._bench is not None
         state = b"".join(part.tobytes() for part in (needle, *self._bench.tools.values(), self._bench.rope))
         if self._view is None or state != self._state:
@@ -138,18 +139,18 @@ class LookingEyes:
 def pictured(world: NeedleScene, bench: Bench, needle: np.ndarray, frame: int) -> TrialScene:
     """Return the scene that the cameras and lamps of `world` see of a trial whose needle is at a pose (4, 4)."""
     pose = NeedlePose(world.camera_from_world @ PICTURED_FROM_TRIAL @ needle)
-    held = bench.hold.arm if bench.hold is not None else None
-    parts = [
+    holding_arm = bench.hold.arm if bench.hold is not None else None
+    driver_tubes = [
         driver(
             PICTURED_FROM_TRIAL @ tool,
             apply(PICTURED_FROM_TRIAL, REMOTE_CENTRES[name]),
-            HELD_OPEN if name == held else OPEN,
+            HELD_OPEN if name == holding_arm else OPEN,
             BODIES[name],
         )
         for name, tool in bench.tools.items()
     ]
     fields = {name: getattr(world, name) for name in NeedleScene.__dataclass_fields__}
-    scene = TrialScene(**fields, drivers=joined(parts))
+    scene = TrialScene(**fields, drivers=joined(driver_tubes))
     return replace(
         scene,
         seed=1000 * world.seed + frame,
@@ -157,7 +158,7 @@ def pictured(world: NeedleScene, bench: Bench, needle: np.ndarray, frame: int) -
         thread=apply(PICTURED_FROM_TRIAL, bench.rope[::-1]),
         crossing=None,
         grips={},
-        holder=held or "air",
+        holder=holding_arm or "air",
         place="trial",
         ridge=Ridge(RIDGE_HEIGHT, RIDGE_HALF_WIDTH, elliptic=True),
     )
@@ -168,14 +169,14 @@ def driver(tool: np.ndarray, remote_centre: np.ndarray, opening: float, body: in
     needle world's, jaws half `opening` [rad] apart."""
     along, across = tool[:3, 2], tool[:3, 1]
     hinge = tool[:3, 3] - YAW_TO_TIP * along
-    parts = []
+    tubes = []
     for side in (-1.0, 1.0):
         direction = np.cos(opening) * along + side * np.sin(opening) * across
         start = hinge + side * 0.0011 * across
-        parts.append(
+        tubes.append(
             chain(start + direction * np.linspace(0.0, 0.0122, 8)[:, None], np.linspace(0.0017, 0.0009, 8), body)
         )
     back = (remote_centre - hinge) / np.linalg.norm(remote_centre - hinge)
-    parts.append(chain(hinge + back * np.linspace(-0.001, 0.010, 5)[:, None], np.linspace(0.0022, 0.0034, 5), body))
-    parts.append(chain(hinge + back * np.linspace(0.010, 0.30, 60)[:, None], np.full(60, 0.0040), body))
-    return joined(parts)
+    tubes.append(chain(hinge + back * np.linspace(-0.001, 0.010, 5)[:, None], np.linspace(0.0022, 0.0034, 5), body))
+    tubes.append(chain(hinge + back * np.linspace(0.010, 0.30, 60)[:, None], np.full(60, 0.0040), body))
+    return joined(tubes)

@@ -14,11 +14,17 @@ import numpy as np
 from scenewright.stages.suture.rig import NEEDLE_RADIUS
 
 SPANNED = pi / 4
+"""Arc of the needle between entry and exit [rad]."""
 CHORD = 2.0 * NEEDLE_RADIUS * sin(SPANNED / 2)
+"""Distance between entry and exit [m]."""
 RIDGE_HALF_WIDTH, RIDGE_HEIGHT = 0.005, 0.005
+"""Half the wound's width and its height [m]; half an ellipse, by eye."""
 HOLE_HEIGHT = RIDGE_HEIGHT * sqrt(1.0 - (CHORD / 2 / RIDGE_HALF_WIDTH) ** 2)
+"""Height of entry and exit on the wound [m]."""
 SPACING, FIRST = 0.005, 0.0125
+"""Distance between two sutures along the wound, and place of the first [m]."""
 SUTURES = 6
+"""Sutures of a wound."""
 SLIDES_OFF = cos(np.radians(75.0))
 """Cosine of the angle between tip and inward surface normal beyond which the tip slides along the flank."""
 SIDEWAYS = 0.0025

@@ -14,8 +14,9 @@ from scenewright.stages.suture.world.render import Eye, StereoView
 from scenewright.stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD
 
 BLOOD = np.array([96.0, 10.0, 12.0])
+"""Colour of blood (RGB); by eye."""
 MOST_GLINTS, MOST_BLOOD = 14, 4
-"""Of one picture."""
+"""Most highlights and most stains of blood in one picture; by eye."""
 SUBPIXEL = 3
 """Bits of cv2's fixed-point coordinates."""
 
@@ -50,8 +51,8 @@ def _glint(rig: StereoRig, random: np.random.Generator) -> np.ndarray:
         axes = np.round(np.array([size, size * random.uniform(0.2, 0.8)]) / 3 * 2**SUBPIXEL).astype(int).tolist()
         cv2.ellipse(canvas, centre, axes, turn, 0, 360, 1.0, -1, cv2.LINE_AA, SUBPIXEL)
     elif kind == 1:
-        way = size * np.array([np.cos(turn), np.sin(turn)])
-        ends = [np.round((middle + side * way) * 2**SUBPIXEL).astype(int).tolist() for side in (-1, 1)]
+        half_length = size * np.array([np.cos(turn), np.sin(turn)])
+        ends = [np.round((middle + side * half_length) * 2**SUBPIXEL).astype(int).tolist() for side in (-1, 1)]
         cv2.line(canvas, ends[0], ends[1], 1.0, thick, cv2.LINE_AA, SUBPIXEL)
     else:
         axes = np.round(np.array([size, size * random.uniform(0.3, 1.0)]) * 2**SUBPIXEL).astype(int).tolist()
@@ -64,10 +65,10 @@ def _blot(rig: StereoRig, random: np.random.Generator) -> np.ndarray:
     small: np.ndarray = cv2.GaussianBlur(random.standard_normal((60, 80)).astype(np.float32), (0, 0), 4.0)
     rows, columns = np.mgrid[0:60, 0:80]
     middle, reach = random.uniform([10, 10], [50, 70]), random.uniform(4.0, 16.0)
-    near = np.exp(-((rows - middle[0]) ** 2 + (columns - middle[1]) ** 2) / (2 * reach**2))
-    blot = (near * (1.0 + 4.0 * small) > 0.5).astype(np.float32)
-    whole = cv2.resize(blot, (rig.width, rig.height), interpolation=cv2.INTER_CUBIC)
-    return random.uniform(0.5, 0.9) * cv2.GaussianBlur(np.clip(whole, 0.0, 1.0), (0, 0), 5.0)
+    falloff = np.exp(-((rows - middle[0]) ** 2 + (columns - middle[1]) ** 2) / (2 * reach**2))
+    blot = (falloff * (1.0 + 4.0 * small) > 0.5).astype(np.float32)
+    full_size = cv2.resize(blot, (rig.width, rig.height), interpolation=cv2.INTER_CUBIC)
+    return random.uniform(0.5, 0.9) * cv2.GaussianBlur(np.clip(full_size, 0.0, 1.0), (0, 0), 5.0)
 
 
 def _paint(pictures: list[np.ndarray], opacity: np.ndarray, colour: np.ndarray, rig: StereoRig, depth: float) -> None:
@@ -86,11 +87,11 @@ def false_masks(view: StereoView, random: np.random.Generator) -> tuple[np.ndarr
         _scatter(masks, view, random)
         return masks[0] > 0, masks[1] > 0
     for _ in range(int(random.integers(1, 7))):
-        wanted = int(random.integers(2))
-        radius, place = random.uniform(10.0, 60.0), random.random()
+        of_thread = int(random.integers(2))
+        radius, position = random.uniform(10.0, 60.0), random.random()
         for mask, eye in zip(masks, (view.left, view.right), strict=True):
             if random.random() < 0.9:
-                _take(mask, _thread(eye) if wanted else _rims(eye), place, radius)
+                _take(mask, _thread(eye) if of_thread else _rims(eye), position, radius)
     return masks[0] > 0, masks[1] > 0
 
 
@@ -99,11 +100,11 @@ def _scatter(masks: list[np.ndarray], view: StereoView, random: np.random.Genera
     rig, middle = view.rig, view.rig.left(view.pose.centre[None])[0]
     spread = random.uniform(0.5, 4.0) * NEEDLE_RADIUS * rig.focal / view.pose.centre[2]
     for _ in range(int(np.exp(random.uniform(np.log(5.0), np.log(200.0))))):
-        place, depth = middle + random.normal(0.0, spread, 2), view.pose.centre[2] * random.normal(1.0, 0.01)
+        pixel, depth = middle + random.normal(0.0, spread, 2), view.pose.centre[2] * random.normal(1.0, 0.01)
         radius = random.uniform(1.0, 6.0)
         for mask, shift in zip(masks, (0.0, rig.focal * rig.baseline / depth), strict=True):
             if random.random() < 0.9:
-                cv2.circle(mask, (round(place[0] - shift), round(place[1])), round(radius), 1, -1)
+                cv2.circle(mask, (round(pixel[0] - shift), round(pixel[1])), round(radius), 1, -1)
 
 
 def _thread(eye: Eye) -> np.ndarray:

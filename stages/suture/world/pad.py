@@ -8,7 +8,9 @@ import numba
 import numpy as np
 
 RIDGE_HEIGHT = 0.0055
+"""Height of the wound over the pad [m]; by eye."""
 RIDGE_HALF_WIDTH = 0.0065
+"""Half the width of the wound [m]; by eye."""
 
 
 class Ridge(NamedTuple):
@@ -22,8 +24,9 @@ class Ridge(NamedTuple):
 
 ROUNDED = Ridge()
 SLIT_HALF_WIDTH = 0.0006
+"""Half the width of the slit along the wound's crest [m]; by eye."""
 FLAT_FROM = 0.0135
-"""Beyond this distance from the wound [m] the pad is flat but for its waves."""
+"""Distance from the wound [m] beyond which the pad is flat but for its waves."""
 
 
 @numba.njit(cache=True, fastmath=True)

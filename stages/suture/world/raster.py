@@ -54,7 +54,7 @@ class Lighting(NamedTuple):
 
 
 @numba.njit(cache=True, fastmath=True)
-def _hit(
+def _hit_depth(
     ray_x: float, ray_y: float, start: np.ndarray, axis: np.ndarray, start_radius: float, end_radius: float
 ) -> tuple[float, float]:
     """Return the depth z of the hit of the ray (ray_x, ray_y, 1) and the place 0..1 on the axis; depth 0 if none."""
@@ -114,7 +114,7 @@ def draw(cones: Cones, view: View, depth: np.ndarray, cone: np.ndarray) -> tuple
             ray_y = ((row - half) / SUBPIXELS - centre_y) / focal
             for column in range(first_column, end_column):
                 ray_x = ((column - half) / SUBPIXELS - centre_x) / focal
-                nearest, _ = _hit(ray_x, ray_y, start, axis, start_radii[index], end_radii[index])
+                nearest, _ = _hit_depth(ray_x, ray_y, start, axis, start_radii[index], end_radii[index])
                 if nearest > 0.0 and (cone[row, column] < 0 or nearest < depth[row, column]):
                     depth[row, column] = nearest
                     cone[row, column] = index
@@ -130,18 +130,18 @@ def pad_depth(ray_x: float, ray_y: float, view: View) -> tuple[float, float, flo
     direction_z = rotation[2, 0] * ray_x + rotation[2, 1] * ray_y + rotation[2, 2]
     if direction_z > -1e-3:
         return 0.0, 0.0, 0.0
-    far = -(eye[2] + 0.001) / direction_z
-    near = -(eye[2] - 0.0065) / direction_z
-    near_y, far_y = eye[1] + near * direction_y, eye[1] + far * direction_y
+    far_depth = -(eye[2] + 0.001) / direction_z
+    near_depth = -(eye[2] - 0.0065) / direction_z
+    near_y, far_y = eye[1] + near_depth * direction_y, eye[1] + far_depth * direction_y
     if min(near_y, far_y) > FLAT_FROM or max(near_y, far_y) < -FLAT_FROM:
         reach = -eye[2] / direction_z
         for _ in range(2):
             reach = (height(eye[0] + reach * direction_x, eye[1] + reach * direction_y, ridge) - eye[2]) / direction_z
         return reach, eye[0] + reach * direction_x, eye[1] + reach * direction_y
     steps = 10
-    last = near
+    last = near_depth
     for step in range(1, steps + 1):
-        reach = near + (far - near) * step / steps
+        reach = near_depth + (far_depth - near_depth) * step / steps
         x, y, z = eye[0] + reach * direction_x, eye[1] + reach * direction_y, eye[2] + reach * direction_z
         if z <= height(x, y, ridge):
             low, high = last, reach
@@ -154,7 +154,7 @@ def pad_depth(ray_x: float, ray_y: float, view: View) -> tuple[float, float, flo
                     low = middle
             return high, x, y
         last = reach
-    return far, eye[0] + far * direction_x, eye[1] + far * direction_y
+    return far_depth, eye[0] + far_depth * direction_x, eye[1] + far_depth * direction_y
 
 
 @numba.njit(cache=True, fastmath=True)

@@ -14,9 +14,11 @@ from scenewright.stages.suture.world.tubes import NEEDLE, Tubes
 from scipy.spatial.transform import Rotation
 
 SHADOW_SIZE, SHADOW_SCALE, SHADOW_ORIGIN = 800, 2000.0, -0.20
+"""Side of the shadow picture [px], its scale [px/m], and the world's x and y at its corner [m]; by eye."""
 NEAR = 70
-"""Without pictures only this many pixels about the needle are drawn."""
+"""Pixels about the needle that are drawn where no pictures are wanted."""
 ARC_ANGLES = np.linspace(0.0, np.pi, 121)
+"""Angles [rad] of the needle at which it is said whether an eye sees it."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +96,15 @@ def _eye(
     light = scene.light
     column, row, rig = (0, 0, scene.rig) if pictures else _around_needle(scene.rig, pose)
     world_from_camera = inverse(camera_from_world)
-    rotation, place = np.ascontiguousarray(world_from_camera[:3, :3]), np.ascontiguousarray(world_from_camera[:3, 3])
+    rotation, eye_position = (
+        np.ascontiguousarray(world_from_camera[:3, :3]),
+        np.ascontiguousarray(world_from_camera[:3, 3]),
+    )
     depth = np.zeros((rig.height * SUBPIXELS, rig.width * SUBPIXELS), dtype=np.float32)
     cone = np.full(depth.shape, -1, dtype=np.int16)
     starts, ends = np.ascontiguousarray(tubes.starts), np.ascontiguousarray(tubes.ends)
     cones = Cones(starts, ends, tubes.start_radii, tubes.end_radii, tubes.bodies)
-    view = View(rig.focal, rig.centre[0], rig.centre[1], rotation, place, scene.ridge)
+    view = View(rig.focal, rig.centre[0], rig.centre[1], rotation, eye_position, scene.ridge)
     box = draw(cones, view, depth, cone)
     hide_below_pad(depth, cone, box, view)
     bodies = np.zeros((rig.height, rig.width), dtype=np.uint8)
@@ -113,10 +118,10 @@ def _eye(
         )
         shade(depth, cone, cones, view, lighting, linear, depth_map)
         image = _sensor(linear, scene, random)
-    sees = _seen_arc(rig, pose, cone, tubes.bodies)
+    sees = _visible_arc(rig, pose, cone, tubes.bodies)
     if not pictures:
-        bodies = _set_in(bodies, scene.rig, column, row)
-        depth_map = _set_in(depth_map, scene.rig, column, row)
+        bodies = _paste(bodies, scene.rig, column, row)
+        depth_map = _paste(depth_map, scene.rig, column, row)
     return Eye(image, bodies, depth_map, sees)
 
 
@@ -133,14 +138,14 @@ def _around_needle(rig: StereoRig, pose: NeedlePose) -> tuple[int, int, StereoRi
     )
 
 
-def _set_in(part: np.ndarray, rig: StereoRig, column: int, row: int) -> np.ndarray:
+def _paste(part: np.ndarray, rig: StereoRig, column: int, row: int) -> np.ndarray:
     """Return the whole image (H, W) that holds `part` at (column, row) and zeros elsewhere."""
-    whole = np.zeros((rig.height, rig.width), dtype=part.dtype)
-    whole[row : row + part.shape[0], column : column + part.shape[1]] = part
-    return whole
+    full_picture = np.zeros((rig.height, rig.width), dtype=part.dtype)
+    full_picture[row : row + part.shape[0], column : column + part.shape[1]] = part
+    return full_picture
 
 
-def _seen_arc(rig: StereoRig, pose: NeedlePose, cone: np.ndarray, bodies: np.ndarray) -> np.ndarray:
+def _visible_arc(rig: StereoRig, pose: NeedlePose, cone: np.ndarray, bodies: np.ndarray) -> np.ndarray:
     """Return which of ARC_ANGLES (121,) this eye sees: the sub-pixel where the centre line falls shows the needle."""
     pixels = rig.left(pose.points(ARC_ANGLES))
     columns = np.round(pixels[:, 0] * SUBPIXELS + (SUBPIXELS - 1) / 2).astype(int)

@@ -82,12 +82,12 @@ class NeedleScene:
 
     def tubes(self) -> Tubes:
         """Return every tube of the scene in the left camera's frame."""
-        parts = [chain(self.thread, np.full(len(self.thread), THREAD_RADIUS), THREAD)]
+        chains = [chain(self.thread, np.full(len(self.thread), THREAD_RADIUS), THREAD)]
         if self.crossing is not None:
-            parts.append(chain(self.crossing, np.full(len(self.crossing), THREAD_RADIUS), THREAD))
+            chains.append(chain(self.crossing, np.full(len(self.crossing), THREAD_RADIUS), THREAD))
         for body, (grip, approach, across, opening) in self.grips.items():
-            parts.append(driver_tube(grip, approach, across, opening, body))
-        others = joined(parts).moved(self.camera_from_world)
+            chains.append(driver_tube(grip, approach, across, opening, body))
+        others = joined(chains).moved(self.camera_from_world)
         return others if self.without_needle else joined([needle_tube(self.pose, shape=self.shape), others])
 
 
@@ -159,8 +159,8 @@ def _light(rig: StereoRig, camera_from_world: np.ndarray, random: np.random.Gene
     eye = inverse(camera_from_world)[:3, 3]
     lamps = []
     for _ in range(int(random.integers(1, 4))):
-        place = np.array([random.uniform(-0.5, 0.4), random.uniform(-0.5, 0.5), random.uniform(0.35, 0.8)])
-        lamps.append([*place, random.uniform(0.3, 1.0)])
+        lamp_position = np.array([random.uniform(-0.5, 0.4), random.uniform(-0.5, 0.5), random.uniform(0.35, 0.8)])
+        lamps.append([*lamp_position, random.uniform(0.3, 1.0)])
     if rig.baseline < 0.02:
         lamps.append([*(eye + [0.0, 0.004, 0.004]), random.uniform(0.6, 1.2)])
     lamps_array = np.array(lamps)
@@ -257,13 +257,13 @@ def moved_scene(scene: NeedleScene, world_motion: np.ndarray, frame: int) -> Nee
     The thread's beginning follows the swage and its far part stays; lamps stay and the sensor's noise is new.
     """
     world_from_camera = inverse(scene.camera_from_world)
-    old = NeedlePose(world_from_camera @ scene.pose.camera_from_needle)
-    new = NeedlePose(world_motion @ old.camera_from_needle)
+    old_pose = NeedlePose(world_from_camera @ scene.pose.camera_from_needle)
+    new_pose = NeedlePose(world_motion @ old_pose.camera_from_needle)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(scene.thread, axis=0), axis=1))])
-    thread = scene.thread + np.exp(-along / 0.03)[:, None] * (new.swage - old.swage)
+    thread = scene.thread + np.exp(-along / 0.03)[:, None] * (new_pose.swage - old_pose.swage)
     grips = {}
     for body, (grip, approach, across, opening) in scene.grips.items():
-        if np.min(np.linalg.norm(old.points(np.linspace(0, np.pi, 90)) - grip, axis=1)) < NEEDLE_RADIUS * 0.05:
+        if np.min(np.linalg.norm(old_pose.points(np.linspace(0, np.pi, 90)) - grip, axis=1)) < NEEDLE_RADIUS * 0.05:
             turn = world_motion[:3, :3]
             grips[body] = (apply(world_motion, grip[None])[0], turn @ approach, turn @ across, opening)
         else:
@@ -271,7 +271,7 @@ def moved_scene(scene: NeedleScene, world_motion: np.ndarray, frame: int) -> Nee
     return replace(
         scene,
         seed=scene.seed * 1000 + frame,
-        pose=NeedlePose(scene.camera_from_world @ new.camera_from_needle),
+        pose=NeedlePose(scene.camera_from_world @ new_pose.camera_from_needle),
         thread=thread,
         grips=grips,
     )
@@ -288,14 +288,14 @@ def random_motions(scene: NeedleScene, frames: int) -> list[np.ndarray]:
     drift, axis = random.normal(0.0, 0.0012, 3), random.normal(size=3)
     axis /= np.linalg.norm(axis)
     for _ in range(frames - 1):
-        here = motion @ pose
+        pose_in_world = motion @ pose
         if scene.holder == "tissue":
-            turn = Rotation.from_rotvec(here[:3, 2] * np.radians(random.uniform(0.5, 2.0))).as_matrix()
+            turn = Rotation.from_rotvec(pose_in_world[:3, 2] * np.radians(random.uniform(0.5, 2.0))).as_matrix()
             shift = np.zeros(3)
         else:
             turn = Rotation.from_rotvec(axis * np.radians(random.uniform(1.0, 5.0))).as_matrix()
             shift = drift + random.normal(0.0, 0.0005, 3)
-        step = transform_from(turn, here[:3, 3] - turn @ here[:3, 3] + shift)
+        step = transform_from(turn, pose_in_world[:3, 3] - turn @ pose_in_world[:3, 3] + shift)
         motion = step @ motion
         motions.append(motion)
     return motions

@@ -8,6 +8,7 @@ from scenewright.stages.suture.world.pad import ROUNDED, height
 THREAD_RADIUS = 0.00019
 """Half the thickness of a 2-0 thread [m]: it is 0.35 to 0.4 mm thick."""
 STEP = 0.0012
+"""Distance between points of a thread [m]; by eye."""
 
 
 def loose_thread(

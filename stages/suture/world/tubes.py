@@ -12,9 +12,11 @@ import numpy as np
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose
 
 NEEDLE, THREAD, LEFT_DRIVER, RIGHT_DRIVER = 1, 2, 3, 4
+"""Numbers of the bodies in pictures."""
 WIRE_RADIUS = 0.0005
 """Half the thickness of the needle's wire [m]; a needle for a 2-0 thread is about 1 mm thick."""
 TIP_RADIUS = 0.00004
+"""Half the thickness of the needle's tip [m]."""
 
 
 @dataclass(frozen=True)
@@ -104,14 +106,14 @@ def driver_tube(grip: np.ndarray, approach: np.ndarray, across: np.ndarray, open
     across = across - (across @ approach) * approach
     across = across / np.linalg.norm(across)
     hinge = grip - approach * 0.0085
-    parts = []
+    chains = []
     for side in (-1.0, 1.0):
         direction = np.cos(opening) * approach + side * np.sin(opening) * across
         start = hinge + side * across * 0.0011
         points = start + direction * np.linspace(0.0, 0.0105, 8)[:, None]
-        parts.append(chain(points, np.linspace(0.0017, 0.0009, 8), body))
+        chains.append(chain(points, np.linspace(0.0017, 0.0009, 8), body))
     wrist = hinge - approach * np.linspace(-0.001, 0.010, 5)[:, None]
-    parts.append(chain(wrist, np.array([0.0020, 0.0028, 0.0031, 0.0032, 0.0034]), body))
+    chains.append(chain(wrist, np.array([0.0020, 0.0028, 0.0031, 0.0032, 0.0034]), body))
     shaft = hinge - approach * np.linspace(0.010, 0.30, 60)[:, None]
-    parts.append(chain(shaft, np.full(60, 0.0040), body))
-    return joined(parts)
+    chains.append(chain(shaft, np.full(60, 0.0040), body))
+    return joined(chains)

@@ -87,4 +87,4 @@ def grasp_two(table: Table, first: str, second: str) -> Grasp:
 
 def taken(table: Table, action: Grasp) -> frozenset[str]:
     """Return the names of everything that a grasp lifts."""
-    return frozenset(name for base in action.items for name in (base, *(other.name for other in table.load(base))))
+    return frozenset(name for base in action.items for name in (base, *(carried.name for carried in table.load(base))))

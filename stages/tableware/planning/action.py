@@ -55,10 +55,10 @@ class Action(ABC):
 
     def risk(self, table: Table, chances: Chances) -> float:
         """Return the chance that something falls off the table."""
-        kept = 1.0
+        all_held = 1.0
         for part in self.parts:
-            kept *= 1.0 - part.risk(table, chances)
-        return 1.0 - kept
+            all_held *= 1.0 - part.risk(table, chances)
+        return 1.0 - all_held
 
     def meant(self, seen: Table) -> list[Item]:
         """Return the items that the action is about, of those that are seen."""

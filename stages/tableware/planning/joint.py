@@ -29,6 +29,7 @@ STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 WORTH = 60.0
 """Seconds that we give for not losing an item (ours): six trips."""
 PORTION = 14
+"""Most items that are planned together in one go; by eye."""
 
 
 @dataclass(frozen=True)
@@ -75,15 +76,15 @@ def plan(
     optimum = Optimum(_portion(table), rules_in(rules, chances), model, chances, worth)
     charges = [off * step * model.whole_trip for step in (STEPS if off else (0.0,))]
     plans = [Plan(optimum, optimum.solve(charge)) for charge in charges]
-    least = {charge: _cost(best, charge, worth) for charge, best in zip(charges, plans, strict=True)}
+    least = {charge: _plan_cost(best, charge, worth) for charge, best in zip(charges, plans, strict=True)}
 
     def regret(one: Plan) -> float:
-        return max(_cost(one, charge, worth) / max(least[charge], 1e-9) for charge in (charges[0], charges[-1]))
+        return max(_plan_cost(one, charge, worth) / max(least[charge], 1e-9) for charge in (charges[0], charges[-1]))
 
-    return min(plans, key=lambda one: (round(regret(one), 9), _cost(one, 0.0, worth)))
+    return min(plans, key=lambda one: (round(regret(one), 9), _plan_cost(one, 0.0, worth)))
 
 
-def _cost(plan: Plan, charge: float, worth: float) -> float:
+def _plan_cost(plan: Plan, charge: float, worth: float) -> float:
     """Return what a plan costs [s] when each trip takes `charge` more than the model says."""
     return plan.seconds + charge * plan.expected_trips + worth * plan.lost
 
@@ -93,11 +94,11 @@ def _portion(table: Table) -> Table:
     if len(table.items) <= MOST_ITEMS:
         return table
     start = table.stacks[0][0].position
-    near = sorted(
+    nearest_piles = sorted(
         table.stacks, key=lambda pile: (pile[0].position[0] - start[0]) ** 2 + (pile[0].position[1] - start[1]) ** 2
     )
     chosen: set[str] = set()
-    for pile in near:
+    for pile in nearest_piles:
         if len(chosen) + len(pile) <= PORTION:
             chosen.update(item.name for item in pile)
     return Table(tuple(item for item in table.items if item.name in chosen), table.obstacles)
@@ -140,9 +141,9 @@ class JointPolicy:
 
     def _next_trip(self, table: Table) -> Trip:
         for earlier in (self._plan, self._first):
-            left = None if earlier is None else earlier.optimum.left_of(table)
-            if earlier is not None and left is not None:
-                return earlier.optimum.trips(earlier.solution, left)[0]
+            remaining = None if earlier is None else earlier.optimum.left_of(table)
+            if earlier is not None and remaining is not None:
+                return earlier.optimum.trips(earlier.solution, remaining)[0]
         self._plan = self._make(table)
         self._first = self._first or self._plan
         return self._plan.trips[0]

@@ -23,6 +23,7 @@ from scenewright.stages.tableware.planning.trip_options import Part, TripOptions
 from scenewright.stages.tableware.world.items import Table
 
 MOST_ITEMS = 16
+"""Most items that the exact optimum takes: its tables have 2^items rows."""
 SAME_PLACE = 1e-6
 """Things that stand no farther [m] from where they stood have not moved."""
 
@@ -85,7 +86,7 @@ class Optimum:
 
     def left_of(self, table: Table) -> int | None:
         """Return what is left of this table as bits; None when something has moved, or was not there."""
-        left = 0
+        subset = 0
         for item in table.items:
             number = self._row.get(item.name)
             if number is None:
@@ -96,8 +97,8 @@ class Optimum:
                 return None
             if not item.is_dish and abs(item.yaw - before.yaw) > SAME_PLACE:
                 return None
-            left |= 1 << number
-        return left
+            subset |= 1 << number
+        return subset
 
     def trips(self, solution: Solution | None = None, left: int | None = None) -> list[Trip]:
         """Return the trips that clear the table, or what is left of it, in order, when nothing slips."""
@@ -117,19 +118,21 @@ class Optimum:
         parts = [options.parts[row] for row in options.chosen[choice]]
         first = options.parts[options.first[option]]
         second: Part | None = None if options.second[option] < 0 else options.parts[options.second[option]]
-        rest = sorted((part for part in parts if part is not first and part is not second), key=lambda part: part.kinds)
+        other_parts = sorted(
+            (part for part in parts if part is not first and part is not second), key=lambda part: part.kinds
+        )
         if second is None:
-            sides: tuple[bool, ...] = (False,) * len(rest)
+            sides: tuple[bool, ...] = (False,) * len(other_parts)
             bases: tuple[str, ...] = (first.items[0].name,)
         else:
-            split = split_over_two(first.kinds, second.kinds, tuple(part.kinds for part in rest), self._rules)
+            split = split_over_two(first.kinds, second.kinds, tuple(part.kinds for part in other_parts), self._rules)
             assert split is not None  # an option is only made where a split exists
             sides, bases = split, (first.items[0].name, second.items[0].name)
-        going = sorted(zip(rest, sides, strict=True), key=lambda pair: pile_order(pair[0].kinds, self._rules))
+        going = sorted(zip(other_parts, sides, strict=True), key=lambda pair: pile_order(pair[0].kinds, self._rules))
         stacks = tuple((part.items[0].name, bases[1] if side else bases[0]) for part, side in going)
         pull = (bases[0], bases[1]) if options.pulled[option] else None
-        taken = frozenset(item.name for part in parts for item in part.items)
-        return Trip(pull, stacks, bases, taken, float(options.seconds[option]), float(options.lost[option]))
+        item_names = frozenset(item.name for part in parts for item in part.items)
+        return Trip(pull, stacks, bases, item_names, float(options.seconds[option]), float(options.lost[option]))
 
 
 def clear(table: Table, rules: Rules, model: TimeModel, chances: Chances) -> list[Trip]:
@@ -146,7 +149,7 @@ def _piles(table: Table) -> _Piles:
     """Return what stands on what."""
     row = {item.name: number for number, item in enumerate(table.items)}
     below = np.array([0 if item.on is None else 1 << row[item.on] for item in table.items], dtype=np.int64)
-    above = np.array([sum(1 << row[other.name] for other in table.load(item.name)) for item in table.items], np.int64)
+    above = np.array([sum(1 << row[loaded.name] for loaded in table.load(item.name)) for item in table.items], np.int64)
     return _Piles(below, above)
 
 
@@ -190,25 +193,25 @@ def _solve(piles, options, worth, per_trip):  # type: ignore[no-untyped-def]
     chosen = np.full(size, -1, np.int64)
     time, trips, losses = np.zeros(size), np.zeros(size), np.zeros(size)
     best[0] = 0.0
-    for left in range(1, size):
-        if _meets(left, below, ~left):  # something would stand on what has gone
+    for subset in range(1, size):
+        if _meets(subset, below, ~subset):  # something would stand on what has gone
             continue
-        part = left
+        part = subset
         while part:
             group = number_of[part]
-            rest = left & ~part
-            if group >= 0 and best[rest] < best[left] and not _meets(part, above, rest):
+            remaining = subset & ~part
+            if group >= 0 and best[remaining] < best[subset] and not _meets(part, above, remaining):
                 for option in range(starts[group], starts[group + 1]):
-                    if not blockers[option] & rest:
+                    if not blockers[option] & remaining:
                         slip = slips[option]
-                        value = seconds[option] + worth * lost[option] + per_trip + best[rest]
+                        value = seconds[option] + worth * lost[option] + per_trip + best[remaining]
                         if slip > 0.0:
-                            value += slip * (best[rest | stays[option]] - best[rest])
-                        if value < best[left]:
-                            best[left], chosen[left] = value, option
-                            again = rest | stays[option]
-                            time[left] = seconds[option] + (1.0 - slip) * time[rest] + slip * time[again]
-                            trips[left] = 1.0 + (1.0 - slip) * trips[rest] + slip * trips[again]
-                            losses[left] = lost[option] + (1.0 - slip) * losses[rest] + slip * losses[again]
-            part = (part - 1) & left
+                            value += slip * (best[remaining | stays[option]] - best[remaining])
+                        if value < best[subset]:
+                            best[subset], chosen[subset] = value, option
+                            after_slip = remaining | stays[option]
+                            time[subset] = seconds[option] + (1.0 - slip) * time[remaining] + slip * time[after_slip]
+                            trips[subset] = 1.0 + (1.0 - slip) * trips[remaining] + slip * trips[after_slip]
+                            losses[subset] = lost[option] + (1.0 - slip) * losses[remaining] + slip * losses[after_slip]
+            part = (part - 1) & subset
     return chosen, time, trips, losses

@@ -21,6 +21,7 @@ FRICTION = 0.5
 """Coefficient of friction between a foot and a table that is reckoned with: plastic and china on wood have 0.2 to 0.5;
 on cloth it may be more."""
 GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
 HEADINGS = 8
 """Directions of a pull that are tried: fingers that go in beside a utensil do not in every one."""
 
@@ -33,10 +34,10 @@ def why_not_pulled(kinds: tuple[Kind, ...], setting: Setting) -> NotPulled | Non
     pile = _pile(kinds, setting.sizes)
     turns = (2.0 * pi * number / HEADINGS for number in range(HEADINGS))
     pushes = [push_place(pile, "0", np.array([cos(turn), sin(turn)]), setting.gripper) for turn in turns]
-    found = [push for push in pushes if push is not None]
-    if len(found) < len(pushes):
+    known_pushes = [push for push in pushes if push is not None]
+    if len(known_pushes) < len(pushes):
         return "no_room"
-    return "tips" if _tips(pile, found) else None
+    return "tips" if _tips(pile, known_pushes) else None
 
 
 def _tips(pile: Table, pushes: list[Push]) -> bool:
@@ -65,8 +66,8 @@ def _pile(kinds: tuple[Kind, ...], sizes: DishSizes) -> Table:
 
 def centre_height(pile: Table) -> float:
     """Return the height [m] of the centre of mass of a pile's dishes, all of one stuff."""
-    parts = [(item.position[2], *_volume(item.measures)) for item in pile.items if item.is_dish]
-    return sum(volume * (foot + height) for foot, volume, height in parts) / sum(volume for _, volume, _ in parts)
+    volumes = [(item.position[2], *_volume(item.measures)) for item in pile.items if item.is_dish]
+    return sum(volume * (foot + height) for foot, volume, height in volumes) / sum(volume for _, volume, _ in volumes)
 
 
 def _volume(dish: Measures) -> tuple[float, float]:

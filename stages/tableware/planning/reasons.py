@@ -33,13 +33,13 @@ def impossible_pairs(table: Table, rules: Rules) -> tuple[ImpossiblePair, ...]:
     stacking are named for the pile that would move first; a multi-object grasp once."""
     reasons = []
     for row, pile in enumerate(table.stacks):
-        for column, other in enumerate(table.stacks):
-            if pile is other:
+        for column, second_pile in enumerate(table.stacks):
+            if pile is second_pile:
                 continue
             if row < column:
-                reasons.append(_multi_grasp(table, pile, other, rules))
-            reasons.append(_pull(table, pile, other, rules))
-            reasons.append(_stack(pile, other, rules))
+                reasons.append(_multi_grasp(table, pile, second_pile, rules))
+            reasons.append(_pull(table, pile, second_pile, rules))
+            reasons.append(_stack(pile, second_pile, rules))
     return tuple(reason for reason in reasons if reason is not None)
 
 
@@ -61,10 +61,12 @@ def _two_piles(pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) ->
     return "too_tall", f"their lips are more than {1e3 * rules.setting.gripper.jaw_height:.0f} mm apart in height"
 
 
-def _blocked(covers: tuple[Footprint, ...], table: Table, names: set[str]) -> tuple[str, str, tuple[str, ...]] | None:
-    things = tuple(item.name for item in in_the_way(covers, table, names))
-    if things:
-        return "in_the_way", f"{', '.join(things)} in the way", things
+def _blocking_reason(
+    covers: tuple[Footprint, ...], table: Table, names: set[str]
+) -> tuple[str, str, tuple[str, ...]] | None:
+    blockers = tuple(item.name for item in in_the_way(covers, table, names))
+    if blockers:
+        return "in_the_way", f"{', '.join(blockers)} in the way", blockers
     if obstructed(covers, table):
         return "in_the_way", "something that is not understood is in the way", ()
     return None
@@ -82,7 +84,7 @@ def _multi_grasp(table: Table, pile: tuple[Item, ...], other: tuple[Item, ...], 
         if not first.is_dish and between < 1e3 * rules.setting.gripper.opening / 2:
             why = "turned", "two utensils that lie at too great an angle for one grasp"
     if why is None:
-        why = _blocked((jaws(first, second, rules),), table, {first.name, second.name})
+        why = _blocking_reason((jaws(first, second, rules),), table, {first.name, second.name})
     return _pair("multi_grasp", first, second, why)
 
 
@@ -95,7 +97,7 @@ def _pull(table: Table, pile: tuple[Item, ...], other: tuple[Item, ...], rules: 
     if why is None and not footprint(first, *pull_end(first, second, rules)).on_table:
         why = "off_table", f"beside {second.name} it would hang over the table's edge"
     if why is None:
-        why = _blocked(sweep(first, second, rules), table, {first.name, second.name})
+        why = _blocking_reason(sweep(first, second, rules), table, {first.name, second.name})
     return _pair("pull", first, second, why)
 
 

@@ -57,15 +57,15 @@ def accept(
         )
     refused = [
         RefusedItem(
-            name=thing.name,
-            position=(thing.x, thing.y, 0.0),
-            radius=thing.radius,
+            name=unknown_thing.name,
+            position=(unknown_thing.x, unknown_thing.y, 0.0),
+            radius=unknown_thing.radius,
             reason="unknown_object",
-            message=f"{thing.name}: no tableware of known size, {1e3 * thing.radius:.0f} mm around",
+            message=f"{unknown_thing.name}: no tableware of known size, {1e3 * unknown_thing.radius:.0f} mm around",
         )
-        for thing in unknown
+        for unknown_thing in unknown
     ]
-    kept: list[Item] = []
+    accepted: list[Item] = []
     for pile in table.stacks:
         wrong = [
             refusal
@@ -75,7 +75,7 @@ def accept(
         if not wrong and not can_hold(letters(pile[-1:]), rules):
             wrong = [_refusal(pile[-1], "too_tall_to_lift", "the jaws do not hold it")]
         if not wrong:
-            kept.extend(pile)
+            accepted.extend(pile)
             continue
         names = {refusal.name for refusal in wrong}
         refused.extend(wrong)
@@ -86,17 +86,17 @@ def accept(
         )
     circles = tuple((refusal.position[0], refusal.position[1], refusal.radius) for refusal in refused)
     order = {item.name: number for number, item in enumerate(table.items)}
-    return Accepted(Table(tuple(sorted(kept, key=lambda item: order[item.name])), circles), tuple(refused))
+    return Accepted(Table(tuple(sorted(accepted, key=lambda item: order[item.name])), circles), tuple(refused))
 
 
 def _wrong(item: Item, doubt: Doubt | None, least: float, setting: Setting) -> RefusedItem | None:
-    place = footprint(item)
-    if item.on is None and not Footprint(place.start, place.end, place.radius - EDGE).on_table:
+    standing = footprint(item)
+    if item.on is None and not Footprint(standing.start, standing.end, standing.radius - EDGE).on_table:
         where = f"at ({item.position[0]:.3f}, {item.position[1]:.3f}) m"
         return _refusal(item, "outside_workspace", f"{where}, hangs over the edge of the workspace")
     usual, size = setting.sizes[item.kind], item.measures
-    other = abs(size.rim_radius - usual.rim_radius) > SIZE or abs(size.height - usual.height) > SIZE
-    if setting.alike is None and other:
+    unlike_usual = abs(size.rim_radius - usual.rim_radius) > SIZE or abs(size.height - usual.height) > SIZE
+    if setting.alike is None and unlike_usual:
         return _refusal(item, "other_size", f"not of the size that a {item.kind} has here: it may not fit the jaws")
     if doubt is not None and doubt.confidence < least:
         why = f" ({', '.join(doubt.reasons)})" if doubt.reasons else ""

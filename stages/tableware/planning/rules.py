@@ -173,11 +173,11 @@ def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules
     numbers = _share_out(first, second, kinds, tuple(parts.count(kind) for kind in kinds), rules)
     if numbers is None:
         return None
-    left = dict(zip(kinds, numbers, strict=True))
+    left_of_kind = dict(zip(kinds, numbers, strict=True))
     sides = []
     for part in parts:
-        sides.append(left[part] > 0)
-        left[part] -= 1
+        sides.append(left_of_kind[part] > 0)
+        left_of_kind[part] -= 1
     return tuple(sides)
 
 
@@ -187,16 +187,16 @@ def _share_out(
     """Return how many of each kind of part, in the order of `pile_order`, go onto `high`, the others onto `low`."""
     if not kinds:
         return () if can_hold_two(low, high, rules) else None
-    lows, highs = (_grown(pile, kinds[0], counts[0], rules) for pile in (low, high))
+    lows, highs = (_growing_piles(pile, kinds[0], counts[0], rules) for pile in (low, high))
     for number in range(counts[0] + 1):
         if counts[0] - number < len(lows) and number < len(highs):
-            rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)
-            if rest is not None:
-                return (number, *rest)
+            shares_of_rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)
+            if shares_of_rest is not None:
+                return (number, *shares_of_rest)
     return None
 
 
-def _grown(pile: str, part: str, count: int, rules: Rules) -> list[str]:
+def _growing_piles(pile: str, part: str, count: int, rules: Rules) -> list[str]:
     """Return the pile with 0, 1, ... `count` parts on it, as far as that goes."""
     piles = [pile]
     while len(piles) <= count and can_stack(part, piles[-1], rules):
@@ -269,7 +269,7 @@ def sweep(item: Item, target: Item, rules: Rules) -> tuple[Footprint, ...]:
 
 def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) -> tuple[Item, ...]:
     """Return the items that any of `covers` overlaps, less those of the piles that `apart_from` stand in."""
-    items = [item for stack in table.stacks if not any(other.name in apart_from for other in stack) for item in stack]
+    items = [item for stack in table.stacks if not any(member.name in apart_from for member in stack) for item in stack]
     if not items:
         return ()
     hits: np.ndarray = overlapped(tuple(covers), [footprint(item) for item in items])
@@ -315,7 +315,7 @@ def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
 
 def can_put(table: Table, item: str, onto: str, rules: Rules) -> bool:
     """Return whether a thing with its load may be put onto the pile that `onto` stands in."""
-    base = next(stack for stack in table.stacks if any(other.name == onto for other in stack))
-    if any(other.name == item for other in base):
+    base = next(stack for stack in table.stacks if any(member.name == onto for member in stack))
+    if any(member.name == item for member in base):
         return False
     return can_stack(letters((table.by_name[item], *table.load(item))), letters(base), rules)

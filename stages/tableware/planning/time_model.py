@@ -125,7 +125,7 @@ class Chances:
 
 
 EXACT = Chances()
-"""Everything goes as planned."""
+"""Chances of a world in which everything goes as planned."""
 
 
 def measured() -> Chances:

@@ -20,20 +20,21 @@ from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolut
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 BASE = np.array([0.0, -0.46, 0.15])
-"""Where the arm stands, higher than the table top: else the upper arm sweeps dishes off it when it reaches far [m]."""
+"""Place of the arm [m], higher than the table top: else the upper arm sweeps dishes off it when it reaches far."""
 PAD_FRICTION, BACK_FRICTION = 1.6, 0.3
-"""Of rubber pads, and of the bare metal that pushes a dish from inside; Bullet multiplies the two of a contact."""
+"""Friction of rubber pads, and of the bare metal that pushes a dish from inside; Bullet multiplies the two of a
+contact. By eye."""
 PAD_STIFFNESS, PAD_DAMPING = 4.0e4, 2.0e2
 """Give of the rubber [N/m, N s/m]: 2.5 MPa over a patch of 22 by 3 mm, 4 mm thick. Rigid pads would hold one of two
 utensils that lie on each other, the one wider by a tenth of a millimetre."""
 JOINT_EFFORTS = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
 """Torques [N m] of the UR5's joints."""
 CLOSING_SPEED = 0.06
-"""Of each finger [m/s]."""
+"""Speed of each finger [m/s]."""
 PAUSE = 0.15
-"""Before and after each movement of the fingers [s]."""
+"""Wait before and after each movement of the fingers [s]; by eye."""
 STEP = 0.02
-"""Between two poses of the tool on a straight way [m]."""
+"""Distance between two poses of the tool on a straight way [m]; by eye."""
 ROOM_TO_TURN = pi
 """The last joint turns two half turns either way from its middle; an empty hand begins within one of them [rad]."""
 WRIST_OFFSET = 0.10915
@@ -123,20 +124,20 @@ class Arm:
         """Return joint values (6,) for a tool pose, None where it is not reached. With nothing held the one turned by
         half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken, of those
         that leave the last joint room for half a turn either way."""
-        near = self.target
+        present_joints = self.target
         solutions = []
         for half_turn in (False,) if held else (False, True):
-            wanted = pose.copy()
+            wrist_pose = pose.copy()
             if half_turn:
-                wanted[:3, :2] *= -1.0
-            wanted[:3, 3] -= BASE
-            radius = hypot(wanted[0, 3], wanted[1, 3])
+                wrist_pose[:3, :2] *= -1.0
+            wrist_pose[:3, 3] -= BASE
+            radius = hypot(wrist_pose[0, 3], wrist_pose[1, 3])
             if radius < WRIST_OFFSET:
                 continue
-            first = atan2(wanted[1, 3], wanted[0, 3]) - pi - asin(WRIST_OFFSET / radius)
+            first = atan2(wrist_pose[1, 3], wrist_pose[0, 3]) - pi - asin(WRIST_OFFSET / radius)
             first = first + 2 * pi * round((self.description.carry[0] - first) / (2 * pi))
-            starts = [np.array([first, -1.4, 1.6, -1.77, -pi / 2, last]) for last in (near[5], 0.0, 2.0, 4.0)]
-            solution = inverse_kinematics(self.chain, wanted, np.array(starts))
+            starts = [np.array([first, -1.4, 1.6, -1.77, -pi / 2, last]) for last in (present_joints[5], 0.0, 2.0, 4.0)]
+            solution = inverse_kinematics(self.chain, wrist_pose, np.array(starts))
             if solution.found and solution.arm[2] > 0.0:
                 for turns in (-2 * pi, 0.0, 2 * pi):
                     arm = solution.arm.copy()
@@ -146,7 +147,8 @@ class Arm:
         if not solutions:
             return None
         return min(
-            solutions, key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - near).max()))
+            solutions,
+            key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - present_joints).max())),
         )
 
     # --- motion -----------------------------------------------------------------------------------------------
@@ -167,7 +169,7 @@ class Arm:
         if times[-1] <= 0.0:  # so short a way that the joints' values do not change
             return
         times = times * max(1.0, length / speed / float(times[-1]))
-        self._run(times, points)
+        self._follow(times, points)
 
     def _path(self, ends: list[np.ndarray], step: float) -> tuple[np.ndarray, float]:
         """Return joint values (K, 6) along straight lines through poses, a pose each `step` [m], and their length [m].
@@ -190,7 +192,7 @@ class Arm:
     def move_joints(self, end: np.ndarray, share: float) -> None:
         """Move all joints to `end` (6,) at a share of the arm's speed and acceleration, with physics."""
         times, points = time_path(np.array([self.target, end]), *self._limits(share))
-        self._run(times, points)
+        self._follow(times, points)
 
     def jump(self, end: np.ndarray) -> None:
         """Move the empty hand above everything to `end` (6,): nothing is met, so that only the time is counted."""
@@ -267,7 +269,7 @@ class Arm:
     def _limits(self, share: float) -> tuple[np.ndarray, np.ndarray]:
         return (np.full(6, self.description.arm_speed * share), np.full(6, self.description.arm_acceleration * share))
 
-    def _run(self, times: np.ndarray, points: np.ndarray) -> None:
+    def _follow(self, times: np.ndarray, points: np.ndarray) -> None:
         if len(times) < 2:
             return
         step = self.world.time_step

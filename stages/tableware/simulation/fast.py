@@ -112,24 +112,24 @@ class FastWorld:
     def _grasp(self, action: Grasp) -> None:
         self.trial.seconds += self._model.whole_trip
         self.trial.trips += 1
-        here = tuple(name for name in action.items if name in self.table.by_name)
+        present = tuple(name for name in action.items if name in self.table.by_name)
         self._there(*action.items)
-        if len(here) == 2:
-            first, second = (self.table.by_name[name] for name in here)
+        if len(present) == 2:
+            first, second = (self.table.by_name[name] for name in present)
             slips = 1.0 - self._chances.holds(letters((first,)), letters((second,)))
-            if not can_grasp_two(self.table, *here, self._rules) or self._goes_wrong(slips, "slip", here[1]):
-                self.troubles.append(f"{here[1]} stayed behind")
-                here = here[:1]
-            elif self._goes_wrong(self._chances.drop_two, "lift", here[1]):
-                self._drop(here[1])
-                here = here[:1]
+            if not can_grasp_two(self.table, *present, self._rules) or self._goes_wrong(slips, "slip", present[1]):
+                self.troubles.append(f"{present[1]} stayed behind")
+                present = present[:1]
+            elif self._goes_wrong(self._chances.drop_two, "lift", present[1]):
+                self._drop(present[1])
+                present = present[:1]
             elif self._chances.spills:
                 self._spill(first, second)
                 self._spill(second, first)
-        elif here and self._goes_wrong(self._chances.drop_single, "lift", here[0]):
-            self._drop(here[0])
+        elif present and self._goes_wrong(self._chances.drop_single, "lift", present[0]):
+            self._drop(present[0])
             return
-        for name in here:
+        for name in present:
             if not can_hold(letters((self.table.by_name[name], *self.table.load(name))), self._rules):
                 self._drop(name)
                 continue

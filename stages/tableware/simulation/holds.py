@@ -21,19 +21,20 @@ JAW_HEIGHT, PAD, PAD_WIDTH, KNUCKLE = 0.045, 0.007, 0.022, 0.014
 DEPTH = 0.020
 """How far the pads reach below the lowest lip where they can [m]."""
 PAIR_DEPTHS, PAIR_ROOMS, PAIR_FREE = (0.030, 0.022, 0.014), (0.007, 0.004), 0.001
-"""When two dishes are pressed together: how far the pads reach below the lowest lip, how far open ones keep from the
-walls, the best first, and what they keep from all else there [m]."""
+"""For two dishes that are pressed together: how far the pads reach below the lowest lip, how far open ones keep from
+the walls, the best first, and what they keep from all else there [m]; by eye."""
 FLAT_DEPTH, MOST_LEAN = 0.008, 0.5
 """The first for a plate, whose rim is nearer to the table; the most that the hand leans [rad]: plates slant by more."""
 ROOM = 0.007
-"""Between an open pad and the wall on each side [m]."""
+"""Room between an open pad and the wall on each side [m]; by eye."""
 PALM_ROOM = 0.003
+"""Room between the palm and the highest lip [m]; by eye."""
 PAIR_SHIFTS = (0.0, 0.01, -0.01, 0.02, -0.02)
-"""Where two utensils side by side are taken, from the middle between them along them [m], the best first."""
+"""Places at which two utensils side by side are taken, from the middle between them along them [m], the best first."""
 FREE = 0.003
 """What open jaws keep from others [m]."""
 ABOVE = 0.0005
-"""Of the fingertips over the table when they take a utensil [m]."""
+"""Height of the fingertips over the table when they take a utensil [m]; by eye."""
 HAND = Gripper()
 """The standard one, whose measures the constants above are."""
 
@@ -77,8 +78,8 @@ def walls(table: Table, name: str) -> list[Item]:
 
 def cargo(table: Table, name: str) -> list[Item]:
     """Return what a pile carries from `name` upwards beside `walls`."""
-    held = {item.name for item in walls(table, name)}
-    return [item for item in table.load(name) if item.name not in held]
+    gripped = {item.name for item in walls(table, name)}
+    return [item for item in table.load(name) if item.name not in gripped]
 
 
 def reach_below(family: list[Item], most: float = DEPTH) -> float:
@@ -108,14 +109,14 @@ def rim_hold(
     middle, opening = (outer + inner) / 2, (outer - inner) * cos(lean) + 2 * ROOM
     if slant > lean:  # a flat rim rises outwards between the pads
         opening += depth / cos(slant) * sin(slant - lean)
-    others = [item for pile in table.stacks for item in pile if base.name not in {other.name for other in pile}]
-    own = cargo(table, name)
+    others = [item for pile in table.stacks for item in pile if base.name not in {member.name for member in pile}]
+    own_cargo = cargo(table, name)
     best: Hold | None = None
     for turn in sorted(np.linspace(-pi, pi, 36, endpoint=False), key=abs):
         angle = wanted + float(turn)
         point = np.array([x + middle * cos(angle), y + middle * sin(angle), tip])
         pose = tool_pose(point, angle, lean)
-        clearance = jaw_clearance(pose, opening, others, own)
+        clearance = jaw_clearance(pose, opening, others, own_cargo)
         if best is None or clearance > best.clearance:
             best = Hold(pose, opening, min(clearance, FREE))
         if clearance >= FREE:
@@ -137,7 +138,7 @@ def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: lis
         knuckles = item.lip > tip + hand.jaw_height
         thickness = KNUCKLE if knuckles else PAD
         backwards = (top - tip) / max(-pose[2, 2], 0.5)
-        place = footprint(item)
+        print_of_item = footprint(item)
         for side in (-1.0, 1.0):
             for back in (0.0, backwards):
                 middle = pose[:3, 3] - back * pose[:3, 2] + side * (opening / 2 + thickness / 2) * pose[:3, 1]
@@ -148,7 +149,7 @@ def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: lis
                     (float(middle[0] + across[0]), float(middle[1] + across[1])),
                     thickness / 2,
                 )
-                least = min(least, gap(print_, place))
+                least = min(least, gap(print_, print_of_item))
     return least
 
 
@@ -165,8 +166,8 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
         tip = min(base.position[2], beside.position[2]) + ABOVE
         best: Hold | None = None
         for along in PAIR_SHIFTS:  # held away from their middles they would hang and swing
-            place = np.array([point[0] + along * cos(yaw), point[1] + along * sin(yaw), tip])
-            pose = tool_pose(place, yaw + pi / 2)
+            tool_point = np.array([point[0] + along * cos(yaw), point[1] + along * sin(yaw), tip])
+            pose = tool_pose(tool_point, yaw + pi / 2)
             clearance = jaw_clearance(pose, opening, others, [])
             if best is None or clearance > best.clearance:
                 best = Hold(pose, opening, min(clearance, FREE))
@@ -208,9 +209,9 @@ def _dish_pair(
         inner = min(item.measures.inner_radius(tip - item.position[2]) for item in family)
         middle = abs(float(ahead @ (np.array(base.position[:2]) - np.array(point[:2]))))
         reach = max(reach, middle - inner)
-    own = [item for name in names for item in cargo(table, name)]
+    own_cargo = [item for name in names for item in cargo(table, name)]
     opening = min(0.085, 2.0 * (reach + room))
-    return Hold(pose, opening, jaw_clearance(pose, opening, others, own))
+    return Hold(pose, opening, jaw_clearance(pose, opening, others, own_cargo))
 
 
 def half_width(item: Item, along: float) -> float:

@@ -42,8 +42,9 @@ HOVER = 0.015
 EMPTY = 0.0008
 """Fingers that are nearer to each other than this [m] hold nothing: the thinnest wall has 3 mm."""
 HEAVY = 4
+"""Walls of two piles from which on the hand presses harder; with 40 N the outer ones slip."""
 LIFT = 0.06
-"""By how much what is held goes above everything else [m]."""
+"""Height by which what is held goes above everything else [m]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +128,10 @@ class PhysicsTable:
         except MotionFailed as failure:
             self.troubles.append(str(failure))
             self._retreat()
-        self._read()
+        self._read_table()
         self._key("done")
 
-    def _read(self) -> None:
+    def _read_table(self) -> None:
         self.arm.seconds += self.top.rest(0.6)
         self.table = self.top.read()
         lying = len(self.top.bodies) - len(self.table.items)
@@ -167,7 +168,7 @@ class PhysicsTable:
 
     def _above(self, pose: np.ndarray, opening: float) -> None:
         """Bring the empty hand over a pose, with the fingers at an opening."""
-        high = _raised(pose, TRAVEL + (0.05 if pose[2, 3] > 0.08 else 0.0))
+        high = _at_height(pose, TRAVEL + (0.05 if pose[2, 3] > 0.08 else 0.0))
         arm = self.arm.solve(high)
         if arm is None:
             raise MotionFailed("no_inverse_kinematics", "the arm does not reach above the grasp")
@@ -181,9 +182,9 @@ class PhysicsTable:
         self.top.rest(0.5)
 
     def _descend(self, pose: np.ndarray) -> None:
-        near = pose.copy()
-        near[:3, 3] -= 0.025 * pose[:3, 2]
-        self.arm.move_line(near, self.speeds.descend)
+        above_grasp = pose.copy()
+        above_grasp[:3, 3] -= 0.025 * pose[:3, 2]
+        self.arm.move_line(above_grasp, self.speeds.descend)
         self.arm.move_line(pose, self.speeds.touch)
 
     def _retreat(self) -> None:
@@ -191,20 +192,20 @@ class PhysicsTable:
         self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.016))
         pose = self.arm.pose_of(self.arm.target)
         try:
-            self.arm.move_line(_raised(pose, TRAVEL), self.speeds.descend)
+            self.arm.move_line(_at_height(pose, TRAVEL), self.speeds.descend)
         except MotionFailed:
             self.arm.put(self.arm.description.carry)
 
     def _to_bin(self, seen: Table, names: list[str]) -> None:
         """Lift what is held, carry it over the bin, let go."""
-        held = {name for name in names} | {item.name for name in names for item in seen.load(name)}
-        self.top.wake_near([np.array(seen.by_name[name].position[:2]) for name in held], 0.03)
+        held_names = {name for name in names} | {item.name for name in names for item in seen.load(name)}
+        self.top.wake_near([np.array(seen.by_name[name].position[:2]) for name in held_names], 0.03)
         pose = self.arm.pose_of(self.arm.target)
-        lowest = min(seen.by_name[name].position[2] for name in held)
-        highest = max([item.lip for item in seen.items if item.name not in held], default=0.0)
+        lowest = min(seen.by_name[name].position[2] for name in held_names)
+        highest = max([item.lip for item in seen.items if item.name not in held_names], default=0.0)
         clear = highest + LIFT - lowest
-        up = _raised(pose, pose[2, 3] + max(clear, 0.06))
-        self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
+        up = _at_height(pose, pose[2, 3] + max(clear, 0.06))
+        self.arm.move_line(_at_height(pose, pose[2, 3] + 0.01), 0.05)
         two = len(names) == 2
         loose = any(cargo(seen, name) for name in names if seen.by_name[name].is_dish)
         self.arm.move_line(up, self.speeds.lift_loose if loose else self.speeds.lift)
@@ -235,10 +236,10 @@ class PhysicsTable:
         best: tuple[float, np.ndarray] | None = None
         for turn in np.linspace(-pi, pi, 16, endpoint=False):
             rotation = np.array([[cos(turn), -sin(turn), 0.0], [sin(turn), cos(turn), 0.0], [0.0, 0.0, 1.0]])
-            there = pose.copy()
-            there[:3, :3] = rotation @ pose[:3, :3]
-            there[:2, 3] = np.array(BIN_CENTER) - rotation[:2, :2] @ offset
-            arm = self.arm.solve(there, held=True)
+            bin_pose = pose.copy()
+            bin_pose[:3, :3] = rotation @ pose[:3, :3]
+            bin_pose[:2, 3] = np.array(BIN_CENTER) - rotation[:2, :2] @ offset
+            arm = self.arm.solve(bin_pose, held=True)
             if arm is not None:
                 cost = float(np.abs(arm - self.arm.target).max())
                 if best is None or cost < best[0]:
@@ -272,20 +273,20 @@ class PhysicsTable:
         self._above(pose, 0.002 if push.spread else push.opening)
         self._descend(pose)
         self.top.wake_near([start], 0.05)
-        there = tool_pose(finish, push.closing)
+        final_pose = tool_pose(finish, push.closing)
         self.arm.touch_with(BACK_FRICTION)
         try:
             if push.spread:
                 self.arm.open_to(push.opening)
             self._key("inside")
-            self.arm.move_line(there, self.speeds.pull)
+            self.arm.move_line(final_pose, self.speeds.pull)
             self._key("pulled")
-            away = there.copy()
+            away = final_pose.copy()
             away[:2, 3] -= 0.006 * direction
             self.arm.move_line(away, 0.1)
         finally:
             self.arm.touch_with(PAD_FRICTION)
-        self.arm.move_line(_raised(away, TRAVEL + 0.03), self.speeds.descend)
+        self.arm.move_line(_at_height(away, TRAVEL + 0.03), self.speeds.descend)
 
     def _pull_bar(self, action: Pull, seen: Table) -> None:
         """Take a utensil where it lies, carry it just above the table, let go. A hand that presses with 20 N does not
@@ -299,14 +300,14 @@ class PhysicsTable:
         rotation = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
         self._take(hold, self.speeds.least, [action.item])
         goal = np.array([*action.p_E[:2], 0.0]) + np.array([*(rotation @ offset), 0.0]) + tip
-        there = tool_pose(goal, action.theta_S + turn)
+        final_pose = tool_pose(goal, action.theta_S + turn)
         pose = self.arm.pose_of(self.arm.target)
-        self.arm.move_line(_raised(pose, pose[2, 3] + HOVER), self.speeds.pull)
-        self.arm.move_line(_raised(there, there[2, 3] + HOVER), self.speeds.pull)
-        self.arm.move_line(there, self.speeds.pull)
+        self.arm.move_line(_at_height(pose, pose[2, 3] + HOVER), self.speeds.pull)
+        self.arm.move_line(_at_height(final_pose, final_pose[2, 3] + HOVER), self.speeds.pull)
+        self.arm.move_line(final_pose, self.speeds.pull)
         self._key("pulled")
         self.arm.open_to(0.022)
-        self.arm.move_line(_raised(there, TRAVEL), self.speeds.descend)
+        self.arm.move_line(_at_height(final_pose, TRAVEL), self.speeds.descend)
 
     # --- stacks -----------------------------------------------------------------------------------------------
 
@@ -322,12 +323,12 @@ class PhysicsTable:
             hold = bar_hold(seen, name)
         self._take(hold, finger_force(seen, [name], self.speeds), [name])
         pose = self.arm.pose_of(self.arm.target)
-        held = {name, *(load.name for load in seen.load(name))}
+        held_names = {name, *(load.name for load in seen.load(name))}
         self.top.wake_near([np.array(item.position[:2])], 0.03)
-        highest = max([other.lip for other in seen.items if other.name not in held], default=0.0)
-        up = _raised(pose, pose[2, 3] + max(highest + 0.04 - item.position[2], 0.04))
+        highest = max([neighbour.lip for neighbour in seen.items if neighbour.name not in held_names], default=0.0)
+        up = _at_height(pose, pose[2, 3] + max(highest + 0.04 - item.position[2], 0.04))
         loose = item.is_dish and bool(cargo(seen, name))
-        self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
+        self.arm.move_line(_at_height(pose, pose[2, 3] + 0.01), 0.05)
         self.arm.move_line(up, self.speeds.lift_loose if loose else self.speeds.lift)
         self.top.sleep()
         self._key("lifted")
@@ -340,44 +341,47 @@ class PhysicsTable:
         self.top.wake_near([np.array(onto.position[:2])], 0.03)
         down = over.copy()
         down[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2] + drop
-        near = _raised(down, down[2, 3] + 0.02)
-        self.arm.move_through([near], self.speeds.lift)
+        above_base = _at_height(down, down[2, 3] + 0.02)
+        self.arm.move_through([above_base], self.speeds.lift)
         self.arm.move_line(down, 0.06)
         self._key("placed")
         self.arm.open_to(min(0.085, self.arm.finger_gap() + 2 * 0.006))
-        self.arm.move_line(_raised(down, down[2, 3] + 0.05), self.speeds.descend)
+        self.arm.move_line(_at_height(down, down[2, 3] + 0.05), self.speeds.descend)
         self._key("let go")
 
     def _pile(self, seen: Table, item: Item) -> tuple[Item, ...]:
-        return next(pile for pile in seen.stacks if any(other.name == item.name for other in pile))
+        return next(pile for pile in seen.stacks if any(member.name == item.name for member in pile))
 
     def _placing(
         self, action: Stack, seen: Table, item: Item, onto: Item, pose: np.ndarray, height: float
     ) -> np.ndarray:
         """Return the tool pose above the place: a dish is turned so that the open jaws fit there, a utensil so that it
         lies along the one below it."""
-        place = np.array(action.p_L[:2])
+        base_middle = np.array(action.p_L[:2])
         offset = pose[:2, 3] - np.array(item.position[:2])
         turns = [0.0]
         if not item.is_dish and not onto.is_dish:
             turns = [(onto.yaw - item.yaw + pi / 2) % pi - pi / 2]
         elif item.is_dish:
             turns = sorted(np.linspace(-pi, pi, 24, endpoint=False), key=abs)
-        own = {other.name for other in self._pile(seen, onto)} | {item.name, *(o.name for o in seen.load(item.name))}
-        others = [other for other in seen.items if other.name not in own]
+        own_names = {neighbour.name for neighbour in self._pile(seen, onto)} | {
+            item.name,
+            *(o.name for o in seen.load(item.name)),
+        }
+        others = [neighbour for neighbour in seen.items if neighbour.name not in own_names]
         best: tuple[float, np.ndarray] | None = None
         for turn in turns:
             rotation = np.array([[cos(turn), -sin(turn), 0.0], [sin(turn), cos(turn), 0.0], [0.0, 0.0, 1.0]])
-            there = pose.copy()
-            there[:3, :3] = rotation @ pose[:3, :3]
-            there[:2, 3] = place + rotation[:2, :2] @ offset
-            there[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2]
-            clearance = jaw_clearance(there, 0.03, others, [])
-            there = _raised(there, height)
-            if self.arm.solve(there, held=True) is None:
+            placing_pose = pose.copy()
+            placing_pose[:3, :3] = rotation @ pose[:3, :3]
+            placing_pose[:2, 3] = base_middle + rotation[:2, :2] @ offset
+            placing_pose[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2]
+            clearance = jaw_clearance(placing_pose, 0.03, others, [])
+            placing_pose = _at_height(placing_pose, height)
+            if self.arm.solve(placing_pose, held=True) is None:
                 continue
             if best is None or clearance > best[0]:
-                best = (min(clearance, FREE), there)
+                best = (min(clearance, FREE), placing_pose)
             if clearance >= FREE:
                 break
         if best is None:
@@ -389,13 +393,13 @@ def finger_force(seen: Table, names: list[str], speeds: Speeds) -> float:
     """Return the force [N] of each finger for some piles."""
     if all(not seen.by_name[name].is_dish for name in names):
         return speeds.least
-    held = [item for name in names for item in walls(seen, name)]
-    if all(item.kind == "cup" for item in held):
+    gripped = [item for name in names for item in walls(seen, name)]
+    if all(item.kind == "cup" for item in gripped):
         return speeds.least
-    return speeds.heavy if len(names) == 2 and len(held) >= HEAVY else speeds.force
+    return speeds.heavy if len(names) == 2 and len(gripped) >= HEAVY else speeds.force
 
 
-def _raised(pose: np.ndarray, height: float) -> np.ndarray:
+def _at_height(pose: np.ndarray, height: float) -> np.ndarray:
     high = pose.copy()
     high[2, 3] = max(height, pose[2, 3])
     return high

@@ -24,14 +24,20 @@ from scenewright.stages.tableware.world.items import TABLE_SIDES, Item, Measures
 from scenewright.stages.tableware.world.shape_files import COLORS
 
 EYE, TARGET = np.array([0.62, 1.02, 0.80]), np.array([0.14, -0.12, 0.0])
+"""Place of the eye, and the point that it looks at [m]; by eye."""
 FIELD_OF_VIEW = np.deg2rad(58.0)
+"""Horizontal field of view [rad]; by eye."""
 ASPECT = 0.62
+"""Height of a picture over its width."""
 TABLE_COLOR, BIN_COLOR, ARM_COLOR, HAND_COLOR = (236, 232, 224), (120, 128, 140), (176, 184, 194), (90, 98, 110)
+"""Colours (RGB) of the table, the bin, the arm and the hand."""
 BIN_DEPTH, WALL = 0.12, 0.008
+"""Depth of the bin, and thickness of its walls, as drawn [m]."""
 HAND_LINKS = ("hand", "left_finger", "right_finger")
 SHOWN = ("inside", "pulled", "placed", "lifted", "over the bin", "released")
 """Moments that are shown, of all that are recorded."""
 MOST_FRAMES = 64
+"""Most frames of an animation; by eye."""
 
 
 class PhysicsPictures:
@@ -47,7 +53,7 @@ class PhysicsPictures:
         self._urdf = parse_urdf(self._robot.urdf)
         self._links = link_shapes(self._robot.urdf.read_text(encoding="utf-8"), "visual")
         self._items = [
-            _painted(item_mesh(Item(str(name), kind, (0.0, 0.0, 0.0), measures=Measures(*measures))), COLORS[kind])
+            _paint(item_mesh(Item(str(name), kind, (0.0, 0.0, 0.0), measures=Measures(*measures))), COLORS[kind])
             for name, kind, measures in zip(
                 frames["names"], frames["kinds"].tolist(), frames["measures"].tolist(), strict=True
             )
@@ -73,7 +79,7 @@ class PhysicsPictures:
             world[:3, 3] += BASE
             for shape in self._links.get(link, ()):
                 mesh = shape.copy().apply_transform(world)
-                meshes.append(_painted(mesh, HAND_COLOR if link in HAND_LINKS else ARM_COLOR))
+                meshes.append(_paint(mesh, HAND_COLOR if link in HAND_LINKS else ARM_COLOR))
         return meshes
 
 
@@ -83,7 +89,7 @@ def key_frames(labels: Sequence[str], most: int) -> list[int]:
     rows = [*rows, len(labels) - 1] if len(labels) else []
     if len(rows) <= most:
         return rows
-    return [rows[round(place)] for place in np.linspace(0, len(rows) - 1, most)]
+    return [rows[round(row_number)] for row_number in np.linspace(0, len(rows) - 1, most)]
 
 
 def draw_physics_strip(
@@ -122,7 +128,7 @@ def _caption(frames: Mapping[str, np.ndarray], words: Sequence[str], row: int) -
     return f"{float(frames['seconds'][row]):.0f} s: {words[row]}, {frames['labels'][row]}"
 
 
-def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
+def _paint(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
     paint(mesh, np.array([*color, 255], dtype=np.uint8))
     return mesh
 
@@ -130,7 +136,7 @@ def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trim
 def _box(
     size: tuple[float, float, float], center: tuple[float, float, float], color: tuple[int, int, int]
 ) -> trimesh.Trimesh:
-    return _painted(trimesh.creation.box(size, trimesh.transformations.translation_matrix(center)), color)
+    return _paint(trimesh.creation.box(size, trimesh.transformations.translation_matrix(center)), color)
 
 
 def _table_and_bin() -> list[trimesh.Trimesh]:

@@ -18,7 +18,7 @@ from scenewright.stages.tableware.world.items import Item, Table
 NEAR = 0.015
 """An item that is seen within this [m] of where one of its kind stands is seen rightly."""
 LEAST_CONFIDENCE = 0.3
-"""Of what is planned for, as the command's."""
+"""Least confidence of what is planned for, as the command's."""
 
 Sight = Literal["truth", "image"]
 
@@ -41,8 +41,8 @@ class Outcome:
         self.actions += 1
         self.troubles = (*self.troubles, *done.troubles)
         kinds = {item.name: item.kind for item in done.before.items}
-        what = done.action.in_kinds(done.seen)
-        self.losses = (*self.losses, *(f"{kinds.get(name, 'item')}: {what}" for name in done.dropped))
+        action_text = done.action.in_kinds(done.seen)
+        self.losses = (*self.losses, *(f"{kinds.get(name, 'item')}: {action_text}" for name in done.dropped))
         if all(_rightly(item, done.before) for item in done.action.meant(done.seen)):
             self.policy += len(done.dropped)
         else:
@@ -76,7 +76,7 @@ def alone(seen: Table, last: Done, idle: int) -> Action:
     alone, then of the highest thing of one pile after another."""
     if idle == 1:
         for item in last.action.meant(last.seen):
-            pile = next((pile for pile in seen.stacks if any(other.name == item.name for other in pile)), None)
+            pile = next((pile for pile in seen.stacks if any(member.name == item.name for member in pile)), None)
             if pile is not None:
                 return grasp(seen, liftable(seen, pile, Rules()), 0.5 * pi)
     return grasp(seen, seen.tops[(idle - 1) % len(seen.tops)].name, 0.5 * pi * idle)
@@ -84,9 +84,9 @@ def alone(seen: Table, last: Done, idle: int) -> Action:
 
 def _rightly(item: Item, truth: Table) -> bool:
     """Whether an item of this kind stands there, on as many others."""
-    for other in truth.items:
-        apart = hypot(other.position[0] - item.position[0], other.position[1] - item.position[1])
-        same = (other.is_dish and other.kind == item.kind) or (not other.is_dish and not item.is_dish)
-        if same and apart < NEAR and abs(other.position[2] - item.position[2]) < 0.01:
+    for true_item in truth.items:
+        apart = hypot(true_item.position[0] - item.position[0], true_item.position[1] - item.position[1])
+        same = (true_item.is_dish and true_item.kind == item.kind) or (not true_item.is_dish and not item.is_dish)
+        if same and apart < NEAR and abs(true_item.position[2] - item.position[2]) < 0.01:
             return True
     return False

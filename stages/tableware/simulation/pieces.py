@@ -18,11 +18,12 @@ from scenewright.stages.tableware.world.items import Kind, Measures
 OUTER = 3
 """Facets of a wedge's outer face: nearly round, while the inner face is one facet."""
 THINNEST = 2e-4
-"""Of a piece without its margin [m]."""
+"""Least thickness of a piece without its margin [m]; by eye."""
 FOOT = 0.0006
-"""By how much the floor stands clear of the table, so that the dish rests on its foot ring all round [m]."""
+"""Height at which the floor stands clear of the table, so that the dish rests on its foot ring all round [m]; by
+eye."""
 MARGIN = 0.001
-"""By which Bullet rounds convex hulls off [m]."""
+"""Distance by which Bullet rounds convex hulls off [m]."""
 DISH_DENSITY = 1500.0
 """Melamine [kg/m^3]."""
 UTENSIL_DENSITY = 7800.0
@@ -89,8 +90,8 @@ def utensil_boxes(strip: Measures, fork: bool) -> list[np.ndarray]:
     cuts = np.array([-0.5, -0.2, 0.08, 0.20, 0.30, 0.42, 0.5]) * strip.length
     pieces = []
     for low, high in zip(cuts[:-1], cuts[1:], strict=True):
-        near = (points[:, 0] > low - 0.02 * strip.length) & (points[:, 0] < high + 0.02 * strip.length)
-        half = float(np.abs(points[near, 1]).mean() + np.abs(points[near, 1]).max()) / 2
+        in_section = (points[:, 0] > low - 0.02 * strip.length) & (points[:, 0] < high + 0.02 * strip.length)
+        half = float(np.abs(points[in_section, 1]).mean() + np.abs(points[in_section, 1]).max()) / 2
         pieces.append(np.array([[x, y, z] for x in (low, high) for y in (-half, half) for z in (0.0, strip.height)]))
     return pieces
 

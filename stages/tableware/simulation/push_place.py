@@ -13,11 +13,11 @@ from scenewright.stages.tableware.world.setting import Gripper
 SPREAD = 0.72
 """Share of a dish's inner radius to which the fingers open when they pull it from inside."""
 HIGH = 0.025
-"""Of the fingertips over the floor of an empty dish [m]."""
+"""Height of the fingertips over the floor of an empty dish [m]; by eye."""
 HEIGHTS = (0.02, 0.03, 0.04)
-"""Of the fingertips over the floor of a dish that carries something [m], the best first."""
+"""Heights of the fingertips over the floor of a dish that carries something [m], the best first."""
 PULL_SPEED = 0.15
-"""Of the hand [m/s]."""
+"""Speed of the hand [m/s]; by eye."""
 CLEAR = 0.002
 """What the fingers keep from a load [m]."""
 

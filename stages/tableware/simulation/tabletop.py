@@ -140,8 +140,8 @@ class Tabletop:
         """Wake what lies within `reach` [m] of any of some points (2,), seen from above: what sleeps does not notice
         that its support was taken away."""
         for name, body in self.bodies.items():
-            here = self.pose(name)[:2, 3]
-            if any(float(np.linalg.norm(here - point)) < reach for point in points):
+            middle = self.pose(name)[:2, 3]
+            if any(float(np.linalg.norm(middle - point)) < reach for point in points):
                 self._activate(body, engine.ACTIVATION_STATE_WAKE_UP)
 
     def _activate(self, body: int, state: int) -> None:
@@ -173,11 +173,11 @@ class Tabletop:
         items: list[Item] = []
         for name in order:
             pose = poses[name]
-            place = tuple(float(value) for value in pose[:3, 3])
+            position = tuple(float(value) for value in pose[:3, 3])
             yaw = atan2(pose[1, 0], pose[0, 0]) if not self.items[name].is_dish else 0.0
-            x, y, z = place
+            x, y, z = position
             item = replace(self.items[name], position=(x, y, z), yaw=yaw, on=None)
-            below = [other for other in items if self._carries(other, item, poses)]
+            below = [lower for lower in items if self._carries(lower, item, poses)]
             if below:
                 item = replace(item, on=_highest(below).name)
             elif z < 0.004:
@@ -195,10 +195,10 @@ class Tabletop:
 
     def _carries(self, lower: Item, upper: Item, poses: dict[str, np.ndarray]) -> bool:
         """Whether `upper` lies within what `lower` covers, higher than its foot."""
-        here = self._middle(upper.name, poses[upper.name])
-        if here[2] < lower.position[2] + 0.002 or upper.position[2] < 0.0015:
+        upper_middle = self._middle(upper.name, poses[upper.name])
+        if upper_middle[2] < lower.position[2] + 0.002 or upper.position[2] < 0.0015:
             return False
-        apart = hypot(here[0] - lower.position[0], here[1] - lower.position[1])
+        apart = hypot(upper_middle[0] - lower.position[0], upper_middle[1] - lower.position[1])
         if lower.is_dish:
             return apart < lower.measures.rim_radius
         return not upper.is_dish and apart < 0.06 and upper.position[2] > lower.position[2] + 0.0015

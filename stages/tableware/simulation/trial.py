@@ -12,6 +12,7 @@ from scenewright.stages.tableware.planning.policy import Policy
 from scenewright.stages.tableware.world.items import Table
 
 MOST_ACTIONS, MOST_IDLE = 400, 8
+"""Most actions of a trial, and most in a row that move nothing; by eye."""
 STILL = 0.004
 """What moved less than this [m] has not been moved."""
 
@@ -78,7 +79,7 @@ class Done:
         if set(self.before.by_name) != set(self.after.by_name):
             return False
         places = ((item.position, self.after.by_name[name].position) for name, item in self.before.by_name.items())
-        return all(hypot(here[0] - there[0], here[1] - there[1]) < STILL for here, there in places)
+        return all(hypot(before[0] - after[0], before[1] - after[1]) < STILL for before, after in places)
 
 
 def truth(world: World) -> Table:
@@ -117,11 +118,15 @@ def run_in(
     idle = 0
     last: Done | None = None
     for _ in range(MOST_ACTIONS if again is None else most_actions(world.table)):
-        seen = see(world)
-        if not seen.items or (again is None and idle == MOST_IDLE):
+        seen_table = see(world)
+        if not seen_table.items or (again is None and idle == MOST_IDLE):
             break
-        action = again(seen, last, idle) if again is not None and idle and last is not None else policy.decide(seen)
-        last = do_in(world, action, seen)
+        action = (
+            again(seen_table, last, idle)
+            if again is not None and idle and last is not None
+            else policy.decide(seen_table)
+        )
+        last = do_in(world, action, seen_table)
         idle = idle + 1 if last.idle else 0
         hear(last)
     return world.trial

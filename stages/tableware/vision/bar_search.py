@@ -14,6 +14,7 @@ ALONG, ACROSS = 4.0, 2.5
 FLANK = 0.6
 """What is beside a bar counts against it by this."""
 DIRECTIONS = 45
+"""Directions of bars in half a turn; by eye."""
 
 
 @njit(cache=True)
@@ -83,10 +84,10 @@ def bar_candidates(rows: np.ndarray, columns: np.ndarray, length: float, most: i
         if best[k, 0] <= 0.0 or count == most:
             break
         apart = True
-        for other in range(count):
-            turned = abs(best[k, 3] - result[other, 3]) % np.pi
+        for chosen in range(count):
+            turned = abs(best[k, 3] - result[chosen, 3]) % np.pi
             turned = min(turned, np.pi - turned)
-            distance = np.hypot(best[k, 1] - result[other, 1], best[k, 2] - result[other, 2])
+            distance = np.hypot(best[k, 1] - result[chosen, 1], best[k, 2] - result[chosen, 2])
             if turned < 0.175 and distance < 8.0:
                 apart = False
         if apart:

@@ -63,25 +63,27 @@ def items_in(heights: HeightMap, sizes: DishSizes) -> tuple[Detection, ...]:
     for index, stack in enumerate(stacks):
         carrier = len(detections) + len(stack.kinds) - 1
         detections.extend(dishes_of(stack, heights, crossed, len(detections)))
-        for level, seen in enumerate(utensils_on_dish(heights, stack, covered, index + 1, sizes)):
-            z = stack.top + level * sizes[seen.bar.kind].height
-            detections.append(as_detection(seen, heights, z, carrier, sizes))
+        for level, utensil in enumerate(utensils_on_dish(heights, stack, covered, index + 1, sizes)):
+            z = stack.top + level * sizes[utensil.bar.kind].height
+            detections.append(as_detection(utensil, heights, z, carrier, sizes))
             carrier = len(detections) - 1
-            _cover_bar(covered, heights, seen.bar, z, sizes)
+            _cover_bar(covered, heights, utensil.bar, z, sizes)
     hidden = covered > 0
-    near = cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0
-    unlike = rising(heights, unlike_table(heights, near), near) & heights.workspace()
+    around_covered = cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0
+    unlike = rising(heights, unlike_table(heights, around_covered), around_covered) & heights.workspace()
     lying, strange = utensils_on_table(heights, unlike, hidden, sizes)
-    for seen in lying:
-        here = np.array(heights.world(np.float64(seen.bar.u), np.float64(seen.bar.v), 0.0))
+    for utensil in lying:
+        middle = np.array(heights.world(np.float64(utensil.bar.u), np.float64(utensil.bar.v), 0.0))
         below = [
             k
-            for k, other in enumerate(detections)
-            if other.on is None and other.kind in UTENSILS and np.hypot(*(here - other.position[:2])) < SAME_PLACE
+            for k, detected in enumerate(detections)
+            if detected.on is None
+            and detected.kind in UTENSILS
+            and np.hypot(*(middle - detected.position[:2])) < SAME_PLACE
         ]
-        z = sizes[seen.bar.kind].height if below else 0.0
-        detections.append(as_detection(seen, heights, z, below[0] if below else None, sizes))
-        _cover_bar(covered, heights, seen.bar, z, sizes)
+        z = sizes[utensil.bar.kind].height if below else 0.0
+        detections.append(as_detection(utensil, heights, z, below[0] if below else None, sizes))
+        _cover_bar(covered, heights, utensil.bar, z, sizes)
     detections.extend(_unknown(heights, covered, strange))
     return tuple(_outside(detection, heights.sides, sizes) for detection in detections)
 

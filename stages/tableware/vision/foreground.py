@@ -66,6 +66,6 @@ def rising(heights: HeightMap, unlike: np.ndarray, covered: np.ndarray) -> np.nd
     cut = np.clip(heights.raw, np.float32(-0.004), np.float32(MOST_RISE))
     count = cv2.boxFilter(heights.valid.astype(np.uint8), cv2.CV_32F, (5, 5), normalize=False)
     mean = cv2.boxFilter(cut, -1, (5, 5), normalize=False) / np.maximum(count, 1.0)
-    near = cv2.dilate(covered.astype(np.uint8), np.ones((NEAR_DISH, NEAR_DISH), np.uint8)) > 0
-    plain = (mean > PLAIN_RISE) & (mean < 0.7 * MOST_RISE) & (count >= 16.0) & ~near
+    near_dish = cv2.dilate(covered.astype(np.uint8), np.ones((NEAR_DISH, NEAR_DISH), np.uint8)) > 0
+    plain = (mean > PLAIN_RISE) & (mean < 0.7 * MOST_RISE) & (count >= 16.0) & ~near_dish
     return np.asarray(((unlike & ~((count >= 9.0) & (mean < LEAST_RISE))) | plain) & ~covered)

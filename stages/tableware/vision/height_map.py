@@ -13,9 +13,11 @@ from scenewright.stages.tableware.world.items import TABLE_SIDES
 from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 TALLEST = 0.20
-"""Nothing on the table reaches higher [m]."""
+"""Height above which nothing on the table reaches [m]."""
 LOWEST = np.float32(-0.02)
+"""Height to which lower ones are cut [m]; by eye."""
 LEAST_VALID = 0.2
+"""Share of pixels with depth that an image needs; by eye."""
 PLANE_WIDTH = 0.0025
 """Width of the last fit's weights [m]: the noise of a dim image."""
 PLANE_BAND, PLANE_OFF = 0.015, 0.03
@@ -130,7 +132,7 @@ def height_map(
     plane = _table_plane(part, (camera.cx - left, camera.cy - top), (camera.fx, camera.fy), above, sides)
     raw, valid, tall = _heights(part, float(plane[0]), float(plane[1]), float(plane[2]))
     weight = cv2.boxFilter(valid.astype(np.float32), -1, (7, 7))
-    filled = _filled(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
+    filled = _fill_gaps(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
     return HeightMap(
         raw=raw,
         valid=valid,
@@ -156,12 +158,12 @@ def _table_plane(
         np.abs(v - center[1]) < 0.49 * sides[1] * focal[1] / above
     )
     u, v, z = u[inside & (z > 0)], v[inside & (z > 0)], z[inside & (z > 0)]
-    near = z[np.abs(z - above) < PLANE_OFF]
-    if len(near) < 0.05 * max(len(z), 200):
+    near_table = z[np.abs(z - above) < PLANE_OFF]
+    if len(near_table) < 0.05 * max(len(z), 200):
         raise BadInput(
             f"no table is seen {above:.3g} m below the camera", hint="check the depth's scale and the height"
         )
-    plane = np.array([0.0, 0.0, float(np.median(near))])
+    plane = np.array([0.0, 0.0, float(np.median(near_table))])
     columns = np.column_stack([u, v, np.ones(len(u))]).astype(np.float64)
     for turn, width in enumerate((PLANE_BAND, 0.008, 0.004, PLANE_WIDTH, PLANE_WIDTH, PLANE_WIDTH)):
         residual = z - columns @ plane
@@ -196,7 +198,7 @@ def _heights(part: np.ndarray, a: float, b: float, c: float) -> tuple[np.ndarray
 
 
 @njit(cache=True)
-def _filled(raw: np.ndarray, valid: np.ndarray, sums: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _fill_gaps(raw: np.ndarray, valid: np.ndarray, sums: np.ndarray, weight: np.ndarray) -> np.ndarray:
     filled = raw.copy()
     for v in range(raw.shape[0]):
         for u in range(raw.shape[1]):

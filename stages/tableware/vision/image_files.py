@@ -26,6 +26,7 @@ COLORS = ("color.png", "color.jpg", "rgb.png", "rgb.jpg")
 DEPTHS = ("depth.npz", "depth.npy", "depth.png")
 CAMERAS = ("camera.json", "scene.json")
 LARGEST_JSON, LARGEST_PIXELS = 5_000_000, 40_000_000
+"""Largest file of a camera [bytes] and largest picture [px]; by eye."""
 MILLIMETRE = 0.001
 """Scale of a 16-bit image where none is given."""
 

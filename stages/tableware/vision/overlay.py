@@ -22,7 +22,9 @@ COLORS = {
 }
 """sRGB by kind; None is unknown."""
 SURE = 0.9
+"""Confidence from which on an outline is drawn full; by eye."""
 FONT, LINE = cv2.FONT_HERSHEY_SIMPLEX, 20
+"""Font of the labels, and height of a line of text [px]."""
 HALO = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """Offsets [px] of a label's dark edge."""
 
@@ -33,7 +35,7 @@ def draw_sight(color: np.ndarray, sight: Sight) -> np.ndarray:
     camera_from_world = np.linalg.inv(sight.world_from_camera)
     labels: list[tuple[tuple[int, int], str, tuple[int, int, int]]] = []
     for number, detection in enumerate(sight.detections):
-        points = _projected(_outline(detection, sight.sizes), camera_from_world, sight)
+        points = _project(_outline(detection, sight.sizes), camera_from_world, sight)
         if points is None:
             continue
         tone = COLORS[detection.kind]
@@ -78,14 +80,17 @@ def _outline(detection: Detection, sizes: DishSizes) -> np.ndarray:
     return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.full(73, detection.lip)])
 
 
-def _projected(points: np.ndarray, camera_from_world: np.ndarray, sight: Sight) -> np.ndarray | None:
+def _project(points: np.ndarray, camera_from_world: np.ndarray, sight: Sight) -> np.ndarray | None:
     """Return (N, 2) pixels, or None when a point is not in front of the camera."""
-    seen = points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
-    if (seen[:, 2] < 0.05).any():
+    in_camera = points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+    if (in_camera[:, 2] < 0.05).any():
         return None
     camera = sight.camera
     return np.column_stack(
-        [camera.fx * seen[:, 0] / seen[:, 2] + camera.cx, camera.fy * seen[:, 1] / seen[:, 2] + camera.cy]
+        [
+            camera.fx * in_camera[:, 0] / in_camera[:, 2] + camera.cx,
+            camera.fy * in_camera[:, 1] / in_camera[:, 2] + camera.cy,
+        ]
     )
 
 
@@ -107,14 +112,14 @@ def _line(picture: np.ndarray, points: np.ndarray, tone: tuple[int, int, int], d
 
 def _write(picture: np.ndarray, labels: list[tuple[tuple[int, int], str, tuple[int, int, int]]]) -> None:
     """Write labels, in place, each moved down until it is on no other."""
-    taken: list[tuple[int, int, int]] = []
+    spans: list[tuple[int, int, int]] = []
     for (u, v), text, tone in labels:
         (width, _), _ = cv2.getTextSize(text, FONT, 0.42, 1)
         left = int(np.clip(u - width // 2, 2, max(2, picture.shape[1] - width - 2)))
         v = max(14, v - 5)
-        while any(abs(v - row) < 14 and left < right and start < left + width for start, right, row in taken):
+        while any(abs(v - row) < 14 and left < right and start < left + width for start, right, row in spans):
             v += 14
-        taken.append((left, left + width, v))
+        spans.append((left, left + width, v))
         for du, dv in HALO:  # a thicker text is a wider one, it would not lie behind
             cv2.putText(picture, text, (left + du, v + dv), FONT, 0.42, (0, 0, 0), 1, cv2.LINE_AA)
         cv2.putText(picture, text, (left, v), FONT, 0.42, tuple(min(255, c + 60) for c in tone), 1, cv2.LINE_AA)

@@ -16,10 +16,11 @@ from scenewright.stages.tableware.world.items import STANDARD, DishSizes, Kind
 WIDTH = 960
 """Pictures are looked at in this width [px]."""
 CANNY = (40.0, 110.0)
+"""Lower and upper threshold of the edges [grey levels]; by eye."""
 LEAST_POINTS, LEAST_AXIS, MOST_AXIS = 30, 0.035, 0.5
 """Points of a contour; greater axis of an ellipse over the picture's width."""
 FLATTEST = 0.25
-"""Smaller over greater axis."""
+"""Least ratio of smaller to greater axis."""
 LEAST_SLOPE, ALIGNED = 6.0, 0.90
 """Tone's change across an edge [levels/px], and cosine of its angle to the ellipse's normal."""
 LEAST_SUPPORT = 0.8
@@ -103,11 +104,11 @@ def _kind(great: float, picture_width: float | None, sizes: DishSizes) -> tuple[
 
 
 def _apart(outlines: list[Outline]) -> list[Outline]:
-    kept: list[Outline] = []
+    distinct: list[Outline] = []
     for outline in sorted(outlines, key=lambda outline: (-round(outline.confidence, 2), -_area(outline.box))):
-        if all(_overlap(outline.box, other.box) < SAME for other in kept):
-            kept.append(outline)
-    return kept
+        if all(_overlap(outline.box, earlier.box) < SAME for earlier in distinct):
+            distinct.append(outline)
+    return distinct
 
 
 def _area(box: tuple[float, float, float, float]) -> float:

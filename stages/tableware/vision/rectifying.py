@@ -35,10 +35,11 @@ STEEPEST = np.deg2rad(75.0)
 MOST_SIDES = (1.40, 0.82)
 """What the virtual view shows of a table along x and y [m]."""
 CELL = 0.01
-"""Of the map in which the table's outline is found [m]."""
+"""Edge of a cell of the map in which the table's outline is found [m]; by eye."""
 JUMP = 0.03
 """Neighbours whose depths differ by more than this share are not one surface."""
 SUBDIVISION = 4
+"""Steps along each side of a patch between four pixels; by eye."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +80,11 @@ def table_plane(
         )
     random = np.random.default_rng([seed, 73])
     points = points[random.permutation(len(points))[:POINTS]]
-    total, left, planes = len(points), points, []
+    total, remaining, planes = len(points), points, []
     direction = up
     for _ in range(3):
         fit = ransac_plane(
-            left,
+            remaining,
             distance_threshold=THICKNESS,
             iterations=400,
             random=random,
@@ -95,8 +96,8 @@ def table_plane(
         sign = 1.0 if fit.offset > 0.0 else -1.0  # the camera, at the origin, is above
         planes.append((len(fit.inliers), sign * fit.normal, sign * fit.offset))
         direction = planes[0][1]
-        left = np.delete(left, fit.inliers, axis=0)
-        if len(left) < 500:
+        remaining = np.delete(remaining, fit.inliers, axis=0)
+        if len(remaining) < 500:
             break
     if not planes:
         raise BadInput(
@@ -105,7 +106,7 @@ def table_plane(
         )
     rivals = [plane for plane in planes if plane[0] >= RIVAL * planes[0][0]]
     _, normal, offset = min(rivals, key=lambda plane: plane[2])
-    normal, offset = _refined(points, normal, offset)
+    normal, offset = _refine_plane(points, normal, offset)
     if abs(normal[2]) < np.cos(STEEPEST):
         raise BadInput(
             f"the table is seen at {np.rad2deg(np.arccos(abs(normal[2]))):.0f} degrees off its normal",
@@ -114,16 +115,16 @@ def table_plane(
     return normal, offset
 
 
-def _refined(points: np.ndarray, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float]:
+def _refine_plane(points: np.ndarray, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float]:
     """Return the plane of points (N, 3) near one, by Welsch's weights: what stands on the table lifts a plain fit."""
     for width in (0.006, 0.004, WIDTH, WIDTH, WIDTH, WIDTH):
         distance = points @ normal + offset
-        near = points[np.abs(distance) < 3.0 * width]
+        near_plane = points[np.abs(distance) < 3.0 * width]
         weight = np.exp(-0.5 * (distance[np.abs(distance) < 3.0 * width] / width) ** 2)
         if weight.sum() < 50.0:
             break
-        center = weight @ near / weight.sum()
-        centred = near - center
+        center = weight @ near_plane / weight.sum()
+        centred = near_plane - center
         turned = np.linalg.eigh((centred * weight[:, None]).T @ centred)[1][:, 0]
         normal = turned if turned @ normal > 0.0 else -turned
         offset = -float(normal @ center)
@@ -161,7 +162,7 @@ def rectify(
     assert sides is not None
     view = overhead_camera()
     world = points @ frame[:3, :3].T + frame[:3, 3]
-    top, picture = _splatted(
+    top, picture = _splat_downwards(
         world.astype(np.float64),
         depth.astype(np.float64),
         color,
@@ -174,10 +175,10 @@ def rectify(
             view.camera.width,
         ),
     )
-    seen = top > 0.0
-    ground = seen & (np.abs(float(view.world_from_camera[2, 3]) - top) < THICKNESS)
-    tone = np.median(picture[ground], axis=0) if ground.any() else np.median(picture[seen], axis=0)
-    picture[~seen] = np.rint(tone).astype(np.uint8)
+    has_height = top > 0.0
+    ground = has_height & (np.abs(float(view.world_from_camera[2, 3]) - top) < THICKNESS)
+    tone = np.median(picture[ground], axis=0) if ground.any() else np.median(picture[has_height], axis=0)
+    picture[~has_height] = np.rint(tone).astype(np.uint8)
     return Rectified(picture, top.astype(np.float32), view, frame, sides, tuple(notes))
 
 
@@ -195,13 +196,13 @@ def _table_frame(plane: tuple[np.ndarray, float]) -> np.ndarray:
 def _workspace_frame(frame: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, tuple[float, float], bool]:
     """Return (world_from_camera (4, 4), sides [m], whether the table was cut to what the view shows) of points (N, 3)
     in the table's frame. Raises BadInput where the largest piece of table is too small."""
-    near = points[(points[:, 2] > -THICKNESS) & (points[:, 2] < 0.35)]
-    cells = np.floor(near[:, :2] / CELL).astype(int)
+    near_table = points[(points[:, 2] > -THICKNESS) & (points[:, 2] < 0.35)]
+    cells = np.floor(near_table[:, :2] / CELL).astype(int)
     low = cells.min(axis=0)
     shape = cells.max(axis=0) - low + 3
     if shape.max() > 1000:
-        near = near[np.abs(near[:, :2] - np.median(near[:, :2], axis=0)).max(axis=1) < 2.0]
-        cells = np.floor(near[:, :2] / CELL).astype(int)
+        near_table = near_table[np.abs(near_table[:, :2] - np.median(near_table[:, :2], axis=0)).max(axis=1) < 2.0]
+        cells = np.floor(near_table[:, :2] / CELL).astype(int)
         low = cells.min(axis=0)
         shape = cells.max(axis=0) - low + 3
     grid = np.zeros(shape, dtype=np.uint8)
@@ -242,7 +243,7 @@ class _LooksDown(NamedTuple):
 
 
 @njit(cache=True)
-def _splatted(
+def _splat_downwards(
     world: np.ndarray, depth: np.ndarray, color: np.ndarray, camera: _LooksDown
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (z-depth (rows, columns) [m], colour) from a camera that looks straight down: patches between four

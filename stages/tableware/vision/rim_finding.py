@@ -17,7 +17,7 @@ from scenewright.stages.tableware.vision.rim_votes import cast_votes
 from scenewright.stages.tableware.world.items import DishSizes, Kind
 
 LEAST_SLOPE = 0.0012
-"""Of an edge [m/px]."""
+"""Least slope of an edge [m/px]; by eye."""
 LEAST_VOTES, LEAST_SUPPORT = 0.22, 0.42
 """Shares of the circumference that must vote, and that the fitted circle must explain."""
 
@@ -49,18 +49,21 @@ def find_rims(heights: HeightMap, sizes: DishSizes) -> list[Rim]:
         heights.camera_height,
         LEAST_SLOPE,
     )
-    kept: list[Rim] = []
-    for kind, own in zip(sizes.dishes, votes, strict=True):
+    distinct: list[Rim] = []
+    for kind, votes_of_kind in zip(sizes.dishes, votes, strict=True):
         rims = [
             fitted
-            for u0, v0 in _peaks(own, heights, sizes[kind].rim_radius)
+            for u0, v0 in _peaks(votes_of_kind, heights, sizes[kind].rim_radius)
             if (fitted := fit_rim(heights, kind, u0, v0, sizes)) is not None
         ]
         for rim in sorted(rims, key=lambda rim: -rim.support):
             apart = 1.2 * sizes[kind].rim_radius
-            if all(rim.kind != other.kind or np.hypot(rim.x - other.x, rim.y - other.y) > apart for other in kept):
-                kept.append(rim)
-    return kept
+            if all(
+                rim.kind != earlier.kind or np.hypot(rim.x - earlier.x, rim.y - earlier.y) > apart
+                for earlier in distinct
+            ):
+                distinct.append(rim)
+    return distinct
 
 
 def _peaks(votes: np.ndarray, heights: HeightMap, rim_radius: float) -> list[tuple[float, float]]:
@@ -101,10 +104,10 @@ def _lip_height(heights: HeightMap, u: float, v: float, radius: float, lip: floa
     valid = heights.valid[rows, columns]
     values = heights.raw[rows, columns][valid]
     for band in (0.008, 0.005):
-        near = values[np.abs(values - lip) < band]
-        if len(near) < 8:
+        near_lip = values[np.abs(values - lip) < band]
+        if len(near_lip) < 8:
             break
-        lip = float(near.mean())
+        lip = float(near_lip.mean())
     return lip, float(valid.mean())
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 DIRECTIONS = 96
+"""Directions in which the fall of a rim is looked for; by eye."""
 WINDOW = 14
 """Pixels on either side of the expected circle that are searched."""
 LEAST_STEP = 0.006
@@ -15,7 +16,9 @@ LEAST_STEP = 0.006
 CREST = 0.012
 """The height before a fall may differ this much [m] from the lip's."""
 _ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+"""Angles [rad] of these directions."""
 RAYS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
+"""The same as unit vectors (DIRECTIONS, 2)."""
 
 
 @njit(cache=True)
@@ -43,12 +46,12 @@ def _outer_edges(profile: np.ndarray, lip: float, falls: np.ndarray, edge: np.nd
     for k in range(len(profile)):
         falls[k] = False
         for step in range(profile.shape[1] - 2, -1, -1):
-            here, there = profile[k, step], profile[k, step + 1]
-            if here >= level > there:
-                crest = max(here, profile[k, step - 1]) if step > 0 else here
+            inner_height, outer_height = profile[k, step], profile[k, step + 1]
+            if inner_height >= level > outer_height:
+                crest = max(inner_height, profile[k, step - 1]) if step > 0 else inner_height
                 if abs(crest - lip) < CREST:
                     falls[k] = True
-                    edge[k] = step - WINDOW + min(1.0, (here - level) / max(here - there, 1e-6))
+                    edge[k] = step - WINDOW + min(1.0, (inner_height - level) / max(inner_height - outer_height, 1e-6))
                     count += 1
                     break
     return count
@@ -72,7 +75,7 @@ def _circle_shift(edge: np.ndarray, kept: np.ndarray, rays: np.ndarray) -> np.nd
     c0 = n[1, 1] * n[2, 2] - n[1, 2] * n[2, 1]
     c1 = n[1, 2] * n[2, 0] - n[1, 0] * n[2, 2]
     c2 = n[1, 0] * n[2, 1] - n[1, 1] * n[2, 0]
-    whole = n[0, 0] * c0 + n[0, 1] * c1 + n[0, 2] * c2
+    determinant = n[0, 0] * c0 + n[0, 1] * c1 + n[0, 2] * c2
     inverse = np.empty((3, 3))
     inverse[0, 0], inverse[1, 0], inverse[2, 0] = c0, c1, c2
     inverse[0, 1] = n[0, 2] * n[2, 1] - n[0, 1] * n[2, 2]
@@ -84,7 +87,7 @@ def _circle_shift(edge: np.ndarray, kept: np.ndarray, rays: np.ndarray) -> np.nd
     shift = np.zeros(3)
     for i in range(3):
         for j in range(3):
-            shift[i] += inverse[i, j] * right[j] / whole
+            shift[i] += inverse[i, j] * right[j] / determinant
     return shift
 
 
@@ -108,7 +111,7 @@ def fit_circle(
     rim_radius, low, high, focal, camera_height = sought
     count = len(rays)
     profile = np.empty((count, 2 * WINDOW + 1))
-    falls, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    falls, fits = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     edge, crests = np.zeros(count), np.empty(count)
     lip, support, radius = 0.5 * (low + high), 0.0, 0.0
     nothing = (u, v, lip, 0.0, 0.0)
@@ -129,16 +132,16 @@ def fit_circle(
                 continue
         if _outer_edges(profile, lip, falls, edge) < 0.3 * count:
             return nothing
-        kept[:] = falls
+        fits[:] = falls
         shift = np.zeros(3)
         limit = 6.0 if turn < 2 else 2.5
         for _ in range(4):
-            shift = _circle_shift(edge, kept, rays)
+            shift = _circle_shift(edge, fits, rays)
             total = 0
             for k in range(count):
                 residual = edge[k] - rays[k, 0] * shift[0] - rays[k, 1] * shift[1] - shift[2]
-                kept[k] = falls[k] and abs(residual) < limit
-                total += kept[k]
+                fits[k] = falls[k] and abs(residual) < limit
+                total += fits[k]
             if total < 0.25 * count:
                 return nothing
             support = total / count

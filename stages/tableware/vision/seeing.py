@@ -26,12 +26,13 @@ from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 Sizes = Literal["known", "estimated"]
 LEAST_SIZE = (240, 180)
-"""Of an image [px]."""
+"""Least width and height of an image [px]."""
 MILLIMETRES = 20.0
 """A median depth beyond this [m] is one in millimetres."""
 LEVEL = 0.9995
 """Cosine of the angle to the vertical, from which a camera looks straight down."""
 OBLIQUE, OBLIQUE_TRUST = np.deg2rad(15.0), 0.8
+"""Tilt of the camera [rad] from which on what was seen is trusted less, and by which factor; by eye."""
 OBLIQUE_VIEW = "oblique view"
 """A view this far off the vertical is oblique; what is left of a confidence there."""
 OVER_MIDDLE = 0.002
@@ -43,7 +44,7 @@ COARSE = 350.0
 GLARE_AREA = 0.0004
 """Saturated colour without depth on more than this [m^2] hides what is there."""
 HOLE_AREA = 0.002
-"""So do holes in the depth of more than this [m^2] that are 14 mm wide at least."""
+"""Area of a hole in the depth [m^2] from which on it is reported; it has to be 14 mm wide at least."""
 
 
 @dataclass(frozen=True)
@@ -126,12 +127,17 @@ def see(
         normal, offset = table_plane(depth, intrinsics, seed, up)
         if pose is not None:
             _check_pose(pose, normal, offset)
-        made = rectify(color, depth, intrinsics, (normal, offset), pose, None if pose is None else sides)
-        color, depth, view, sides = made.color, made.depth, made.view, made.sides
-        world, rectified = made.world_from_camera, True
+        rectified_view = rectify(color, depth, intrinsics, (normal, offset), pose, None if pose is None else sides)
+        color, depth, view, sides = (
+            rectified_view.color,
+            rectified_view.depth,
+            rectified_view.view,
+            rectified_view.sides,
+        )
+        world, rectified = rectified_view.world_from_camera, True
         notes += [
             "the view was rectified to the table's plane: what others hide from the camera is not seen",
-            *made.notes,
+            *rectified_view.notes,
         ]
         if min(intrinsics.fx, intrinsics.fy) / max(middle, 0.1) < COARSE:
             notes.append(f"{intrinsics.fx / max(middle, 0.1):.0f} pixels per metre are too few to see utensils")
@@ -145,7 +151,7 @@ def see(
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
     if rectified and -normal[2] < np.cos(OBLIQUE):
         detections = seen_from_the_side(detections)
-    notes += _unhandled(heights)
+    notes += _unseen_notes(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
     return Sight(
         detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights, dishes, sizes == "estimated"
@@ -211,19 +217,21 @@ def seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ..
     What belongs to a stack gets none: lower rims are hidden, so that a tall mug is two cups, a can in a bowl a cup.
     """
     carrying = {detection.on for detection in detections if detection.kind in DISHES}
-    seen = []
+    trusted = []
     for index, detection in enumerate(detections):
         if detection.kind is None:
-            seen.append(detection)
+            trusted.append(detection)
             continue
         stacked = index in carrying or (detection.kind in DISHES and detection.on is not None)
         reasons = (OBLIQUE_VIEW, "a stack seen from the side") if stacked else (OBLIQUE_VIEW,)
         trust = 0.0 if stacked else OBLIQUE_TRUST
-        seen.append(replace(detection, confidence=trust * detection.confidence, unsure=(*detection.unsure, *reasons)))
-    return tuple(seen)
+        trusted.append(
+            replace(detection, confidence=trust * detection.confidence, unsure=(*detection.unsure, *reasons))
+        )
+    return tuple(trusted)
 
 
-def _unhandled(heights: HeightMap) -> list[str]:
+def _unseen_notes(heights: HeightMap) -> list[str]:
     """Return what of the workspace could not be looked at."""
     inside = heights.workspace()[::2, ::2]
     area = 4.0 / float(heights.scale(0.0)) ** 2

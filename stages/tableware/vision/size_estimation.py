@@ -24,11 +24,13 @@ ROUGH = 3.0
 AROUND = 0.012
 """What is this near to a dish belongs to it: handles, what flies about its edge [m]."""
 DRAWS = 200
+"""Triples of points through which circles are laid; by eye."""
 NEAR = 0.0035
 """Points this near to a circle are on it [m]."""
 LEAST_TRIED, SURE_ROUND = 0.30, 0.70
 """Shares of a circle's directions from which it is looked at, and from which more adds nothing to the confidence."""
 RADII = (0.028, 0.160)
+"""Least and largest radius of a dish [m]."""
 HOLLOW_SHARE = 0.4
 """What is inside of a dish's edge lies lower than it by `hollow` or by this share of its height, whichever is less."""
 
@@ -57,43 +59,43 @@ def estimated_dishes(heights: HeightMap, seed: int = 0, limits: Limits = DEFAULT
     inside = heights.workspace()
     measured = inside & heights.valid
     result: list[Detection] = []
-    taken = np.zeros(inside.shape, dtype=np.uint8)
+    covered = np.zeros(inside.shape, dtype=np.uint8)
     # What is joined low down, by what hides between things, comes apart higher up: levels from the top down, and what
     # is a dish at one is left out of the lower ones.
     for level in LEVELS:
-        high = (measured & (heights.smooth > max(level, ROUGH * heights.roughness)) & (taken == 0)).astype(np.uint8)
-        for window, own in _pieces(high, heights):
-            dish = _dish(heights, window, own, limits, random)
+        high = (measured & (heights.smooth > max(level, ROUGH * heights.roughness)) & (covered == 0)).astype(np.uint8)
+        for window, of_piece in _pieces(high, heights):
+            dish = _dish(heights, window, of_piece, limits, random)
             if dish is not None:
                 result.append(dish)
                 assert dish.size is not None
                 u, v = heights.pixel(dish.position[0], dish.position[1], dish.lip)
                 reach = (dish.size.rim_radius + AROUND) * float(heights.scale(dish.lip))
-                cv2.circle(taken, (int(u), int(v)), int(reach), 1, -1)
+                cv2.circle(covered, (int(u), int(v)), int(reach), 1, -1)
     result = _apart(result)
     low = max(LEAST_HEIGHT, ROUGH * heights.roughness)
-    rest = (((measured & (heights.smooth > low)) | (heights.tall & inside)) & (taken == 0)).astype(np.uint8)
-    for window, own in _pieces(rest, heights):
-        tall = heights.tall[window][own].mean() > 0.05
-        known_heights = heights.smooth[window][own & heights.valid[window]]
+    unexplained = (((measured & (heights.smooth > low)) | (heights.tall & inside)) & (covered == 0)).astype(np.uint8)
+    for window, of_piece in _pieces(unexplained, heights):
+        tall = heights.tall[window][of_piece].mean() > 0.05
+        known_heights = heights.smooth[window][of_piece & heights.valid[window]]
         height = TALLEST if tall or len(known_heights) == 0 else float(np.percentile(known_heights, 97))
         result.append(
-            _unknown(heights, window, own, height, f"taller than {TALLEST:.2f} m" if tall else "unknown object")
+            _unknown(heights, window, of_piece, height, f"taller than {TALLEST:.2f} m" if tall else "unknown object")
         )
     return tuple(result)
 
 
 def _apart(dishes: list[Detection]) -> list[Detection]:
     """Return dishes less those whose middle is within one that is surer."""
-    kept: list[Detection] = []
+    distinct: list[Detection] = []
     for dish in sorted(dishes, key=lambda dish: -dish.confidence):
         (x, y, _), apart = dish.position, True
-        for other in kept:
-            reach = other.size.rim_radius if other.size is not None else 0.0
-            apart &= bool(np.hypot(x - other.position[0], y - other.position[1]) > reach)
+        for earlier in distinct:
+            reach = earlier.size.rim_radius if earlier.size is not None else 0.0
+            apart &= bool(np.hypot(x - earlier.position[0], y - earlier.position[1]) > reach)
         if apart:
-            kept.append(dish)
-    return kept
+            distinct.append(dish)
+    return distinct
 
 
 def _pieces(mask: np.ndarray, heights: HeightMap) -> list[tuple[tuple[slice, slice], np.ndarray]]:
@@ -178,9 +180,9 @@ def _circle(edge: np.ndarray, scale: float, random: np.random.Generator) -> tupl
         circle = _through(points[random.choice(len(points), 3, replace=False)])
         if circle is None or not RADII[0] * scale < circle[2] < RADII[1] * scale:
             continue
-        own = _share(points, circle, scale)
-        if own > share:
-            best, share = circle, own
+        share_of_circle = _share(points, circle, scale)
+        if share_of_circle > share:
+            best, share = circle, share_of_circle
     if best is None or share < LEAST_TRIED:
         return None
     outer = _outermost(points, best, scale)
@@ -197,8 +199,8 @@ def _outermost(points: np.ndarray, circle: tuple[float, float, float], scale: fl
     inner side too."""
     offset = points - np.array(circle[:2])
     reach = np.hypot(offset[:, 0], offset[:, 1])
-    near = np.abs(reach - circle[2]) < 2.5 * NEAR * scale
-    points, reach, offset = points[near], reach[near], offset[near]
+    near_circle = np.abs(reach - circle[2]) < 2.5 * NEAR * scale
+    points, reach, offset = points[near_circle], reach[near_circle], offset[near_circle]
     direction = np.floor((np.arctan2(offset[:, 1], offset[:, 0]) / (2.0 * np.pi) + 0.5) * 72.0).astype(int) % 72
     order = np.argsort(-reach)
     return points[order[np.unique(direction[order], return_index=True)[1]]]
@@ -215,6 +217,9 @@ def _through(points: np.ndarray) -> tuple[float, float, float] | None:
 def _share(points: np.ndarray, circle: tuple[float, float, float], scale: float) -> float:
     """Return the share of 72 directions around a circle's centre in which a point lies on it."""
     offset = points - np.array(circle[:2])
-    near = np.abs(np.hypot(offset[:, 0], offset[:, 1]) - circle[2]) < NEAR * scale
-    directions = np.floor((np.arctan2(offset[near, 1], offset[near, 0]) / (2.0 * np.pi) + 0.5) * 72.0).astype(int) % 72
+    near_circle = np.abs(np.hypot(offset[:, 0], offset[:, 1]) - circle[2]) < NEAR * scale
+    directions = (
+        np.floor((np.arctan2(offset[near_circle, 1], offset[near_circle, 0]) / (2.0 * np.pi) + 0.5) * 72.0).astype(int)
+        % 72
+    )
     return len(np.unique(directions)) / 72.0

@@ -38,33 +38,33 @@ class Stack:
 def read_stacks(rims: list[Rim], sizes: DishSizes) -> list[Stack]:
     """Return the stacks that rims belong to, widest first: each rim is the topmost of its kind there."""
     stacks: list[Stack] = []
-    left = sorted(rims, key=lambda rim: (-sizes[rim.kind].rim_radius, -rim.support))
-    while left:
-        base = left.pop(0)
+    unread = sorted(rims, key=lambda rim: (-sizes[rim.kind].rim_radius, -rim.support))
+    while unread:
+        base = unread.pop(0)
         members = [base]
         for kind in sizes.dishes:
-            near = [
+            members_of_stack = [
                 rim
-                for rim in left
+                for rim in unread
                 if rim.kind == kind != base.kind and np.hypot(rim.x - base.x, rim.y - base.y) < CONCENTRIC
             ]
-            if near:
-                member = min(near, key=lambda rim: np.hypot(rim.x - base.x, rim.y - base.y))
+            if members_of_stack:
+                member = min(members_of_stack, key=lambda rim: np.hypot(rim.x - base.x, rim.y - base.y))
                 members.append(member)
-                left.remove(member)
-        stacks.append(_read(members, sizes))
+                unread.remove(member)
+        stacks.append(_read_stack(members, sizes))
     return stacks
 
 
-def _read(members: list[Rim], sizes: DishSizes) -> Stack:
+def _read_stack(members: list[Rim], sizes: DishSizes) -> Stack:
     """Return the possible stack whose lips are nearest to those of the rims (root mean square)."""
     members = sorted(members, key=lambda rim: -sizes[rim.kind].rim_radius)
-    seen = {rim.kind: rim.lip for rim in members}
+    seen_lips = {rim.kind: rim.lip for rim in members}
     best, least = None, np.inf
     for kinds, feet, lips in possible_stacks(sizes):
-        if lips.keys() != seen.keys():
+        if lips.keys() != seen_lips.keys():
             continue
-        misfit = float(np.sqrt(np.mean([(lips[kind] - seen[kind]) ** 2 for kind in seen])))
+        misfit = float(np.sqrt(np.mean([(lips[kind] - seen_lips[kind]) ** 2 for kind in seen_lips])))
         if misfit < least:
             best, least = (kinds, feet), misfit
     assert best is not None

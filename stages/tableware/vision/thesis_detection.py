@@ -19,7 +19,9 @@ from scenewright.stages.tableware.world.items import Kind
 from scenewright.stages.tableware.world.overhead import OverheadCamera
 
 CANNY = (60.0, 150.0)
+"""Lower and upper threshold of the edges [grey levels]; by eye."""
 VOTES = 26.0
+"""Threshold of the accumulator of OpenCV's Hough transform; by eye."""
 RADIUS_TOLERANCE = 0.14
 """A lip is nearer to the camera than the table, so circles appear larger by up to this share."""
 CLUSTER = 0.02
@@ -27,7 +29,7 @@ CLUSTER = 0.02
 SLENDER = 4.0
 """Length against width of a contour's box from which it is a utensil."""
 LENGTH = (0.10, 0.20)
-"""Of a utensil [m]."""
+"""Least and largest length of a utensil [m]."""
 
 
 def detect_thesis(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tuple[Detection, ...]:

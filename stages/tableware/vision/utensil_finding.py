@@ -62,8 +62,8 @@ def outline(kind: Kind, sizes: DishSizes) -> tuple[np.ndarray, np.ndarray]:
     for stations, low, high in utensil_parts(measures, kind == "fork"):
         within = (x >= stations[0]) & (x <= stations[-1])
         inside |= (within & (y >= np.interp(x, stations, low)) & (y <= np.interp(x, stations, high))).astype(np.uint8)
-    near = cv2.dilate(inside, np.ones((3, 3), np.uint8))
-    border = (cv2.dilate(inside, np.ones((7, 7), np.uint8)) > 0) & (near == 0)
+    dilated = cv2.dilate(inside, np.ones((3, 3), np.uint8))
+    border = (cv2.dilate(inside, np.ones((7, 7), np.uint8)) > 0) & (dilated == 0)
     # A fork's gaps are two pixels wide, and blurred: here they say nothing.
     gaps = (x > 0.5 * measures.length - 0.040) & (np.abs(y) < 0.5 * measures.width) & (x < 0.5 * measures.length)
     border &= ~(gaps & (kind == "fork"))
@@ -126,8 +126,8 @@ def _best_pose(
 
 @cache
 def _grid(far: int) -> tuple[np.ndarray, ...]:
-    near = np.arange(-1, 2)
-    return tuple(part.reshape(-1) for part in np.meshgrid(np.arange(-far, far + 1), near, near))
+    fine_steps = np.arange(-1, 2)
+    return tuple(part.reshape(-1) for part in np.meshgrid(np.arange(-far, far + 1), fine_steps, fine_steps))
 
 
 def fit_utensil(map_: np.ndarray, scale: float, start: tuple[float, float, float], sizes: DishSizes) -> Bar:
@@ -150,26 +150,26 @@ def fit_utensil(map_: np.ndarray, scale: float, start: tuple[float, float, float
 
 def search_bars(map_: np.ndarray, scale: float, most: int, sizes: DishSizes) -> list[Bar]:
     """Return up to `most` utensils of a map (h, w) that lie touching, crossing or partly unknown, best first."""
-    rest = map_.copy()
+    unexplained = map_.copy()
     bars: list[Bar] = []
     if not sizes.utensils:
         return bars
     length = sizes["spoon"].length * scale
     for _ in range(most):
-        rows, columns = np.nonzero(rest > 0)
+        rows, columns = np.nonzero(unexplained > 0)
         if len(rows) < 0.25 * length * 0.008 * scale:
             break
         best: Bar | None = None
         for start in bar_candidates(rows, columns, length, STARTS):
             if start[0] < LEAST_VOTES * length or (best is not None and best.score > GOOD_SCORE):
                 break
-            bar = fit_utensil(rest, scale, (float(start[1]), float(start[2]), float(start[3])), sizes)
+            bar = fit_utensil(unexplained, scale, (float(start[1]), float(start[2]), float(start[3])), sizes)
             if best is None or bar.score > best.score:
                 best = bar
         if best is None or best.score < LEAST_SCORE or best.visible < LEAST_VISIBLE:
             break
         bars.append(best)
-        erase_bar(rest, best, scale, sizes)
+        erase_bar(unexplained, best, scale, sizes)
     return bars
 
 

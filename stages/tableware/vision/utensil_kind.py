@@ -22,8 +22,10 @@ LEAST_CONTRAST = 15.0
 SHIFTS = (0.0, 0.005, -0.005)
 """A spoon is 10 mm shorter: where the head ends may be off by half of that [m]."""
 WEIGHTS: dict[str, tuple[float, float, float]] = {"table": (26.8, 1.7, 2.2), "dish": (26.1, 1.6, 4.6)}
-"""Of the outlines' difference in score, the tines' height [mm] and their colour over the contrast, less MIDDLE."""
+"""Weights of the outlines' difference in score, of the tines' height [mm] and of their colour over the contrast, less
+MIDDLE."""
 MIDDLE: dict[str, tuple[float, float, float]] = {"table": (0.0, 1.3, 0.3), "dish": (0.0, 1.3, 0.3)}
+"""Features at which fork and spoon are equally likely, of utensils on the table and on a dish."""
 
 
 def kind_features(
@@ -45,8 +47,8 @@ def kind_features(
     high[hidden[window]] = gray[hidden[window]] = -1.0
     handle = np.outer(np.linspace(-0.075, 0.01, 40) * scale, along) + np.array([u - left, v - top])
     aside = 0.012 * scale * np.array([-along[1], along[0]])
-    tone = _sampled(gray, handle)
-    contrast = float(np.median(tone - 0.5 * (_sampled(gray, handle + aside) + _sampled(gray, handle - aside))))
+    tone = _sample(gray, handle)
+    contrast = float(np.median(tone - 0.5 * (_sample(gray, handle + aside) + _sample(gray, handle - aside))))
     sign = 1.0 if contrast > 0.0 else -1.0
     places = [(u - left + shift * scale * along[0], v - top + shift * scale * along[1]) for shift in SHIFTS]
     steps = [tine_difference(high, (x, y, angle), scale, sizes["fork"]) for x, y in places]
@@ -60,7 +62,7 @@ def _most(values: list[float]) -> float:
     return max(measured) if measured else float("nan")
 
 
-def _sampled(image: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _sample(image: np.ndarray, points: np.ndarray) -> np.ndarray:
     columns = np.clip(np.rint(points[:, 0]).astype(int), 0, image.shape[1] - 1)
     rows = np.clip(np.rint(points[:, 1]).astype(int), 0, image.shape[0] - 1)
     return np.asarray(image[rows, columns])
@@ -70,13 +72,13 @@ def fork_chance(features: tuple[float, float, float], place: str) -> float:
     """Return the chance 0..1 that a utensil with these features is a fork; `place` is `table` or `dish`."""
     logit = sum(
         weight * (feature - middle)
-        for weight, feature, middle in zip(WEIGHTS[place], _cut(features), MIDDLE[place], strict=True)
+        for weight, feature, middle in zip(WEIGHTS[place], _clip_features(features), MIDDLE[place], strict=True)
         if not np.isnan(feature)
     )
     return 1.0 / (1.0 + exp(-min(max(logit, -30.0), 30.0)))
 
 
-def _cut(features: tuple[float, float, float]) -> tuple[float, float, float]:
+def _clip_features(features: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return features within what was seen while the weights were fitted: one odd pixel decides nothing."""
     low, high = (-1.0, -1.0, -0.5), (1.0, 4.0, 1.5)
     return tuple(float(np.clip(f, *ends)) for f, ends in zip(features, zip(low, high, strict=True), strict=True))  # type: ignore[return-value]

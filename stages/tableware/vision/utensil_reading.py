@@ -64,7 +64,9 @@ class SeenUtensil:
     depth_share: float
 
 
-def _seen(bar: Bar, heights: HeightMap, z: float, place: str, hidden: np.ndarray, sizes: DishSizes) -> SeenUtensil:
+def _read_utensil(
+    bar: Bar, heights: HeightMap, z: float, place: str, hidden: np.ndarray, sizes: DishSizes
+) -> SeenUtensil:
     chance = fork_chance(kind_features(bar, heights, z, hidden, sizes), place)
     bar = told_apart(bar, chance)
     return SeenUtensil(bar, max(chance, 1.0 - chance), *_relief(heights, bar, z, hidden, sizes))
@@ -102,10 +104,10 @@ def utensils_on_dish(
     map_[(distance > hollow - 0.007) & (distance < top.rim_radius + 0.004)] = 0
     map_[(owner != label) & (owner > 0)] = 0
     map_[part > z + BAND] = 0
-    bars = [_shifted(bar, left, up) for bar in search_bars(map_, scale, 2, sizes)]
+    bars = [_shift(bar, left, up) for bar in search_bars(map_, scale, 2, sizes)]
     nothing = np.zeros(heights.smooth.shape, dtype=bool)
-    seen = [_seen(bar, heights, stack.top, "dish", nothing, sizes) for bar in bars]
-    return sorted(seen, key=lambda utensil: _middle_height(heights, utensil.bar, z, sizes))
+    utensils = [_read_utensil(bar, heights, stack.top, "dish", nothing, sizes) for bar in bars]
+    return sorted(utensils, key=lambda utensil: _middle_height(heights, utensil.bar, z, sizes))
 
 
 def _square(center: float, half: float, scale: float) -> slice:
@@ -113,8 +115,11 @@ def _square(center: float, half: float, scale: float) -> slice:
     return slice(max(0, int(center - half * scale)), max(0, int(center + half * scale) + 1))
 
 
-def _shifted(bar: Bar, du: float, dv: float) -> Bar:
-    poses = {kind: (score, u + du, v + dv, angle, seen) for kind, (score, u, v, angle, seen) in bar.poses.items()}
+def _shift(bar: Bar, du: float, dv: float) -> Bar:
+    poses = {
+        kind: (score, u + du, v + dv, angle, visible_share)
+        for kind, (score, u, v, angle, visible_share) in bar.poses.items()
+    }
     return replace(bar, u=bar.u + du, v=bar.v + dv, poses=poses)
 
 
@@ -143,8 +148,8 @@ def _relief(heights: HeightMap, bar: Bar, z: float, hidden: np.ndarray, sizes: D
         rows = (bar.v + points[:, 0] * sin - points[:, 1] * cos + 0.5).astype(int)
         inside = (columns >= 0) & (columns < hidden.shape[1]) & (rows >= 0) & (rows < hidden.shape[0])
         columns, rows = columns[inside], rows[inside]
-        seen = ~hidden[rows, columns]
-        columns, rows = columns[seen], rows[seen]
+        visible = ~hidden[rows, columns]
+        columns, rows = columns[visible], rows[visible]
         values = heights.raw[rows, columns][heights.valid[rows, columns]]
         if part == 0:
             share = len(values) / max(len(rows), 1)
@@ -160,42 +165,44 @@ def utensils_on_table(
     the table and is none. `unlike` (h, w) bool: what looks like no table; `hidden` (h, w) bool: where dishes are."""
     scale = float(heights.scale(0.003))
     forklike = sizes["fork"] if sizes.utensils else STANDARD["fork"]
-    whole = AREA_SHARE * forklike.length * forklike.width * scale**2
+    utensil_area = AREA_SHARE * forklike.length * forklike.width * scale**2
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(
         unlike.astype(np.uint8), connectivity=8, ltype=cv2.CV_16U
     )
     strange = np.zeros(unlike.shape, dtype=bool)
-    rest = np.where(unlike, 1, -1).astype(np.int8)
-    rest[hidden] = 0
+    unexplained = np.where(unlike, 1, -1).astype(np.int8)
+    unexplained[hidden] = 0
     margin = int(0.05 * scale)
-    seen: list[SeenUtensil] = []
+    utensils: list[SeenUtensil] = []
     for label in range(1, count):
         left, top, width, height, area = boxes[label]
-        if area < 0.25 * whole:
+        if area < 0.25 * utensil_area:
             continue
         window = (
             slice(max(0, top - margin), top + height + margin),
             slice(max(0, left - margin), left + width + margin),
         )
-        own = labels[window] == label
-        map_ = np.where(own, 1, -1).astype(np.int8)
-        map_[hidden[window] | ((labels[window] > 0) & ~own)] = 0
-        bars = _lone_bar(map_, own, scale, area, whole, sizes)
+        of_component = labels[window] == label
+        map_ = np.where(of_component, 1, -1).astype(np.int8)
+        map_[hidden[window] | ((labels[window] > 0) & ~of_component)] = 0
+        bars = _lone_bar(map_, of_component, scale, area, utensil_area, sizes)
         if not bars:
-            bars = search_bars(map_, scale, min(5, int(area / whole + 1.5)), sizes)
-        bars = [_shifted(bar, window[1].start, window[0].start) for bar in bars]
+            bars = search_bars(map_, scale, min(5, int(area / utensil_area + 1.5)), sizes)
+        bars = [_shift(bar, window[1].start, window[0].start) for bar in bars]
         if (
             not bars
             and area > UNKNOWN_AREA * scale**2
-            and heights.smooth[window][own].mean() > max(FLAT, ROUGH * heights.roughness)
+            and heights.smooth[window][of_component].mean() > max(FLAT, ROUGH * heights.roughness)
         ):
-            strange[window] |= own
-        seen.extend(_that_rise(bars, heights, hidden, rest, scale, sizes))
+            strange[window] |= of_component
+        utensils.extend(_that_rise(bars, heights, hidden, unexplained, scale, sizes))
     # What a dish cuts in two is found by its parts together.
-    if np.count_nonzero(rest > 0) > LEAST_VISIBLE * 0.5 * whole:
-        seen.extend(_that_rise(search_bars(rest, scale, MOST_CUT, sizes), heights, hidden, rest, scale, sizes))
-    strange &= rest > 0
-    return sorted(seen, key=lambda utensil: 0.0 if np.isnan(utensil.relief) else utensil.relief), strange
+    if np.count_nonzero(unexplained > 0) > LEAST_VISIBLE * 0.5 * utensil_area:
+        utensils.extend(
+            _that_rise(search_bars(unexplained, scale, MOST_CUT, sizes), heights, hidden, unexplained, scale, sizes)
+        )
+    strange &= unexplained > 0
+    return sorted(utensils, key=lambda utensil: 0.0 if np.isnan(utensil.relief) else utensil.relief), strange
 
 
 def _that_rise(
@@ -203,11 +210,11 @@ def _that_rise(
 ) -> list[SeenUtensil]:
     """Return the bars that rise over the table, which the rim of a shadow as slender as a utensil does not, and set
     `rest` (h, w) to unknown where they lie, in place."""
-    seen = [_seen(bar, heights, 0.0, "table", hidden, sizes) for bar in bars]
-    kept = [utensil for utensil in seen if not utensil.relief < max(LEAST_RELIEF, ROUGH * heights.roughness)]
-    for utensil in kept:
+    utensils = [_read_utensil(bar, heights, 0.0, "table", hidden, sizes) for bar in bars]
+    risen = [utensil for utensil in utensils if not utensil.relief < max(LEAST_RELIEF, ROUGH * heights.roughness)]
+    for utensil in risen:
         erase_bar(rest, utensil.bar, scale, sizes)
-    return kept
+    return risen
 
 
 def _lone_bar(map_: np.ndarray, own: np.ndarray, scale: float, area: int, whole: float, sizes: DishSizes) -> list[Bar]:

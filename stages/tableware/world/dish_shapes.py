@@ -12,6 +12,7 @@ import trimesh
 from scenewright.stages.tableware.world.items import Item, Measures
 
 SIDES = 64
+"""Corners of a dish's circles as a mesh; by eye."""
 HEAD_SHARE = 0.36
 """Share of a utensil's length that is its head."""
 NECK_SHARE, HANDLE_SHARE = 0.32, 0.55
@@ -30,15 +31,15 @@ def shell_mesh(shell: Measures, sides: int = SIDES) -> trimesh.Trimesh:
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     points = [np.column_stack([radius * circle, np.full(sides, z)]) for radius, z in rings]
     points.append(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, shell.wall]]))
-    here, following = np.arange(sides), (np.arange(sides) + 1) % sides
+    side, following = np.arange(sides), (np.arange(sides) + 1) % sides
     faces = []
     for lower in range(len(rings) - 1):
         a, b = lower * sides, (lower + 1) * sides
-        faces.append(np.column_stack([a + here, a + following, b + following]))
-        faces.append(np.column_stack([a + here, b + following, b + here]))
+        faces.append(np.column_stack([a + side, a + following, b + following]))
+        faces.append(np.column_stack([a + side, b + following, b + side]))
     bottom, floor = 4 * sides, 4 * sides + 1
-    faces.append(np.column_stack([following, here, np.full(sides, bottom)]))
-    faces.append(np.column_stack([3 * sides + here, 3 * sides + following, np.full(sides, floor)]))
+    faces.append(np.column_stack([following, side, np.full(sides, bottom)]))
+    faces.append(np.column_stack([3 * sides + side, 3 * sides + following, np.full(sides, floor)]))
     return trimesh.Trimesh(np.concatenate(points), np.concatenate(faces), process=False)
 
 
@@ -76,8 +77,8 @@ def _prism(
     for k in range(count - 1):
         a, b = 4 * k, 4 * (k + 1)
         for side in range(4):
-            other = (side + 1) % 4
-            faces += [[a + side, a + other, b + other], [a + side, b + other, b + side]]
+            next_side = (side + 1) % 4
+            faces += [[a + side, a + next_side, b + next_side], [a + side, b + next_side, b + side]]
     end = 4 * (count - 1)
     faces += [[0, 2, 1], [0, 3, 2], [end, end + 1, end + 2], [end, end + 2, end + 3]]
     return vertices, np.array(faces)

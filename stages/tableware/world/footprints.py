@@ -52,7 +52,7 @@ def gap(first: Footprint, second: Footprint) -> float:
 
 def overlapped(places: Sequence[Footprint], others: Sequence[Footprint]) -> np.ndarray:
     """Return for places (P,) and others (N,) who overlaps whom: `gap` below zero, (P, N) bool."""
-    return _overlapped(_as_rows(places), _as_rows(others))
+    return _overlaps(_as_rows(places), _as_rows(others))
 
 
 def _as_rows(prints: Sequence[Footprint]) -> np.ndarray:
@@ -60,7 +60,7 @@ def _as_rows(prints: Sequence[Footprint]) -> np.ndarray:
 
 
 @njit(cache=True)
-def _overlapped(places, others):  # type: ignore[no-untyped-def]
+def _overlaps(places, others):  # type: ignore[no-untyped-def]
     result = np.zeros((len(places), len(others)), np.bool_)
     for i in range(len(places)):
         for k in range(len(others)):

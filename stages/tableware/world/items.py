@@ -238,17 +238,17 @@ class Table:
         item = self.by_name[name]
         z = 0.0 if on is None else stand_height(self, item, on)
         dx, dy, dz = x - item.position[0], y - item.position[1], z - item.position[2]
-        going = {name, *(other.name for other in self.load(name))}
+        going = {name, *(member.name for member in self.load(name))}
         items = []
-        for other in self.items:
-            if other.name not in going:
-                items.append(other)
+        for member in self.items:
+            if member.name not in going:
+                items.append(member)
                 continue
-            place = (other.position[0] + dx, other.position[1] + dy, other.position[2] + dz)
-            other = replace(other, position=place)
-            if other.name == name:
-                other = replace(other, on=on, yaw=other.yaw if yaw is None else yaw)
-            items.append(other)
+            position = (member.position[0] + dx, member.position[1] + dy, member.position[2] + dz)
+            member = replace(member, position=position)
+            if member.name == name:
+                member = replace(member, on=on, yaw=member.yaw if yaw is None else yaw)
+            items.append(member)
         return Table(tuple(items), self.obstacles)
 
 
@@ -256,5 +256,5 @@ def stand_height(table: Table, item: Item, on: str) -> float:
     """Return the world height [m] of an item's foot when it is put onto `on` or, where utensils lie there already,
     onto the highest of them."""
     base = table.by_name[on]
-    lying = [other.lip for other in table.carried[on] if not other.is_dish and other.name != item.name]
+    lying = [loaded.lip for loaded in table.carried[on] if not loaded.is_dish and loaded.name != item.name]
     return max([base.position[2] + rise(item.measures, base.measures), *lying])

@@ -55,6 +55,7 @@ LEVELS: dict[str, Level] = {
     "usual": Level(key=0.45, ambient=0.25, grain=4.0, gloss=0.25, dark_signal=0.015, axial=0.001),
     "dim": Level(key=0.18, ambient=0.07, grain=7.0, gloss=0.6, dark_signal=0.035, axial=0.002),
 }
+"""Name of a light -> exposure, ambient share, grain, gloss and noise of the depth; by eye."""
 _TONES: dict[Scheme, tuple[float, float]] = {"dark_on_white": (0.90, 0.22), "white_on_dark": (0.20, 0.88)}
 """sRGB of table and of dishes."""
 
@@ -69,7 +70,7 @@ def overhead_camera(height: float = CAMERA_HEIGHT, width: int = 1280, rows: int 
     return OverheadCamera(camera, pose)
 
 
-def _coloured(mesh: trimesh.Trimesh, srgb: np.ndarray) -> trimesh.Trimesh:
+def _color_mesh(mesh: trimesh.Trimesh, srgb: np.ndarray) -> trimesh.Trimesh:
     rgba = np.append(np.round(255.0 * np.clip(srgb, 0.0, 1.0)), 255.0).astype(np.uint8)
     mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(rgba, (len(mesh.faces), 1)))
     return mesh
@@ -101,8 +102,8 @@ def render_overhead(
     light = LEVELS[level]
     random = np.random.default_rng([seed, 72])
     table_tone, dish_tone = _TONES[scheme]
-    meshes = [(1, _coloured(_slab(*TABLE_SIDES, 0.0), np.full(3, table_tone) + random.uniform(-0.04, 0.04)))]
-    meshes.append((2, _coloured(_slab(6.0, 6.0, FLOOR), np.array([0.42, 0.38, 0.35]))))
+    meshes = [(1, _color_mesh(_slab(*TABLE_SIDES, 0.0), np.full(3, table_tone) + random.uniform(-0.04, 0.04)))]
+    meshes.append((2, _color_mesh(_slab(6.0, 6.0, FLOOR), np.array([0.42, 0.38, 0.35]))))
     for index, item in enumerate(table.items):
         tone = dish_tone + random.uniform(-0.08, 0.08) + random.uniform(-0.05, 0.05, 3)
         mesh = item_mesh(item)
@@ -110,10 +111,10 @@ def render_overhead(
             upright = trimesh.transformations.rotation_matrix(item.yaw, [0.0, 0.0, 1.0])
             upright[:3, 3] = item.position
             mesh.apply_transform(poses[item.name] @ np.linalg.inv(upright))
-        meshes.append((3 + index, _coloured(mesh, tone)))
+        meshes.append((3 + index, _color_mesh(mesh, tone)))
     first_other = 3 + len(table.items)
     for index, mesh in enumerate(others):
-        meshes.append((first_other + index, _coloured(mesh.copy(), random.uniform(0.2, 0.7, 3))))
+        meshes.append((first_other + index, _color_mesh(mesh.copy(), random.uniform(0.2, 0.7, 3))))
     lamp = (float(random.uniform(-0.8, 0.8)), float(random.uniform(-0.8, 0.8)), 1.8)
     lights = (
         AreaLight(lamp, (0.3, 0.0, 0.0), (0.0, -0.3, 0.0), (light.key,) * 3),

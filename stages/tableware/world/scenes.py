@@ -43,6 +43,7 @@ class Tier:
 
 
 MIXED: dict[Kind, int] = {"bowl": 4, "cup": 4, "fork": 2, "spoon": 2}
+"""Kind -> number of items on a table of tiers 1 and 2."""
 TIERS: dict[str, Tier] = {
     "tier0_cups": Tier({"cup": 6}),
     "tier0_bowls": Tier({"bowl": 6}),
@@ -51,6 +52,7 @@ TIERS: dict[str, Tier] = {
     "tier2": Tier(MIXED, intersections=4, highest=3),
     "tier3": Tier({**MIXED, "plate": 2}, intersections=7, highest=4, touching=0.5),
 }
+"""Name of a tier -> what is on its table (section 7.1; the fourth is ours)."""
 
 
 def make_table(tier: str, seed: int, sizes: DishSizes = STANDARD) -> Table:
@@ -71,7 +73,7 @@ def make_table(tier: str, seed: int, sizes: DishSizes = STANDARD) -> Table:
 def _draw(tier: Tier, random: np.random.Generator, sizes: DishSizes) -> Table | None:
     """Return a table, or None where the last items found no place."""
     table = Table(())
-    left = tier.intersections
+    touches_left = tier.intersections
     for kind in ORDER:
         for number in range(tier.counts.get(kind, 0)):
             for _ in range(TRIES):
@@ -82,17 +84,22 @@ def _draw(tier: Tier, random: np.random.Generator, sizes: DishSizes) -> Table | 
                 if not touched:
                     break
                 top = touched[0][-1]
-                if left and len(touched) == 1 and len(touched[0]) < tier.highest and radius(item) <= radius(top):
+                if (
+                    touches_left
+                    and len(touched) == 1
+                    and len(touched[0]) < tier.highest
+                    and radius(item) <= radius(top)
+                ):
                     z = stand_height(table, item, top.name)
                     item = replace(item, position=(top.position[0], top.position[1], z), on=top.name)
                     others = [stack for stack in table.stacks if stack is not touched[0]]
                     if all(_least_gap(footprint(item), stack) >= 0.0 for stack in others):
-                        left -= 1
+                        touches_left -= 1
                         break
             else:
                 return None
             if item.on is None and random.random() < tier.touching:
-                item = _pushed(item, table)
+                item = _push_to_touch(item, table)
             table = Table((*table.items, item))
     return table
 
@@ -107,7 +114,7 @@ def _least_gap(print_: Footprint, stack: tuple[Item, ...]) -> float:
     return min(gap(print_, footprint(item)) for item in stack)
 
 
-def _pushed(item: Item, table: Table) -> Item:
+def _push_to_touch(item: Item, table: Table) -> Item:
     """Return the item moved straight towards the nearest thing until something is touched."""
     if not table.items:
         return item

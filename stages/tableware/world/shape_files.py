@@ -16,6 +16,7 @@ COLORS: dict[Kind, tuple[int, int, int]] = {
     "fork": (75, 85, 99),
     "spoon": (124, 92, 168),
 }
+"""Kind -> colour (RGB) of its mesh."""
 
 
 def write_shapes(folder: Path, sizes: DishSizes = STANDARD) -> None:

@@ -57,7 +57,7 @@ def test_a_front_looks_into_the_room_and_hides_what_is_inside(piece: Furniture) 
     assert "spoon_0" not in seen() and f"{piece.name}__handle" in seen()
     room.world.set_joint(piece.name, made.joint.name, made.joint.upper)
     if piece is DRESSER:  # it goes with the drawer, which the hand of this test does not
-        room.world.set_pose("spoon_0", room._moved(piece.name) @ room.world.pose("spoon_0"))
+        room.world.set_pose("spoon_0", room._displacement(piece.name) @ room.world.pose("spoon_0"))
     assert "spoon_0" in seen() and room.opened() == {piece.name}
     assert room.body("spoon_0", None).on == piece.name
     room.close()

@@ -69,9 +69,9 @@ class AskedSegmenter:
             reply = parse_reply(answer.body, answer.content_type, shape, self._categories)
         except BadInput as error:
             raise BadInput(f"{self._connection.address}: reply: {error.message}", hint="mend the service") from None
-        found = [
+        masks = [
             Mask(self._words[segment.category_id], reply.ids == number)
             for number, segment in sorted(reply.segments.items())
             if segment.is_thing
         ]
-        return [entry for entry in found if entry.mask.sum() >= LEAST_PIXELS]
+        return [entry for entry in masks if entry.mask.sum() >= LEAST_PIXELS]

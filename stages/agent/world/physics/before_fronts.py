@@ -10,9 +10,10 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.motion.doors import body_from_moved, closing_direction
 
 AWAYS, ASIDES = (0.85, 0.75, 0.65, 0.55), (0.0, 0.25, -0.25, 0.45, -0.45)
-"""From where a side is looked at: before it, and beside its middle [m]."""
+"""Distances before a side, and beside its middle, from which it is looked at [m], in the order in which they are
+tried."""
 OFFS = (0.0, 0.25, -0.25)
-"""Beside the middle of a leaf from where it is pushed [m]."""
+"""Distances beside the middle of a leaf from which it is pushed [m], in the order in which they are tried."""
 
 
 def bases_before(front: Front) -> list[np.ndarray]:
@@ -26,11 +27,15 @@ def bases_before(front: Front) -> list[np.ndarray]:
         side = -front.joint.axis[2]
         offs = ((0.75, 0.15), (0.65, 0.25), (0.85, 0.1), (0.85, 0.3), (0.55, 0.35), (0.75, -0.05), (0.95, 0.15))
         spots = [(away, at[1] + side * aside) for away, aside in offs]
-    made = []
+    bases = []
     for away, y in spots:
-        here, there = apply(front.map_from_front, np.array([(x + away, y, 0.0), (x, at[1], 0.0)]))
-        made.append(np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])]))
-    return made
+        standpoint, front_point = apply(front.map_from_front, np.array([(x + away, y, 0.0), (x, at[1], 0.0)]))
+        bases.append(
+            np.array(
+                [standpoint[0], standpoint[1], atan2(front_point[1] - standpoint[1], front_point[0] - standpoint[0])]
+            )
+        )
+    return bases
 
 
 def bases_outside(front: Front) -> list[np.ndarray]:
@@ -42,9 +47,9 @@ def bases_outside(front: Front) -> list[np.ndarray]:
     y0, y1 = front.panel[:2]
     middle = np.array([front.size[0] / 2, (y0 + y1) / 2, 0.0])
     moved = front.map_from_front @ body_from_moved(joint, front.value)
-    at, way = apply(moved, middle[None])[0], moved[:3, :3] @ closing_direction(joint, middle)
-    aside = np.array([-way[1], way[0]])
-    spots = (at[:2] - away * way[:2] + off * aside for off in OFFS for away in AWAYS)
+    at, direction = apply(moved, middle[None])[0], moved[:3, :3] @ closing_direction(joint, middle)
+    aside = np.array([-direction[1], direction[0]])
+    spots = (at[:2] - away * direction[:2] + off * aside for off in OFFS for away in AWAYS)
     return [np.array([*spot, atan2(*(at[:2] - spot)[::-1])]) for spot in spots]
 
 
@@ -56,12 +61,12 @@ def sides_of(box: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.nd
 
 def before(middle: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
     """Return base poses (3,) from which a side (its middle and normal, (2,)) is looked at, the best first."""
-    left = np.array([-normal[1], normal[0]])
-    spots = (middle + away * normal + aside * left for aside in ASIDES for away in AWAYS)
+    along_front = np.array([-normal[1], normal[0]])
+    spots = (middle + away * normal + aside * along_front for aside in ASIDES for away in AWAYS)
     return [np.array([*spot, atan2(*(middle - spot)[::-1])]) for spot in spots]
 
 
 def away_from(front: Front, base: np.ndarray) -> float:
     """Return the distance [m] of a base (3,) from the middle of the front."""
-    own = front.local(np.array([[base[0], base[1], 0.0]]))[0]
-    return hypot(own[0] - front.size[0] / 2, own[1])
+    base_in_front = front.local(np.array([[base[0], base[1], 0.0]]))[0]
+    return hypot(base_in_front[0] - front.size[0] / 2, base_in_front[1])

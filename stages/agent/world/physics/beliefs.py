@@ -54,11 +54,11 @@ class Beliefs:
     def show(self, boxes: dict[str, Believed]) -> None:
         """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, in these fronts, and in
         nothing else but what is held."""
-        wanted = {name: _told(entry) for name, entry in boxes.items()}
-        for name in [n for n, box in self._boxes.items() if n != HELD and wanted.get(n) != box]:
+        wanted_boxes = {name: _identity(entry) for name, entry in boxes.items()}
+        for name in [n for n, box in self._boxes.items() if n != HELD and wanted_boxes.get(n) != box]:
             self.world.remove_body(name)
             del self._boxes[name]
-        for name, box in wanted.items():
+        for name, box in wanted_boxes.items():
             if name in self._boxes:
                 continue
             entry = boxes[name]
@@ -101,7 +101,7 @@ class Beliefs:
         self.checker.carry(HELD, hold.tool_from_box)
 
 
-def _told(entry: Believed) -> object:
+def _identity(entry: Believed) -> object:
     """Return what tells a box or a front from another one: numbers to the millimetre."""
     if not isinstance(entry, Front):
         return (*np.round(entry[0], 3).tolist(), *np.round(entry[1], 3).tolist())

@@ -49,12 +49,12 @@ class PhysicsBody:
         self._robot = RobotInRoom(self._room, rates, seed)
         self._asked = segmenter
         eyes = segmenter or NoisyOracle(self._room, SegmenterErrors(rates, self._robot.luck, sought))
-        seen = Seen(self._robot, CLEARANCE)
-        self.obstacles = seen.obstacles
-        self._driving = Driving(self._robot, seen)
-        self._looking = Looking(self._robot, seen, eyes, sought)
-        self._handling = Handling(self._robot, seen, self._looking)
-        self._pulling = Pulling(self._robot, seen, self._looking, self._driving)
+        seen_by_robot = Seen(self._robot, CLEARANCE)
+        self.obstacles = seen_by_robot.obstacles
+        self._driving = Driving(self._robot, seen_by_robot)
+        self._looking = Looking(self._robot, seen_by_robot, eyes, sought)
+        self._handling = Handling(self._robot, seen_by_robot, self._looking)
+        self._pulling = Pulling(self._robot, seen_by_robot, self._looking, self._driving)
 
     def close(self) -> None:
         """End both pybullet worlds, and the connection to a segmenter."""

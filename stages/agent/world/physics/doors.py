@@ -23,12 +23,13 @@ SHELF = 0.5
 DRAWER, TRAY = 0.20, 0.10
 """Height of a drawer's front, and of its other sides [m]."""
 BEHIND = 0.04
-"""Of a drawer stays in the furniture when it is out [m]."""
+"""Length of a drawer that stays in the furniture when it is out [m]; by eye."""
 WIDEST = 2.0
 """Angle at which a leaf stops [rad]."""
 BAR, BEFORE = 0.02, 0.045
 """Thickness of a handle's bar, and its middle before the front [m]."""
 BAR_LENGTH, FROM_EDGE = 0.2, 0.06
+"""Length of a handle's bar, and its distance from the leaf's edge [m]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,9 @@ def front_of(apartment: Apartment, piece: Furniture) -> tuple[np.ndarray, float]
         (0, -1): room.high[1] - y - piece.size[1] / 2,
     }
     normal = min(gaps, key=lambda side: gaps[side])
-    left = (-normal[1], normal[0])
+    left_direction = (-normal[1], normal[0])
     # the gap to a wall is filed under the direction away from it
-    hinge = 1.0 if gaps[(-left[0], -left[1])] <= gaps[left] else -1.0
+    hinge = 1.0 if gaps[(-left_direction[0], -left_direction[1])] <= gaps[left_direction] else -1.0
     return np.array(normal, float), hinge
 
 

@@ -20,7 +20,8 @@ TRIES = 6
 TOUCHES = 0.001
 """Contacts less deep do not count [m]."""
 STEP, BACK_STEPS = 0.05, 2
-"""Between poses of the base at which collisions are looked for [m], and how many of them it backs off a touch."""
+"""Distance between poses of the base at which collisions are looked for [m], and how many of them it backs off a touch;
+by eye."""
 
 
 class Driving:
@@ -37,14 +38,14 @@ class Driving:
         failed: MotionFailed | None = None
         rows: list[np.ndarray] = []
         for number in range(TRIES):
-            way = self._seen.obstacles.path(self._robot.base, (base.x, base.y))
-            if way is None:
+            path = self._seen.obstacles.path(self._robot.base, (base.x, base.y))
+            if path is None:
                 failed = failed or MotionFailed("no_way", "the obstacle map shows no way there")
                 break
             if not np.allclose(self._robot.arm, self._robot.home):
                 self._robot.arm_to(self._robot.home)
-            points = [np.array([*point, 0.0]) - self._robot.error for point in way[1:-1]]
-            ease = [self._seen.obstacles.at_ease(*point) for point in way[1:-1]]
+            points = [np.array([*point, 0.0]) - self._robot.error for point in path[1:-1]]
+            ease = [self._seen.obstacles.at_ease(*point) for point in path[1:-1]]
             turns = (ease, [False] * len(ease), [True] * len(ease))[number % 3]
             start = self._robot.true_base()
             rows = _facing_on(start, points, [*turns, turns_there], goal - error)
@@ -64,38 +65,38 @@ class Driving:
     def _roll_along(self, start: np.ndarray, rows: list[np.ndarray]) -> MotionFailed | None:
         arm = self._robot.arm + self._robot.joint_error
         if self._robot.hold is not None:
-            way = np.array([start, *rows])
+            rows_from_start = np.array([start, *rows])
             try:
-                self._robot.driver.follow(Segment(_whole_body_rows(way, arm), 0.0), None)
+                self._robot.driver.follow(Segment(_whole_body_rows(rows_from_start, arm), 0.0), None)
             except MotionFailed as failed:
                 if failed.failure.kind == "path_blocked":
                     self._robot.metres += float(np.linalg.norm((self._robot.true_base() - start)[:2]))
                     return failed
-            self._robot.metres += float(np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1).sum())
+            self._robot.metres += float(np.linalg.norm(np.diff(rows_from_start[:, :2], axis=0), axis=1).sum())
             return None
-        here = start
+        reached = start
         opening = self._robot.driver.robot.configuration().opening
-        before = self._touched()  # what it leans on already does not keep it from going away
+        before = self._touching_depths()  # what it leans on already does not keep it from going away
         for row in rows:
-            count = max(1, int(np.ceil(np.abs(row - here)[:2].max() / STEP)))
+            count = max(1, int(np.ceil(np.abs(row - reached)[:2].max() / STEP)))
             for k in range(1, count + 1):
-                at = here + (row - here) * k / count
+                at = reached + (row - reached) * k / count
                 self._robot.driver.robot.set_body(np.concatenate([at, arm]))
-                now = self._touched()
+                now = self._touching_depths()
                 struck = next((name for name, depth in now.items() if depth > before.get(name, TOUCHES)), None)
                 before = now
                 if struck is not None:
                     touched = self._remember(struck)
-                    back = here + (row - here) * (k - 1) / count
-                    self._robot.driver.put(Configuration(self._backed_off(back, arm, touched), arm, opening))
-                    what = self._robot.room.world.bodies[struck].record.class_name
-                    return MotionFailed("path_blocked", f"the base touched {what}", (what,))
+                    back = reached + (row - reached) * (k - 1) / count
+                    self._robot.driver.put(Configuration(self._back_off(back, arm, touched), arm, opening))
+                    class_name = self._robot.room.world.bodies[struck].record.class_name
+                    return MotionFailed("path_blocked", f"the base touched {class_name}", (class_name,))
                 self._seen.obstacles.driven(*(at + self._robot.error)[:2])
-            rolled = float(np.linalg.norm((row - here)[:2]))
+            rolled = float(np.linalg.norm((row - reached)[:2]))
             self._robot.metres += rolled
             self._robot.seconds_aside += rolled / self._robot.description.base_speed
-            here = row
-        self._robot.driver.put(Configuration(here, arm, opening))
+            reached = row
+        self._robot.driver.put(Configuration(reached, arm, opening))
         self._robot.seconds_aside += 1.0
         return None
 
@@ -108,22 +109,22 @@ class Driving:
         self._seen.obstacles.add(Sweep(np.zeros((0, 2), int), np.array(sorted(cells), int).reshape(-1, 2), ()))
         return np.mean([c.point[:2] for c in of_it], axis=0)
 
-    def _backed_off(self, base: np.ndarray, arm: np.ndarray, touched: np.ndarray) -> np.ndarray:
+    def _back_off(self, base: np.ndarray, arm: np.ndarray, touched: np.ndarray) -> np.ndarray:
         """Return the base pose (3,) farther from where it touched something (2,), as far as nothing is touched more for
         it: leaning on it, no way would lead on."""
         away = base[:2] - touched
         step = np.array([*(away / max(np.linalg.norm(away), 1e-6) * STEP), 0.0])
         self._robot.driver.robot.set_body(np.concatenate([base, arm]))
-        before = self._touched()
+        before = self._touching_depths()
         for _ in range(BACK_STEPS):
             self._robot.driver.robot.set_body(np.concatenate([base + step, arm]))
-            now = self._touched()
+            now = self._touching_depths()
             if any(depth > before.get(name, TOUCHES) for name, depth in now.items()):
                 break
             base, before = base + step, now
         return base
 
-    def _touched(self) -> dict[str, float]:
+    def _touching_depths(self) -> dict[str, float]:
         """Return what the robot stands in, the floor aside, and how deep [m]."""
         world = self._robot.room.world
         engine.performCollisionDetection(physicsClientId=world.client)
@@ -144,15 +145,15 @@ def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], g
     """Return base poses (3,) through points to a goal pose that turn little from each to the next: along the way at
     points where it `turns`, and as the goal says there if it does, as before at the others, for the base drives to any
     side."""
-    made: list[np.ndarray] = []
+    poses: list[np.ndarray] = []
     before = start
     for point, turn in zip([*points, goal], turns, strict=True):
         turned = point.copy()
         if not turn:
             turned[2] = before[2]
-        elif len(made) < len(points):
+        elif len(poses) < len(points):
             turned[2] = atan2(point[1] - before[1], point[0] - before[0])
         turned[2] = before[2] + (turned[2] - before[2] + pi) % (2 * pi) - pi
-        made.append(turned)
+        poses.append(turned)
         before = turned
-    return made
+    return poses

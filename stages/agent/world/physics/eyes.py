@@ -13,11 +13,13 @@ from scenewright.stages.kit.rendering.object_views import Picture, cloud
 from scipy.spatial import cKDTree
 
 HEAD = Camera(width=160, height=120, fx=100.0, fy=100.0, cx=79.5, cy=59.5)
+"""Intrinsics of the head camera."""
 WRIST = Camera(width=240, height=180, fx=175.0, fy=175.0, cx=119.5, cy=89.5)
+"""Intrinsics of the wrist camera."""
 NEAR_BY = Camera(width=240, height=180, fx=350.0, fy=350.0, cx=119.5, cy=89.5)
 """The middle of the wrist camera's full resolution, of which looks at a whole surface take every second pixel."""
 LEAST_POINTS = 16
-"""Of an object (ConceptGraphs)."""
+"""Least points of an object (ConceptGraphs)."""
 VOXEL, OVERLAP = 0.025, 0.5
 """Edge of a cell in which two clouds overlap [m], and the share from which they are one (ConceptGraphs)."""
 COINCIDE = 0.03
@@ -88,15 +90,15 @@ class Surface:
 
 def seen_in(picture: Picture, masks: list[Mask], map_from_camera: np.ndarray, eye: np.ndarray) -> list[Surface]:
     """Return what one picture shows of each mask."""
-    found = []
+    surfaces = []
     for entry in masks:
         points = cloud(picture, entry.mask, map_from_camera)
         if len(points) < LEAST_POINTS:
             continue
         pixels = picture.color[entry.mask].astype(float) / 255
         normals, cut = outward(points, eye), _at_an_edge(entry.mask)
-        found.append(Surface(entry.label, points, normals, color_name(pixels), stain_share(pixels), 1, cut))
-    return found
+        surfaces.append(Surface(entry.label, points, normals, color_name(pixels), stain_share(pixels), 1, cut))
+    return surfaces
 
 
 def _at_an_edge(mask: np.ndarray) -> bool:
@@ -106,8 +108,8 @@ def _at_an_edge(mask: np.ndarray) -> bool:
 def outward(points: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """Return surface normals (N, 3) of points, from the plane of their neighbours, towards the camera."""
     count = min(NEIGHBOURS, len(points))
-    near = points[cKDTree(points).query(points, k=count)[1]]
-    centred = near - near.mean(axis=1, keepdims=True)
+    neighbours = points[cKDTree(points).query(points, k=count)[1]]
+    centred = neighbours - neighbours.mean(axis=1, keepdims=True)
     _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred))
     normals = vectors[:, :, 0]
     towards = np.einsum("ni,ni->n", normals, eye - points) < 0
@@ -123,15 +125,15 @@ def fuse(pieces: list[Surface]) -> list[Surface]:
         if best is None or overlap(piece, objects[best]) < OVERLAP:
             objects.append(piece)
             continue
-        other = objects[best]
+        matched = objects[best]
         objects[best] = Surface(
-            other.label,
-            np.concatenate([other.points, piece.points]),
-            np.concatenate([other.normals, piece.normals]),
-            other.color,
-            max(other.stain, piece.stain),
-            other.views + 1,
-            other.cut and piece.cut,
+            matched.label,
+            np.concatenate([matched.points, piece.points]),
+            np.concatenate([matched.normals, piece.normals]),
+            matched.color,
+            max(matched.stain, piece.stain),
+            matched.views + 1,
+            matched.cut and piece.cut,
         )
     return objects
 
@@ -153,15 +155,15 @@ def color_name(pixels: np.ndarray) -> str:
     chroma = (middle - middle.min()) / spread
     away = {}
     for name, color in COLORS.items():
-        wanted = np.array(color)
-        if np.ptp(wanted) > 0.15:
-            away[name] = float(np.abs(chroma - (wanted - wanted.min()) / np.ptp(wanted)).sum())
+        reference = np.array(color)
+        if np.ptp(reference) > 0.15:
+            away[name] = float(np.abs(chroma - (reference - reference.min()) / np.ptp(reference)).sum())
     return min(away, key=lambda name: away[name])
 
 
 def stain_share(pixels: np.ndarray) -> float:
     """Return the share of sRGB pixels (N, 3) that have the chroma of a stain and are dark."""
-    wanted = np.array(STAIN) / max(STAIN)
+    stain_color = np.array(STAIN) / max(STAIN)
     bright = pixels.max(axis=1)
-    close = np.abs(pixels / np.maximum(bright, 1e-3)[:, None] - wanted).max(axis=1) < 0.25
+    close = np.abs(pixels / np.maximum(bright, 1e-3)[:, None] - stain_color).max(axis=1) < 0.25
     return float((close & (bright < 0.6)).mean())

@@ -24,17 +24,17 @@ WITH_DRAWERS, WITH_LEAVES = ("dresser",), ("fridge",)
 PARTS = ("handle", "door", "drawer")
 """Words for what moves of furniture: no things."""
 THICK, LEAF = 0.03, 0.02
-"""Of walls, and of leaves and drawer fronts [m]."""
+"""Thickness of walls, and of leaves and drawer fronts [m]; by eye."""
 HALF_BAR = 0.01
 """Half of a bar's thickness: the middle of a handle lies so far behind what is seen of it [m]."""
 ROOM = 0.008
-"""Around a bar that the hand keeps when it goes past it [m]."""
+"""Room around a bar that the hand keeps when it goes past it [m]; by eye."""
 OVER = 0.025
 """Believed of a front over where its mask ends, which is a pixel too low [m]."""
 BEHIND_BAR = 0.03
 """Room of a hand's fingers behind a bar: so far is a front from it where it was not seen itself [m]."""
 STAYS = 0.04
-"""Of a drawer stays in [m]."""
+"""Length of a drawer that stays in [m]."""
 WIDEST = 1.9
 """Angle to which a leaf opens [rad]."""
 NEAR_HINGE = 0.15
@@ -42,8 +42,9 @@ NEAR_HINGE = 0.15
 LOOK_AT = 0.6
 """Height at which it is looked into, as a share of its own."""
 NARROWEST = 0.25
-"""Of a front that was looked at, and not its edge [m]."""
+"""Least width of a front that was looked at, and not its edge [m]; by eye."""
 EDGE_CELL = 0.01
+"""Edge of a cell on which a front's outline is told [m]; by eye."""
 TRAY = 0.5
 """Height of the sides of a drawer, as a share of its front's."""
 
@@ -117,16 +118,16 @@ class Front:
 
     def inside(self, points: np.ndarray) -> np.ndarray:
         """Return (N,) bool: points of the map that are within it, or within its drawer where that is now."""
-        own = self.local(points)
+        in_front_frame = self.local(points)
         out = self.value if self.slides else 0.0
         low = self.panel[2] - 0.03 if self.slides else 0.0
         x, w = self.size[0] / 2, self.size[1] / 2
         return (
-            (own[:, 0] > out - x)
-            & (own[:, 0] < x + out)
-            & (np.abs(own[:, 1]) < w)
-            & (own[:, 2] > low)
-            & (own[:, 2] < self.size[2] - 0.05)
+            (in_front_frame[:, 0] > out - x)
+            & (in_front_frame[:, 0] < x + out)
+            & (np.abs(in_front_frame[:, 1]) < w)
+            & (in_front_frame[:, 2] > low)
+            & (in_front_frame[:, 2] < self.size[2] - 0.05)
         )
 
     def behind(self, at: np.ndarray) -> float:
@@ -160,11 +161,11 @@ class Front:
 
     def value_seen(self, points: np.ndarray) -> float:
         """Return how far it is open by points (N, 3) of the map that were seen of what moves [rad] or [m]."""
-        own = self.local(points)
+        in_front_frame = self.local(points)
         if self.slides:
-            return edges(own[:, :2])[1] - self.size[0] / 2
+            return edges(in_front_frame[:, :2])[1] - self.size[0] / 2
         joint = self.joint
-        from_hinge = own[:, :2] - np.array(joint.origin)[:2]
+        from_hinge = in_front_frame[:, :2] - np.array(joint.origin)[:2]
         far = from_hinge[np.hypot(*from_hinge.T) > NEAR_HINGE] * (1.0, -joint.axis[2])
         return float(np.median(np.arctan2(far[:, 0], far[:, 1]))) if len(far) else self.value
 
@@ -197,11 +198,11 @@ def front_seen(
     middle, half_depth, half_width = (low + high) / 2, (high - low)[across] / 2, (high - low)[1 - across] / 2
     slides = label in WITH_DRAWERS
     frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*middle[:2], 0.0]))
-    own = apply(inverse(frame), panel)
+    in_frame = apply(inverse(frame), panel)
     if not panels:
-        own[:, 0] = np.percentile(apply(inverse(frame), handle)[:, 0], 95) - 2 * HALF_BAR - BEHIND_BAR
-    plane = float(np.median(own[:, 0]))
-    (y0, y1), (z0, z1) = edges(own[:, 1:]), edges(own[:, :0:-1])
+        in_frame[:, 0] = np.percentile(apply(inverse(frame), handle)[:, 0], 95) - 2 * HALF_BAR - BEHIND_BAR
+    plane = float(np.median(in_frame[:, 0]))
+    (y0, y1), (z0, z1) = edges(in_frame[:, 1:]), edges(in_frame[:, :0:-1])
     if y1 - y0 < NARROWEST:
         return None
     if slides:  # wider than a picture, perhaps
@@ -213,13 +214,13 @@ def front_seen(
     bar = bar[bar[:, 0] > half_depth + BEHIND_BAR / 2]  # what is farther back is the panel seen beside the bar
     if len(bar) < 5:
         return None
-    near, far = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)
-    if abs(near[1] + far[1]) / 2 > half_width:
+    handle_low, handle_high = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)
+    if abs(handle_low[1] + handle_high[1]) / 2 > half_width:
         return None  # seen past an edge: it is on another side
-    near[0] = far[0] - 2 * HALF_BAR
+    handle_low[0] = handle_high[0] - 2 * HALF_BAR
     extent = (-half_width, half_width, z0 if slides else LEAF, min(z1, float(high[2])))
     size = (float(2 * half_depth), float(2 * half_width), float(high[2]))
-    return Front(name, label, frame, size, extent, (tuple(near.tolist()), tuple(far.tolist())), slides)
+    return Front(name, label, frame, size, extent, (tuple(handle_low.tolist()), tuple(handle_high.tolist())), slides)
 
 
 def _facing(box: tuple[np.ndarray, np.ndarray], base: np.ndarray) -> np.ndarray:

@@ -26,16 +26,17 @@ ALIKE, ALIKE_WIDE = 0.1, 0.006
 LEAST = 10
 """Points between the fingers."""
 HEADINGS = 16
+"""Headings of the hand that are tried; by eye."""
 PITCHES = (np.pi / 2, 1.1, 0.7)
 """How steeply the hand comes, from above first [rad]."""
 FORWARD_PITCHES = (0.15, 0.0, 0.35)
-"""The same of the hand that goes into a shelf."""
+"""Pitches of the hand that goes into a shelf [rad], in the order in which they are tried."""
 LEVEL = 0.5
-"""Below this a hand sees nothing of a thing's top [rad]: its middle lies half its width behind its front."""
+"""Pitch below which a hand sees nothing of a thing's top [rad]: its middle lies half its width behind its front."""
 BEFORE_PALM = 0.004
 """Room that such a hand leaves between its palm and the thing [m]."""
 STEEP = 1.5
-"""From here on it comes from above [rad]."""
+"""Pitch from which on a hand comes from above [rad]."""
 HEIGHTS = (0.5, 0.65, 0.8, 0.35)
 """Shares of the thing's height at which an aslant hand grips it, that of its middle first."""
 OFF = 0.012
@@ -59,29 +60,29 @@ def antipodal_grasps(
     `opening` of the gripper [m]; `floor` [m]: height of what the thing stands on, over which the finger tips stay.
     """
     low, high = np.percentile(points, 2, axis=0), np.percentile(points, 98, axis=0)
-    made = []
+    ranked_grasps = []
     for rank, pitch in enumerate(pitches):
         deepest = max(high[2] - FINGER_DEPTH, (low[2] + high[2]) / 2 - 0.005)
         heights = [deepest] if pitch > STEEP else [low[2] + share * (high[2] - low[2]) for share in HEIGHTS]
         for height in heights:
             at = np.array([*_middle_above(points, height), max(height, floor + 0.004 + TIP_BEFORE * np.sin(pitch))])
             for number in range(HEADINGS):
-                found = _grasp_at(points, normals, at, 2 * np.pi * number / HEADINGS, pitch, opening)
-                if found is not None:
-                    pose, square, width = found
+                grasp = _grasp_at(points, normals, at, 2 * np.pi * number / HEADINGS, pitch, opening)
+                if grasp is not None:
+                    pose, square, width = grasp
                     off = round(abs(height - (low[2] + high[2]) / 2) / OFF)
                     kind = (square < FACES, rank, -round(square / ALIKE), off, round(width / ALIKE_WIDE))
-                    made.append((kind, number * 7 % HEADINGS, pose))
-    made.sort(key=lambda entry: entry[:2])
-    return [pose for *_, pose in made]
+                    ranked_grasps.append((kind, number * 7 % HEADINGS, pose))
+    ranked_grasps.sort(key=lambda entry: entry[:2])
+    return [pose for *_, pose in ranked_grasps]
 
 
 def _middle_above(points: np.ndarray, height: float) -> np.ndarray:
     """Return the middle (2,) of what was seen of a thing from a height upwards: with its top, since the far one of its
     sides was not seen, and without what is wider below."""
     above = points[:, 2] > height - OFF
-    own = points[above, :2] if above.sum() >= LEAST else points[:, :2]
-    return np.percentile(own, [2, 98], axis=0).mean(axis=0)
+    upper_points = points[above, :2] if above.sum() >= LEAST else points[:, :2]
+    return np.percentile(upper_points, [2, 98], axis=0).mean(axis=0)
 
 
 def _grasp_at(
@@ -121,7 +122,7 @@ def _grasp_at(
 def within_reach(grasps: list[np.ndarray], heading: float, least: float = ASIDE) -> list[np.ndarray]:
     """Return those of grasps (4, 4) that an arm may get at that stands before the thing, a few of each pitch in their
     order. `heading` [rad]: from the base to the thing; `least`: cosine between that and where a hand comes from."""
-    kept: list[np.ndarray] = []
+    reachable: list[np.ndarray] = []
     of_pitch: dict[float, int] = {}
     for pose in grasps:
         along = pose[:2, 2]
@@ -129,5 +130,5 @@ def within_reach(grasps: list[np.ndarray], heading: float, least: float = ASIDE)
         aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < least * level
         if not aside and of_pitch.get(pitch, 0) < OF_ONE_PITCH:
             of_pitch[pitch] = of_pitch.get(pitch, 0) + 1
-            kept.append(pose)
-    return kept
+            reachable.append(pose)
+    return reachable

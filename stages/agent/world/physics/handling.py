@@ -54,11 +54,13 @@ class Handling:
             self._robot.draw_in()
             self._robot.log.done("grasp", step, False, "grasp", "")
             return felt(failed)
-        held = self._robot.driver.held or self._between_the_fingers()
-        self._robot.carried = held
-        right = held is not None and self._robot.room.things[held].label == label
-        cause = "grasp" if held is None else "false_positive"
-        self._robot.log.done("grasp", step, right, cause, self._robot.room.things[held].label if held else "")
+        name_in_hand = self._robot.driver.held or self._between_the_fingers()
+        self._robot.carried = name_in_hand
+        right = name_in_hand is not None and self._robot.room.things[name_in_hand].label == label
+        cause = "grasp" if name_in_hand is None else "false_positive"
+        self._robot.log.done(
+            "grasp", step, right, cause, self._robot.room.things[name_in_hand].label if name_in_hand else ""
+        )
         return Felt(True)
 
     def _see_from_here(self, at: Position) -> None:
@@ -120,12 +122,12 @@ class Handling:
     def _close_hand(self) -> None:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]
         world = self._robot.room.world
-        near = [(float(np.linalg.norm(world.center_of_mass(n)[:3, 3] - tool)), n) for n in self._loose()]
+        by_distance = [(float(np.linalg.norm(world.center_of_mass(n)[:3, 3] - tool)), n) for n in self._loose()]
         world.wake()
-        for _, name in sorted(near)[:2]:
+        for _, name in sorted(by_distance)[:2]:
             self._robot.room.moved[name] += 1
         try:
-            self._robot.driver.grasp(min(near)[1] if near else "")
+            self._robot.driver.grasp(min(by_distance)[1] if by_distance else "")
         except (MotionFailed, KeyError):
             self._robot.driver.held = None
 
@@ -146,9 +148,9 @@ class Handling:
             return Felt(True)
         support = self._seen.support(at)
         around, beside = self._seen.boxes(), self._seen.boxes(at)
-        here = Spot((at[0], at[1], support), self._seen.rim(at, support), around, beside, self._seen.beside_on(at))
+        spot = Spot((at[0], at[1], support), self._seen.rim(at, support), around, beside, self._seen.beside_on(at))
         try:
-            self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
+            self._let_go(self._way_down(spot, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:
             self._robot.draw_in()
             self._robot.log.done("release", step, False, "place", "")
@@ -180,16 +182,16 @@ class Handling:
     def _let_go(self, motion: Motion, gently: bool) -> None:
         reach, down = motion.there
         self._robot.carry_out((reach,))
-        parts = np.array_split(down.path, min(4, len(down.path))) if gently else [down.path]
-        for rows in parts:
+        path_parts = np.array_split(down.path, min(4, len(down.path))) if gently else [down.path]
+        for rows in path_parts:
             self._robot.carry_out((Segment(rows, 0.0, down.pace),))
             if gently and self._touches():
                 break
-        held = self._robot.carried
+        released = self._robot.carried
         self._robot.driver.release()
         self._robot.carried, self._robot.hold = None, None
-        if held is not None:
-            self._robot.room.moved[held] += 1
+        if released is not None:
+            self._robot.room.moved[released] += 1
         back = np.concatenate([self._robot.arm[None], motion.away[0].path[:, 3:]])
         rows = whole_body(self._robot.true_base(), back)
         try:
@@ -204,19 +206,19 @@ class Handling:
         """Whether the wrist feels that what is held stands on something."""
         if self._robot.carried is None:
             return True
-        own = self._robot.room.world.bodies[self._robot.carried].body_id
-        contacts = self._robot.room.world.contacts(own)
+        body_id = self._robot.room.world.bodies[self._robot.carried].body_id
+        contacts = self._robot.room.world.contacts(body_id)
         return sum(c.force for c in contacts if c.other_body != self._robot.driver.robot.body_id) > 1.0
 
     def _nearest_thing(self, at: Position) -> str:
         true = apply(inverse(self._robot.map_from_true()), np.array([at], float))[0]
-        near = [
+        by_distance = [
             (hypot(x - true[0], y - true[1]), name)
             for name in self._loose()
             if not self._robot.room.things[name].carries
             for x, y, _ in [self._robot.room.lies(name)]
         ]
-        return min(near)[1] if near and min(near)[0] <= FOUND_WITHIN else ""
+        return min(by_distance)[1] if by_distance and min(by_distance)[0] <= FOUND_WITHIN else ""
 
 
 def _chance(candidate: int) -> np.random.Generator:

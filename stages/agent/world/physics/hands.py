@@ -22,7 +22,7 @@ CANDIDATES = 20
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
 APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
-"""Of the hand before and after it closes, and after it does behind a front [m]."""
+"""Ways of the hand before and after it closes, and after it closes behind a front [m]; by eye."""
 CLEAR = 0.04
 """What comes out of a shelf is so far before its front before it goes anywhere else [m]."""
 SLOW = 0.35
@@ -30,7 +30,7 @@ SLOW = 0.35
 ELBOWS = 12
 """Ways to hold the elbow that are tried where the first is in the way."""
 SAMPLES = 500
-"""Of one path search."""
+"""Most samples of one path search; by eye."""
 
 
 @dataclass(frozen=True)
@@ -175,10 +175,10 @@ def _one_grasp(
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     checker, opening = beliefs.checker, beliefs.description.opening
-    way = _way_in(planner, base, arm, target, map_from_tool, tally)
-    if way is None:
+    approach_and_lift = _way_in(planner, base, arm, target, map_from_tool, tally)
+    if approach_and_lift is None:
         return None
-    approach, lift = way
+    approach, lift = approach_and_lift
     checker.allow()
     reach = planner.path(base, arm, approach[-1])
     low, high = whole_box(target)
@@ -240,11 +240,11 @@ def _by_another_elbow(
     planner: ArmPlanner, base: np.ndarray, map_from_tool: np.ndarray, tally: Tally
 ) -> np.ndarray | None:
     """Return free arm values (7,) for a tool pose that the arm gets to with its elbow in the way of something."""
-    chain, wanted = planner.model.chain, in_arm_frame(base, map_from_tool, planner.model.description)
+    chain, tool_in_arm_frame = planner.model.chain, in_arm_frame(base, map_from_tool, planner.model.description)
     for start in random_starts(chain, ELBOWS, planner.random):
-        found = inverse_kinematics(chain, wanted, start[None])
-        if found.found and planner.free(base, found.arm, tally):
-            return found.arm
+        solution = inverse_kinematics(chain, tool_in_arm_frame, start[None])
+        if solution.found and planner.free(base, solution.arm, tally):
+            return solution.arm
     return None
 
 

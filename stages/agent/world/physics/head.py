@@ -12,22 +12,25 @@ from scipy.ndimage import maximum_filter, minimum_filter
 TURNS = 6
 """Pictures of one turn."""
 HEIGHT, PITCH = 1.35, 0.55
-"""Of the camera over the floor [m], and how far it looks down [rad]."""
+"""Height of the camera over the floor [m], and how far it looks down [rad]."""
 FLOOR, CEILING = 0.08, 1.7
 """What lies between is in the way of the base [m]."""
 SURE = 3.2
-"""Farther than this the depth is too coarse for cells of 10 cm [m]."""
+"""Distance beyond which the depth is too coarse for cells of 10 cm [m]."""
 RAYS = 180
+"""Directions of one turn in which free floor is told; by eye."""
 ENOUGH = 3
 """Points of an occupied cell."""
 LEAST = 60
 """Points of a piece of furniture that is made out."""
 JUMP = 0.06
-"""Of the depth within a pixel's neighbours that is no jump yet, as a share of it: floors slope by less."""
+"""Difference of depth within a pixel's neighbours that is no jump yet, as a share of the depth: floors slope by less.
+By eye."""
 GRAIN = 0.04
+"""Edge of the cubes in which furniture is kept [m]; by eye."""
 TOP_SHARE = 0.3
-"""Of the fullest level's cubes: the highest level that has as many is the top; above it are strays at the rims of
-things that stand there."""
+"""Share of the fullest level's cubes: the highest level that has as many is the top; above it are strays at the rims of
+things that stand there. By eye."""
 
 
 def steady(depth: np.ndarray) -> np.ndarray:
@@ -112,9 +115,9 @@ def enter(pieces: list[SeenPiece], label: str, points: np.ndarray) -> None:
         pieces.append(SeenPiece(label))
     first, *others = overlapped or pieces[-1:]
     first.add(points)
-    for other in others:
-        first.merge(other)
-    pieces[:] = [piece for piece in pieces if all(piece is not other for other in others)]
+    for merged in others:
+        first.merge(merged)
+    pieces[:] = [piece for piece in pieces if all(piece is not merged for merged in others)]
 
 
 def _overlap(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> bool:

@@ -18,7 +18,8 @@ DROP = 0.15
 JUST_OVER = 0.008
 """Height at which ours does, if nothing was touched before [m]."""
 UP, OVER_RIM = 0.06, 0.015
-"""Of the hand from where it lets go before it goes anywhere else, and of what it holds over the rim of a box [m]."""
+"""Way of the hand up from where it lets go before it goes anywhere else, and of what it holds over the rim of a box
+[m]; by eye."""
 SOME_WAY_OVER = 0.06
 """Height at which ours does where the hand has no room farther down [m]."""
 TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6))
@@ -66,7 +67,7 @@ def plan_release(
     heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
     try:
         for turn, tilt in TURNS:
-            pose = _tilted(_turned(hold, heading, turn), heading, tilt)
+            pose = _tilt(_tool_rotation(hold, heading, turn), heading, tilt)
             pose[:3, 3] = (at[0], at[1], at[2] + height + foot)
             goal = planner.reachable(base, pose, tally, starts=3)
             if goal is None or not planner.free(base, goal, tally):
@@ -94,20 +95,22 @@ def plan_release(
     raise AssertionError("unreachable")
 
 
-def _turned(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
+def _tool_rotation(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
     """Return the tool's rotation (4, 4): as it grasped but for the yaw, the hand away from the base."""
     if hold is None:
         return pointing(heading + turn, np.pi / 2)
     approach = hold.rotation[:, 2]
     level = float(np.hypot(approach[0], approach[1]))
-    own = np.arctan2(approach[1], approach[0]) if level > 0.2 else np.arctan2(hold.rotation[1, 0], hold.rotation[0, 0])
-    c, s = np.cos(heading + turn - own), np.sin(heading + turn - own)
+    present_heading = (
+        np.arctan2(approach[1], approach[0]) if level > 0.2 else np.arctan2(hold.rotation[1, 0], hold.rotation[0, 0])
+    )
+    c, s = np.cos(heading + turn - present_heading), np.sin(heading + turn - present_heading)
     pose = np.eye(4)
     pose[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ hold.rotation
     return pose
 
 
-def _tilted(pose: np.ndarray, heading: float, tilt: float) -> np.ndarray:
+def _tilt(pose: np.ndarray, heading: float, tilt: float) -> np.ndarray:
     """Return a tool's rotation (4, 4) leaned so that the hand is behind its tip, as seen along a heading [rad]."""
     axis = np.array([np.sin(heading), -np.cos(heading), 0.0])
     turn = np.eye(4)

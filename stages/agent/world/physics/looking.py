@@ -37,9 +37,9 @@ STEEP, OVER = (1.5, 1.3, 1.1), 0.45
 FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
 INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
-"""The same of looks into a shelf."""
+"""Pitches [rad], distances and shifts aside [m] of looks into a shelf, in the order in which they are tried."""
 WIDEST = 0.5
-"""Of what lies about on furniture or in it [m]."""
+"""Largest width of what lies about on furniture or in it [m]; by eye."""
 PICTURE_SECONDS = 0.5
 """**Assumed**: of a picture."""
 
@@ -66,12 +66,14 @@ class Looking:
             pose = look_at(eye, eye + away)
             picture = take(renderer, HEAD, pose, self._robot.random)
             points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
-            there = head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points) & ~self._seen.of_parts(points)
-            clouds.append(points[there])
+            is_steady = (
+                head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points) & ~self._seen.of_parts(points)
+            )
+            clouds.append(points[is_steady])
             for entry in self._segmenter.furniture(picture, map_from_true @ pose):
-                own = there & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
-                if own.sum() >= head.LEAST:
-                    head.enter(self._seen.pieces, entry.label, points[own])
+                of_furniture = is_steady & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
+                if of_furniture.sum() >= head.LEAST:
+                    head.enter(self._seen.pieces, entry.label, points[of_furniture])
             self._robot.seconds_aside += PICTURE_SECONDS
         free, occupied = head.cells_of(np.concatenate(clouds), apply(map_from_true, eye[None])[0])
         sweep = Sweep(free, occupied, tuple(self._seen.furniture()))
@@ -84,7 +86,7 @@ class Looking:
         sector, piece = quarter(self._robot.base, at), self._seen.piece_at(at)
         toward = atan2(at[1] - self._robot.believed[1], at[0] - self._robot.believed[0]) - self._robot.believed[2]
         toward = (toward + pi) % (2 * pi) - pi
-        found: list[Surface] = []
+        surfaces: list[Surface] = []
         renderer = None
         arms = [np.array([np.clip(toward + turn, -2.7, 2.7), *VIEW[1:]]) for turn in ((0.0,) if close else SIDEWAYS)]
         shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
@@ -94,52 +96,54 @@ class Looking:
             arms += self._arms_over(at)
         if not arms:
             return Look((), sector, close, in_view=False)
-        known = self._seen.nearest(at) if close and shelf is not None else None
-        aim = at if known is None else (at[0], at[1], float(known.middle[2]))  # tall, it would be cut
+        nearest_surface = self._seen.nearest(at) if close and shelf is not None else None
+        aim = (
+            at if nearest_surface is None else (at[0], at[1], float(nearest_surface.middle[2]))
+        )  # tall, it would be cut
         for arm in arms:
             self._robot.arm_to(arm)
             pose, seen_pose = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
-            picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, aim, close), self._robot.random)
-            camera = self._aimed(seen_pose, aim, close)
+            picture = take(renderer, NEAR_BY if close else WRIST, self._aim(pose, aim, close), self._robot.random)
+            camera = self._aim(seen_pose, aim, close)
             if not close:  # a thing fills a picture from near by
                 self._seen.keep_top(picture, camera, piece)
             front = self._seen.front_of(piece)
             if front is not None:
                 self._seen.keep_floor(picture, camera, front)
             masks = self._segmenter.masks(picture, camera, (sector, close))
-            found += seen_in(picture, _things(masks), camera, camera[:3, 3])
+            surfaces += seen_in(picture, _things(masks), camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
         self._count_missed()
         self.looked_near = (self._robot.base, at) if close else None
-        found = [s for s in found if not self._robot.in_hand(s.middle[None])[0]]
-        near = [s for s in fuse(found) if is_thing(s) and self._seen.belongs(s, at, piece, close)]
-        self._seen.keep(near, at, piece, close)
-        return Look(tuple(self._detection(s, sector, close, at) for s in near), sector, close)
+        surfaces = [s for s in surfaces if not self._robot.in_hand(s.middle[None])[0]]
+        surfaces_near = [s for s in fuse(surfaces) if is_thing(s) and self._seen.belongs(s, at, piece, close)]
+        self._seen.keep(surfaces_near, at, piece, close)
+        return Look(tuple(self._detection(s, sector, close, at) for s in surfaces_near), sector, close)
 
     def _count_missed(self) -> None:
         for name in sorted(self._segmenter.missed):
-            thing = self._robot.room.things.get(name)
-            if thing is None or thing.label in self._sought:
+            sought_thing = self._robot.room.things.get(name)
+            if sought_thing is None or sought_thing.label in self._sought:
                 self._robot.log.mistaken("missed", f"look {name}")
         self._segmenter.missed.clear()
 
     def look_at_front(self, at: Position, *, close: bool = False) -> list[Surface]:
         """Look at a front from before it, to both sides of a position, or there at twice the resolution: handles, and
         what they are on, as surfaces."""
-        sector, found, renderer = quarter(self._robot.base, at), list[Surface](), None
+        sector, surfaces, renderer = quarter(self._robot.base, at), list[Surface](), None
         for arm in self._arms_at(at, FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE):
             self._robot.arm_to(arm)
             pose, camera = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
             picture = take(renderer, NEAR_BY if close else WRIST, pose, self._robot.random)
             masks = [m for m in self._segmenter.masks(picture, camera, (sector, close)) if m.label in PARTS]
-            found += seen_in(picture, masks, camera, camera[:3, 3])
+            surfaces += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"front {arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
         self._count_missed()
-        return fuse(found)
+        return fuse(surfaces)
 
     def _arms_into(self, shelf: Front, at: Position, *, close: bool) -> list[np.ndarray]:
         """Return arms that hold the wrist camera before an open shelf; none where the robot does not stand there."""
@@ -186,7 +190,7 @@ class Looking:
                 return [arm]
         return []
 
-    def _aimed(self, pose: np.ndarray, at: Position, close: bool) -> np.ndarray:
+    def _aim(self, pose: np.ndarray, at: Position, close: bool) -> np.ndarray:
         """Return a camera pose, with the crop of a near look turned to the position that it is of."""
         if not close:
             return pose
@@ -215,17 +219,19 @@ class Looking:
         pose = look_at(eye, tool)
         picture = take(self._robot.room.renderer(eye), WRIST, pose, self._robot.random)
         masks = _things(self._segmenter.masks(picture, pose, ("hand", view)))
-        near = [
+        by_distance = [
             (float(np.linalg.norm(s.middle - tool)), k, s) for k, s in enumerate(seen_in(picture, masks, pose, eye))
         ]
-        seen = min(near, default=None)
-        held = seen[2] if seen is not None and seen[0] < FOUND_WITHIN else None
+        nearest = min(by_distance, default=None)
+        thing_in_hand = nearest[2] if nearest is not None and nearest[0] < FOUND_WITHIN else None
         position = (float(tool[0]), float(tool[1]), float(tool[2]))
         if self._robot.luck.happens(self._robot.rates.feedback, "feedback", self._robot.grasps, view):
             self._robot.log.mistaken("feedback", f"hand {self._robot.grasps}")
             label = self._sought[0] if self._sought else "thing"
-            return Detection(label, position, "", None, 0.04) if held is None else None
-        return None if held is None else Detection(held.label, position, held.color, None, 0.04)
+            return Detection(label, position, "", None, 0.04) if thing_in_hand is None else None
+        return (
+            None if thing_in_hand is None else Detection(thing_in_hand.label, position, thing_in_hand.color, None, 0.04)
+        )
 
 
 def is_thing(surface: Surface) -> bool:

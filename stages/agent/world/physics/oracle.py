@@ -29,7 +29,7 @@ class NoisyOracle:
 
     def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
         """Return the masks of things, handles, doors and drawers. `view`: ("hand", number), or (quarter turn, near)."""
-        found = []
+        noisy_masks = []
         for number in np.unique(picture.instance):
             name = self._room.named.get(int(number), "")
             mask = picture.instance == number
@@ -42,5 +42,5 @@ class NoisyOracle:
                 self.missed.add(name)
                 continue
             label = part or self._room.things[name].label
-            found.append(Mask(self._errors.class_of(name, label, *view), mask))
-        return found
+            noisy_masks.append(Mask(self._errors.class_of(name, label, *view), mask))
+        return noisy_masks

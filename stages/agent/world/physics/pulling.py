@@ -42,7 +42,7 @@ from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.kit.simulation.shapes import joined, link_shapes
 
 HEIGHT_OF_LOOK = 0.65
-"""At which share of its height a side is looked at."""
+"""Share of its height at which a side is looked at; by eye."""
 PITCHES = (0.0, 0.5, 0.9)
 """How far the hand comes down to a bar [rad]."""
 TILTS, WIDE_TILTS = (0.0, 0.35, -0.35, 0.7, -0.7), ((1.0, 0.0), (-1.0, 0.0), (0.5, -0.5), (-0.5, 0.5))
@@ -50,22 +50,24 @@ TILTS, WIDE_TILTS = (0.0, 0.35, -0.35, 0.7, -0.7), ((1.0, 0.0), (-1.0, 0.0), (0.
 FINE = 0.02
 """Largest step of a joint between two checks [rad]: a bar is thinner than what the elbow sweeps in a larger one."""
 GRIP_OPENING = 0.06
-"""Of the fingers around a bar before they close [m]: there is little room behind it."""
+"""Gap of the fingers around a bar before they close [m]: there is little room behind it."""
 DEEPER = 0.008
-"""Of the tool point behind the middle of a bar [m]: held by their ends alone, the fingers slide off it."""
+"""Distance of the tool point behind the middle of a bar [m]: held by their ends alone, the fingers slide off it."""
 NOTHING_GRIPPED = 0.01
 """Opening of the fingers below which they hold no bar [m]."""
 PRESS, OVERSHOOT = 0.006, 0.02
 """The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
 PUSHES = 4
-"""At one front, at most: something may be in the way of one."""
+"""Most pushes at one front: something may be in the way of one. By eye."""
 NOTICED = 0.1
-"""Of an angle by which it pays to push a leaf on [rad]."""
+"""Least angle by which it pays to push a leaf on [rad]; by eye."""
 SHARES = (1.0, 0.75, 0.5)
-"""Of what a door opens to, tried one after the other."""
+"""Shares of what a door opens to, tried one after the other."""
 FAR_OUT = 1.1
-"""The same of a drawer first: what lies at its back is under the furniture's edge otherwise, and the hand is wide."""
+"""Share of what a drawer opens to that is tried first: what lies at its back is under the furniture's edge otherwise,
+and the hand is wide."""
 SAMPLES = 500
+"""Most samples of one path search; by eye."""
 SEEN_TO = 0.15
 """How well the eyes tell how far a front is open [rad] or [m]."""
 HERE = 0.12
@@ -139,18 +141,18 @@ class Pulling:
         if its handle is there."""
         piece, base = self._seen.pieces[number], self._robot.believed
         low, high = piece.box
-        known = self._seen.fronts.get(f"furniture_{number}")
-        if known is not None and known.value > 0:
-            return known  # half open, the handle does not tell where the front is
-        if known is not None:
-            at = apply(known.map_from_front, np.array([known.joint.handle]))[0]
+        known_front = self._seen.fronts.get(f"furniture_{number}")
+        if known_front is not None and known_front.value > 0:
+            return known_front  # half open, the handle does not tell where the front is
+        if known_front is not None:
+            at = apply(known_front.map_from_front, np.array([known_front.joint.handle]))[0]
         else:
             assert middle is not None
             at = np.array([*middle, HEIGHT_OF_LOOK * high[2]])
         name, surfaces = f"furniture_{number}", self._looking.look_at_front(_position(at))
         if not any(s.label == PARTS[0] for s in surfaces):  # a near look shows no whole panel
-            near = self._looking.look_at_front(_position(at), close=True)
-            surfaces += [s for s in near if s.label == PARTS[0]]
+            surfaces_close = self._looking.look_at_front(_position(at), close=True)
+            surfaces += [s for s in surfaces_close if s.label == PARTS[0]]
         front = front_seen(name, piece.label, (low, high), surfaces, base)
         if front is not None:
             self._seen.fronts[name] = front
@@ -158,13 +160,13 @@ class Pulling:
 
     def _go(self, pose: np.ndarray, label: str) -> bool:
         """Drive to a base pose (3,) before furniture of a class, if the robot does not stand there."""
-        here = self._robot.believed
-        turn = (pose[2] - here[2] + pi) % (2 * pi) - pi
-        if np.hypot(*(pose[:2] - here[:2])) < HERE and abs(turn) < 0.6:
+        present_pose = self._robot.believed
+        turn = (pose[2] - present_pose[2] + pi) % (2 * pi) - pi
+        if np.hypot(*(pose[:2] - present_pose[:2])) < HERE and abs(turn) < 0.6:
             return True
         base = Base(float(pose[0]), float(pose[1]), float(pose[2]))
-        known = np.isfinite(self._seen.obstacles.way(self._robot.base, (base.x, base.y)))
-        return bool(known) and self._driving.drive(base, f"{label}_0").ok
+        is_drivable = np.isfinite(self._seen.obstacles.way(self._robot.base, (base.x, base.y)))
+        return bool(is_drivable) and self._driving.drive(base, f"{label}_0").ok
 
     # ---- open ----
 
@@ -189,19 +191,19 @@ class Pulling:
         for _ in range(PUSHES):
             front = self._seen.moved(name, value)
             end = open_value(front.joint)
-            pushed = self._pushed_toward(front, (end,), Tally()) if value < end - NOTICED else None
+            pushed = self._push_toward(front, (end,), Tally()) if value < end - NOTICED else None
             if pushed is None or pushed < value + NOTICED:
                 return value if pushed is None else pushed
             value = pushed
         return value
 
-    def _pushed(self, front: Front, motion: Manipulation) -> float:
+    def _carry_out_push(self, front: Front, motion: Manipulation) -> float:
         """Carry out a push; something behind a leaf may stop it."""
         try:
             return self._carry_out(front, motion)
         except MotionFailed:
             self._robot.draw_in()
-            return self._seen_open(front, front.value)
+            return self._see_opening(front, front.value)
 
     def _bases(self, front: Front, *, shutting: bool = False) -> Iterator[np.ndarray]:
         """Yield base poses (3,) for a front that the robot can get to: where it stands first, if that is before it."""
@@ -246,12 +248,12 @@ class Pulling:
         MotionFailed.
         """
         robot = self._robot
-        *there, away, home = motion.segments
-        start = next(k for k, segment in enumerate(there) if segment.label in ("pull", "push"))
+        *segments, away, home = motion.segments
+        start = next(k for k, segment in enumerate(segments) if segment.label in ("pull", "push"))
         robot.room.world.wake()
         robot.driver.robot.finger_force = robot.description.firm_finger_force
         try:
-            value, slipped = self._along(front, there, start)
+            value, slipped = self._along(front, segments, start)
         finally:
             robot.driver.robot.finger_force = robot.description.finger_force
         try:
@@ -260,7 +262,7 @@ class Pulling:
             robot.draw_in()  # it let go already
         robot.driver.wait(0.5)
         if not front.slides or slipped:
-            value = self._seen_open(front, value)
+            value = self._see_opening(front, value)
         return value
 
     def _along(self, front: Front, there: list[Segment], start: int) -> tuple[float, bool]:
@@ -275,13 +277,13 @@ class Pulling:
             return front.value, True
         return max(0.0, front.felt(self._tool(robot.measured_arm()), shut)), False
 
-    def _seen_open(self, front: Front, value: float) -> float:
+    def _see_opening(self, front: Front, value: float) -> float:
         """Return how far a front is open as seen from here; the `value` that was felt, which is finer, where it is not
         seen or the eyes say about the same."""
         handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
-        seen = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
-        found = max(0.0, front.value_seen(max(seen, key=lambda s: len(s.points)).points)) if seen else value
-        return value if abs(found - value) < SEEN_TO else found
+        panels = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
+        value_seen = max(0.0, front.value_seen(max(panels, key=lambda s: len(s.points)).points)) if panels else value
+        return value if abs(value_seen - value) < SEEN_TO else value_seen
 
     def _tool(self, arm: np.ndarray) -> np.ndarray:
         """Return the tool point (3,) of the map for joint values (7,)."""
@@ -296,8 +298,12 @@ class Pulling:
         side = -front.joint.axis[2]
         x = front.size[0] / 2
         for away, aside in LOOKS_IN:
-            here, there = apply(front.map_from_front, np.array([(x + away, side * aside, 0.0), (0.0, 0.0, 0.0)]))
-            pose = np.array([here[0], here[1], atan2(there[1] - here[1], there[0] - here[0])])
+            standpoint, handle_point = apply(
+                front.map_from_front, np.array([(x + away, side * aside, 0.0), (0.0, 0.0, 0.0)])
+            )
+            pose = np.array(
+                [standpoint[0], standpoint[1], atan2(handle_point[1] - standpoint[1], handle_point[0] - standpoint[0])]
+            )
             if self._seen.obstacles.fits(pose[0], pose[1]) and self._go(pose, front.label):
                 return
 
@@ -312,8 +318,8 @@ class Pulling:
         for number in range(PUSHES):
             front = self._seen.fronts[name]
             if not front.slides and not number:  # the arm may have come against it since
-                front = self._seen.moved(name, self._seen_open(front, front.value))
-            value = self._pushed_toward(front, (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value), tally)
+                front = self._seen.moved(name, self._see_opening(front, front.value))
+            value = self._push_toward(front, (-OVERSHOOT, 0.4 * front.value, 0.7 * front.value), tally)
             if value is None and not self._look_from_elsewhere(name, number):
                 tally.raise_for(f"close({name})", (name,))
             if value is not None and is_closed(front.joint, self._seen.moved(name, value).value):
@@ -325,11 +331,11 @@ class Pulling:
         front = self._seen.fronts[name]
         for base in [] if front.slides else list(self._bases(front, shutting=True))[number + 1 :]:
             if self._go(base, front.label):
-                self._seen.moved(name, self._seen_open(front, front.value))
+                self._seen.moved(name, self._see_opening(front, front.value))
                 return True
         return False
 
-    def _pushed_toward(self, front: Front, ends: tuple[float, ...], tally: Tally) -> float | None:
+    def _push_toward(self, front: Front, ends: tuple[float, ...], tally: Tally) -> float | None:
         """Push a front to the first of some values that the arm can push it to; return where it is then, None where it
         can to none of them."""
         for end in ends:
@@ -337,7 +343,7 @@ class Pulling:
                 if self._push(front, base, end, tally) is not None and self._go(base, front.label):
                     motion = self._push(front, self._robot.believed, end, tally)
                     if motion is not None:
-                        return self._pushed(front, motion)
+                        return self._carry_out_push(front, motion)
         return None
 
     def _push(self, front: Front, base: np.ndarray, end: float, tally: Tally) -> Manipulation | None:

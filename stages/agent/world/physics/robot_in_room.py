@@ -27,6 +27,7 @@ from scenewright.stages.kit.simulation.robot import Configuration, base_pose
 from scenewright.stages.kit.simulation.robot_description import load_robot
 
 TOOL_FROM_CAMERA = np.array([[0, -1, 0, 0.06], [1, 0, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]], float)
+"""Pose (4, 4) of the wrist camera in the tool's frame [m]; by eye."""
 LOOK_SECONDS = 3.0
 """**Assumed**: of a motion of the arm to a view."""
 ROOM_IN_HAND = 0.04
@@ -154,11 +155,11 @@ class RobotInRoom:
         if self.hold is None:
             return np.zeros(len(points), bool)
         map_from_tool = base_pose(self.believed, self.description) @ forward(self.beliefs.chain, self.arm)
-        own = apply(inverse(map_from_tool @ self.hold.tool_from_box), points)
-        return np.all(np.abs(own) < self.hold.size / 2 + ROOM_IN_HAND, axis=1)
+        in_box_frame = apply(inverse(map_from_tool @ self.hold.tool_from_box), points)
+        return np.all(np.abs(in_box_frame) < self.hold.size / 2 + ROOM_IN_HAND, axis=1)
 
     def wrist_poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the wrist camera's pose (4, 4) in truth, and in the map by base and encoders."""
         true = self.driver.robot.tool_pose() @ TOOL_FROM_CAMERA
-        seen = base_pose(self.believed, self.description) @ forward(self.beliefs.chain, self.arm)
-        return true, seen @ TOOL_FROM_CAMERA
+        believed_tool = base_pose(self.believed, self.description) @ forward(self.beliefs.chain, self.arm)
+        return true, believed_tool @ TOOL_FROM_CAMERA

@@ -35,6 +35,7 @@ FURNITURE_COLORS = {
     "fridge": (0.88, 0.88, 0.90),
     "dresser": (0.55, 0.42, 0.30),
 }
+"""Class -> colour (RGB) of the furniture."""
 RESTS = 0.06
 """A thing whose foot is at most this far below a top is on it [m]."""
 HANDLES = (0.25, 0.25, 0.28)
@@ -112,10 +113,14 @@ class Room:
 
     def opened(self) -> set[str]:
         """Return the furniture whose door is not shut."""
-        return {name for name, made in self.doored.items() if not is_closed(made.joint, self.joint_value(name))}
+        return {
+            name
+            for name, doored_piece in self.doored.items()
+            if not is_closed(doored_piece.joint, self.joint_value(name))
+        }
 
     def _add_walls(self) -> None:
-        parts = []
+        slabs = []
         for room in self.apartment.rooms:
             (x0, y0), (x1, y1) = room.low, room.high
             for low, high, axis in (
@@ -130,17 +135,19 @@ class Room:
                         cuts += [door.centre[axis] - door.width / 2, door.centre[axis] + door.width / 2]
                 cuts.sort()
                 for start, end in zip(cuts[::2], cuts[1::2], strict=True):
-                    near, far = [low[0], low[1]], [low[0], low[1]]
-                    near[axis], far[axis] = start, end
-                    near[1 - axis] -= WALL
-                    far[1 - axis] += WALL
-                    parts.append(slab((near[0], near[1], 0.0), (far[0], far[1], WALL_HEIGHT)))
+                    start_corner, end_corner = [low[0], low[1]], [low[0], low[1]]
+                    start_corner[axis], end_corner[axis] = start, end
+                    start_corner[1 - axis] -= WALL
+                    end_corner[1 - axis] += WALL
+                    slabs.append(
+                        slab((start_corner[0], start_corner[1], 0.0), (end_corner[0], end_corner[1], WALL_HEIGHT))
+                    )
         low = np.min([room.low for room in self.apartment.rooms], axis=0) - 0.5
         high = np.max([room.high for room in self.apartment.rooms], axis=0) + 0.5
         floor = slab((float(low[0]), float(low[1]), -0.1), (float(high[0]), float(high[1]), 0.0))
-        self.world.add_body(record_of("walls", "wall", (0, 0, 0), 0), urdf_of("walls", tuple(parts), 1.0))
+        self.world.add_body(record_of("walls", "wall", (0, 0, 0), 0), urdf_of("walls", tuple(slabs), 1.0))
         self.world.add_body(record_of("floor", "floor", (0, 0, 0), 0), urdf_of("floor", (floor,), 1.0))
-        walls = mesh_of(tuple(parts), (0.82, 0.81, 0.78))
+        walls = mesh_of(tuple(slabs), (0.82, 0.81, 0.78))
         self._meshes["walls"] = joined([walls, mesh_of((floor,), (0.60, 0.56, 0.50))])
 
     def _add_thing(self, thing: Thing) -> None:
@@ -148,18 +155,20 @@ class Room:
         height = on.height if on is not None else 0.77
         at = np.array([*thing.at, self.doored[thing.on].floor if thing.on in self.doored else height])
         if thing.on in self.doored:  # in a drawer that stands open it is where the drawer is
-            at = apply(self._moved(thing.on), at[None])[0]
+            at = apply(self._displacement(thing.on), at[None])[0]
         record = record_of(thing.name, thing.label, (float(at[0]), float(at[1]), float(at[2]) + 0.002), shape.mass)
         self.world.add_body(record, urdf_of(thing.name, shape.parts(), shape.mass))
         self._meshes[thing.name] = stained(thing, mesh_of(shape.parts(), COLORS.get(thing.color, shape.color)))
 
-    def _moved(self, name: str) -> np.ndarray:
+    def _displacement(self, name: str) -> np.ndarray:
         """Return the displacement (4, 4), world frame, of a drawer from where it is shut; of a leaf none, for nothing
         stands in it."""
-        made = self.doored[name]
-        if made.joint.type == "revolute":
+        doored_piece = self.doored[name]
+        if doored_piece.joint.type == "revolute":
             return np.eye(4)
-        return made.pose @ body_from_moved(made.joint, self.joint_value(name)) @ inverse(made.pose)
+        return (
+            doored_piece.pose @ body_from_moved(doored_piece.joint, self.joint_value(name)) @ inverse(doored_piece.pose)
+        )
 
     def renderer(self, eye: np.ndarray) -> SceneRenderer:
         """Return what the cameras at a place (3,) see, as everything lies now."""
@@ -173,9 +182,11 @@ class Room:
                 placed = mesh.copy()
                 placed.apply_transform(pose)
             elif name in self.parts:
-                made = self.doored[name.rsplit("__", 1)[0]]
+                doored_piece = self.doored[name.rsplit("__", 1)[0]]
                 placed = mesh.copy()
-                placed.apply_transform(made.pose @ body_from_moved(made.joint, self.joint_value(made.name)))
+                placed.apply_transform(
+                    doored_piece.pose @ body_from_moved(doored_piece.joint, self.joint_value(doored_piece.name))
+                )
             entries.append((self._number.get(name, 0), placed))
         return SceneRenderer(entries, shadows=False, antialias=False)
 
@@ -197,11 +208,11 @@ class Room:
         x, y, z = self.lies(name)
         if name == held:
             return Body(thing, "", (x, y), moved)
-        for other in self.things.values():
-            if other.carries and other.name != name:
-                u, v, w = self.lies(other.name)
-                if hypot(x - u, y - v) <= other.radius and -0.02 <= z - w < 0.2:
-                    return Body(thing, other.name, (x, y), moved)
+        for carrier in self.things.values():
+            if carrier.carries and carrier.name != name:
+                u, v, w = self.lies(carrier.name)
+                if hypot(x - u, y - v) <= carrier.radius and -0.02 <= z - w < 0.2:
+                    return Body(thing, carrier.name, (x, y), moved)
         for door in self.doored:
             if self._inside(door, np.array([x, y, z])):
                 return Body(thing, door, (x, y), moved)
@@ -213,9 +224,12 @@ class Room:
 
     def _inside(self, name: str, at: np.ndarray) -> bool:
         """Whether a point (3,) is in furniture with a door, or in its drawer where that is now."""
-        made, piece = self.doored[name], self.furniture[name]
-        own = apply(inverse(self._moved(name) @ made.pose), at[None])[0]
-        size = np.array(piece.size if abs(made.pose[0, 0]) > 0.5 else piece.size[::-1])
-        drawer = made.joint.type == "prismatic"
-        lowest = made.floor - RESTS if drawer else 0.0
-        return bool(np.all(np.abs(own[:2]) <= size / 2) and lowest <= own[2] < piece.height - RESTS)
+        doored_piece, piece = self.doored[name], self.furniture[name]
+        in_furniture_frame = apply(inverse(self._displacement(name) @ doored_piece.pose), at[None])[0]
+        size = np.array(piece.size if abs(doored_piece.pose[0, 0]) > 0.5 else piece.size[::-1])
+        drawer = doored_piece.joint.type == "prismatic"
+        lowest = doored_piece.floor - RESTS if drawer else 0.0
+        return bool(
+            np.all(np.abs(in_furniture_frame[:2]) <= size / 2)
+            and lowest <= in_furniture_frame[2] < piece.height - RESTS
+        )

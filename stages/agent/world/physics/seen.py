@@ -45,12 +45,12 @@ class Seen:
 
     def furniture(self) -> list[SeenFurniture]:
         """Return the pieces of which enough was seen."""
-        made = []
+        pieces_seen = []
         for number, piece in enumerate(self.pieces):
             if len(piece.cubes) < head.LEAST:
                 continue
-            made.append(self.piece_seen(number))
-        return made
+            pieces_seen.append(self.piece_seen(number))
+        return pieces_seen
 
     def piece_seen(self, number: int) -> SeenFurniture:
         """Return a piece as arms know it: with its drawer, where that is out."""
@@ -94,10 +94,10 @@ class Seen:
 
     def of_parts(self, points: np.ndarray) -> np.ndarray:
         """Return (N,) bool: points (N, 3) of leaves and drawers, which are no lasting obstacles."""
-        own = np.zeros(len(points), bool)
+        on_part = np.zeros(len(points), bool)
         for front in self.fronts.values():
-            own |= front.of_part(points, BESIDE_PART)
-        return own
+            on_part |= front.of_part(points, BESIDE_PART)
+        return on_part
 
     def front_of(self, piece: int | None) -> Front | None:
         """Return the front of a piece, if it is open."""
@@ -158,19 +158,21 @@ class Seen:
     def keep(self, fresh: list[Surface], at: Position, piece: int | None, close: bool) -> None:
         """Replace what was known of a piece of furniture, or of where a look from near by was at, by what was seen. Of
         what is only partly in the picture, what was seen before is kept."""
-        known = [s for s in self.surfaces if self.belongs(s, at, piece, close)]
-        better = {id(s): old for s in fresh if s.cut for old in known if overlap(s, old) > OVERLAP}
-        away = [s for s in self.surfaces if not any(s is old for old in known)]
+        earlier_surfaces = [s for s in self.surfaces if self.belongs(s, at, piece, close)]
+        better = {
+            id(s): earlier for s in fresh if s.cut for earlier in earlier_surfaces if overlap(s, earlier) > OVERLAP
+        }
+        away = [s for s in self.surfaces if not any(s is earlier for earlier in earlier_surfaces)]
         self.surfaces = away + [better.get(id(s), s) for s in fresh]
 
     def boxes(self, without: Position | None = None, base: Base | None = None) -> dict[str, Believed]:
         """Return what is around a base pose in the map, the robot's own if none is given; what covers a position is
         left out."""
-        here = np.array([base.x, base.y]) if base is not None else self._robot.believed[:2]
+        robot_position = np.array([base.x, base.y]) if base is not None else self._robot.believed[:2]
         boxes: dict[str, Believed] = {}
         for number, piece in enumerate(self.pieces):
             low, high = piece.box
-            off = np.maximum(0.0, np.maximum(low[:2] - here, here - high[:2]))
+            off = np.maximum(0.0, np.maximum(low[:2] - robot_position, robot_position - high[:2]))
             if len(piece.cubes) >= head.LEAST and np.hypot(*off) < AROUND:
                 if f"furniture_{number}" in self.fronts:
                     boxes[f"furniture_{number}"] = self.fronts[f"furniture_{number}"]
@@ -185,7 +187,7 @@ class Seen:
             low, high = surface.low, surface.high
             if (
                 not (without is not None and _covers(surface, without))
-                and np.hypot(*(surface.middle[:2] - here)) < AROUND
+                and np.hypot(*(surface.middle[:2] - robot_position)) < AROUND
             ):
                 boxes[f"thing_{number}"] = (low, high)
         return boxes
@@ -203,9 +205,9 @@ class Seen:
     def support(self, at: Position) -> float:
         """Return the height [m] of what was seen at a position: of a thing there, else of the furniture."""
         for surface in self.surfaces:
-            near = np.hypot(*(surface.points[:, :2] - at[:2]).T) < 0.035
-            if near.sum() > 5:
-                return float(np.median(surface.points[near, 2]))
+            close_points = np.hypot(*(surface.points[:, :2] - at[:2]).T) < 0.035
+            if close_points.sum() > 5:
+                return float(np.median(surface.points[close_points, 2]))
         piece = self.piece_at(at)
         if piece is None:
             return at[2]

@@ -27,8 +27,9 @@ COLORS = {
 STAIN = (0.30, 0.16, 0.06)
 """What a used cup has on its top."""
 RIM_PARTS = 12
+"""Pieces of a round rim; by eye."""
 MOVING_MASS = 3.0
-"""Of a leaf or a drawer [kg]."""
+"""Mass of a leaf or a drawer [kg]; by eye."""
 
 
 class Piece(Model):
@@ -70,9 +71,9 @@ def shapes() -> dict[str, Shape]:
 
 def shape_of(thing: Thing) -> Shape:
     """Return the shape of a thing; of a class that has none a box as wide as the thing is."""
-    known = shapes().get(thing.label)
-    if known is not None:
-        return known
+    catalogued = shapes().get(thing.label)
+    if catalogued is not None:
+        return catalogued
     side = min(2 * thing.radius, 0.06)
     return Shape(mass=0.2, color=(0.5, 0.5, 0.5), pieces=(Piece(box=(side, side, 0.08), at=(0, 0, 0.04)),))
 
@@ -110,12 +111,12 @@ def link_text(name: str, parts: tuple[Piece, ...], mass: float) -> str:
 def jointed_text(name: str, still: tuple[Piece, ...], moving: tuple[Piece, ...], joint: Joint) -> str:
     """Return URDF text of furniture with one joint; pieces in its own frame, the joint at 0."""
     shift = [-value for value in joint.origin]
-    parts = tuple(
+    moving_parts = tuple(
         piece.model_copy(update={"at": tuple(a + b for a, b in zip(piece.at, shift, strict=True))}) for piece in moving
     )
     at, along = (" ".join(str(value) for value in vector) for vector in (joint.origin, joint.axis))
     return (
-        f'<robot name="{name}">{link_text(name, still, 1.0)}{link_text(joint.part, parts, MOVING_MASS)}'
+        f'<robot name="{name}">{link_text(name, still, 1.0)}{link_text(joint.part, moving_parts, MOVING_MASS)}'
         f'<joint name="{joint.name}" type="{joint.type}"><parent link="{name}"/><child link="{joint.part}"/>'
         f'<origin xyz="{at}"/><axis xyz="{along}"/>'
         f'<limit lower="{joint.lower}" upper="{joint.upper}" effort="100" velocity="5"/></joint></robot>'
@@ -139,7 +140,7 @@ def record_of(name: str, label: str, position: tuple[float, float, float], mass:
 
 def mesh_of(parts: tuple[Piece, ...], color: tuple[float, float, float]) -> trimesh.Trimesh:
     """Return the pieces as one painted mesh, body frame [m]."""
-    made = []
+    meshes = []
     for piece in parts:
         if piece.box is not None:
             mesh = trimesh.creation.box(extents=piece.box)
@@ -150,8 +151,8 @@ def mesh_of(parts: tuple[Piece, ...], color: tuple[float, float, float]) -> trim
         mesh.apply_transform(trimesh.transformations.rotation_matrix(piece.yaw, (0, 0, 1)))
         mesh.apply_translation(piece.at)
         paint(mesh, np.array([*(round(255 * value) for value in color), 255], np.uint8))
-        made.append(mesh)
-    return joined(made)
+        meshes.append(mesh)
+    return joined(meshes)
 
 
 def joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:

@@ -12,6 +12,7 @@ from scenewright.stages.suture.trials.places import GRASPING
 from scenewright.stages.suture.trials.wound import SPANNED
 
 INWARDS, LEAST_TURN = np.radians(12.0), np.radians(10.0)
+"""How far from its end the needle is gripped, and the least turn that draws it out [rad]; by eye."""
 
 
 class AsInserted:

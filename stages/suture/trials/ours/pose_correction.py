@@ -17,6 +17,7 @@ from scenewright.stages.suture.trials.places import NOMINAL
 from scenewright.stages.suture.trials.policy import Trust
 
 SERVO_TURNS, SERVO_LOOKS, FEWEST_POSES, SERVOED = 4, 5, 2, np.radians(3.0)
+"""Most turns of the correction, looks of each, poses that are needed, and the error at which it ends [rad]; by eye."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +61,18 @@ class BySeenEnds:
         bench.overhead()
         bench.go("right", transform_from(NOMINAL, CORNER[:3, 3]))
         bench.record("i: to the corner")
-        wanted = upright(np.zeros(3), START_ANGLE)[:3, 0]
-        kept: list[Held] = []
+        wanted_direction = upright(np.zeros(3), START_ANGLE)[:3, 0]
+        poses_in_driver: list[Held] = []
         for turn in range(SERVO_TURNS + 1):
             tool = bench.tools["right"]
-            kept.append(in_driver(corner_looks(bench, trust, SERVO_LOOKS), tool))
-            normal, tip, swage = self.combined(kept, tool)
+            poses_in_driver.append(in_driver(corner_looks(bench, trust, SERVO_LOOKS), tool))
+            normal, tip, swage = self.combined(poses_in_driver, tool)
             along = tip - swage
-            angle = float(np.arctan2(np.cross(along, wanted) @ UP_THE_WOUND, along @ wanted))
+            angle = float(np.arctan2(np.cross(along, wanted_direction) @ UP_THE_WOUND, along @ wanted_direction))
             tilted = float(np.arccos(np.clip(normal @ UP_THE_WOUND, -1.0, 1.0)))
-            if turn == SERVO_TURNS or (abs(angle) < SERVOED and tilted < SERVOED and len(kept) >= FEWEST_POSES):
+            if turn == SERVO_TURNS or (
+                abs(angle) < SERVOED and tilted < SERVOED and len(poses_in_driver) >= FEWEST_POSES
+            ):
                 break
             bench.go("right", primitives.normal_to_y(bench.tools["right"], normal))
             if turn == 0:

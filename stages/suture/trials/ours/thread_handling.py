@@ -13,13 +13,15 @@ from scenewright.stages.suture.trials.thread import draw, pull_on
 TAIL_TO_LEAVE = 0.030
 """What bookkeeping leaves behind the first hole [m]."""
 BOOK_MARGIN = 0.002
+"""Thread that bookkeeping leaves over [m]; by eye."""
 WANTED = 0.080
 """Thread [m] between stitch and needle that handover and pose correction take."""
 LAST_DRAWN = 3
-"""From this suture (0 to 5) on, friction in the stitches made holds the tail: what is wanted later is drawn here."""
+"""Suture (0 to 5) from which on friction in the stitches made holds the tail: what is wanted later is drawn here."""
 PULLS_ON, LOOSE_SEEN, LOOSE_ERROR = 2, 0.003, 0.001
 """How often thread seen loose is pulled on, from what length [m] on, and what it is off by [m] beside its share."""
 LONGEST_PUSH, SHORT_BY = 0.05, 0.005
+"""Longest push sideways, and by how little too short a thread may be [m]; by eye."""
 
 
 class ByTheBooks:
@@ -43,16 +45,18 @@ def booked(bench: Bench) -> float:
     """
     suture = bench.suture
     working = seen_length(bench)
-    left = working - bench.thread.used_by(suture, 0.0)
+    remaining = working - bench.thread.used_by(suture, 0.0)
     if suture == 0:
-        pull = min(WANTED, left - TAIL_TO_LEAVE)
-        bench.tail_reckoned = left - pull
+        pull = min(WANTED, remaining - TAIL_TO_LEAVE)
+        bench.tail_reckoned = remaining - pull
         return pull
-    wanted = WANTED + bench.thread.used_by(suture + 1, 0.0) * (suture == LAST_DRAWN) if suture <= LAST_DRAWN else 0.0
+    wanted_working = (
+        WANTED + bench.thread.used_by(suture + 1, 0.0) * (suture == LAST_DRAWN) if suture <= LAST_DRAWN else 0.0
+    )
     spare = max(0.0, bench.tail_reckoned - TAIL_TO_LEAVE)
-    drawn = min(spare, max(0.0, wanted - left))
+    drawn = min(spare, max(0.0, wanted_working - remaining))
     bench.tail_reckoned -= drawn
-    return left + max(drawn, BOOK_MARGIN)
+    return remaining + max(drawn, BOOK_MARGIN)
 
 
 def seen_length(bench: Bench) -> float:
@@ -98,12 +102,12 @@ class PushedSideways:
         bench.overhead()
         hanging = bench.tools["left"][:3, 3]
         half = float(np.linalg.norm(bench.anchor - hanging)) / 2.0
-        wanted = min(2.0 * float(np.hypot(half, LONGEST_PUSH)), WANTED, working + spare)
-        push = float(np.sqrt(max(0.0, (wanted / 2.0) ** 2 - half**2)))
-        bench.tail_reckoned -= max(0.0, wanted - working)
+        target_length = min(2.0 * float(np.hypot(half, LONGEST_PUSH)), WANTED, working + spare)
+        push = float(np.sqrt(max(0.0, (target_length / 2.0) ** 2 - half**2)))
+        bench.tail_reckoned -= max(0.0, target_length - working)
         start = transform_from(TAKING, (bench.anchor + hanging) / 2.0 + np.array([-0.02, -0.01, 0.0]))
         bench.go("right", start)
-        bench.yield_to(draw(thread, wanted, 0.5 * world.hold * bench.hold.quality, world))
+        bench.yield_to(draw(thread, target_length, 0.5 * world.hold * bench.hold.quality, world))
         end = start.copy()
         end[1, 3] += 0.01 + push
         bench.go("right", end)

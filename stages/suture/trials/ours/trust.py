@@ -13,6 +13,7 @@ PASSES = 0.010
 """A needle seen farther than this [m] from where it must be is not believed: jaws are 12 mm deep, and thread that pulls
 turns a needle about their middle."""
 LOOKS_AFTER = 20
+"""Looks after an extraction until one is believed; by eye."""
 
 
 class InPlace:
@@ -20,14 +21,14 @@ class InPlace:
 
     def look(self, bench: Bench, place: str, where: np.ndarray) -> Seen | None:
         """Return one estimate of a needle that passes one of the points `where` (K, 3) [m]; None for another."""
-        seen = bench.look(place)
-        return seen if seen is not None and passes(seen, where) else None
+        looked = bench.look(place)
+        return looked if looked is not None and passes(looked, where) else None
 
     def seems_out(self, bench: Bench, before: Seen, out: bool) -> bool:
         """Return whether the needle is seen in the left jaws and not in the wound, or not seen at all."""
         jaws, wound = bench.jaws("left"), exit_(bench.suture)[None]
-        where, place = np.concatenate([jaws, wound]), "elsewhere" if out else "tissue"
-        after = until_known(lambda: self.look(bench, place, where), LOOKS_AFTER)
+        where, scene_place = np.concatenate([jaws, wound]), "elsewhere" if out else "tissue"
+        after = until_known(lambda: self.look(bench, scene_place, where), LOOKS_AFTER)
         return after is None or (passes(after, jaws) and not passes(after, wound))
 
 

@@ -7,7 +7,7 @@ from scenewright.stages.kit.geometry.transforms import transform_from
 from scenewright.stages.suture.trials.bench import HOME, Bench
 
 HOVER = np.array([-0.015, 0.0, 0.02])
-"""From the place of insertion to where the right driver comes from [m]."""
+"""Way from the place of insertion to where the right driver comes from [m]; by eye."""
 
 
 class OneAtATime:

@@ -18,11 +18,11 @@ class NoCorrection:
     def believed(self, bench: Bench, trust: Trust) -> Belief:
         """Return what is believed of the needle where it is. Raises Failed (I) where it can't be known."""
         bench.overhead()
-        seen = until_known(lambda: bench.look("elsewhere"))
-        if seen is None:
+        looked = until_known(lambda: bench.look("elsewhere"))
+        if looked is None:
             raise Failed("I", "the needle could not be known before insertion")
-        normal = seen.normal if seen.normal @ UP_THE_WOUND > 0 else -seen.normal
-        return believed(bench.tools["right"], NOMINAL, normal, (seen.tip, seen.swage))
+        normal = looked.normal if looked.normal @ UP_THE_WOUND > 0 else -looked.normal
+        return believed(bench.tools["right"], NOMINAL, normal, (looked.tip, looked.swage))
 
 
 class NinetyDegrees:
