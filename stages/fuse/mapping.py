@@ -157,16 +157,16 @@ class PanopticMapper:
         labels = [self.labels.new() if label == 0 else max(label, 0) for label in matched]
         inside = overlapping_labels(overlap, options.merge_overlap_share)
         self.merging.observe_segments(
-            [SharedSegment(segment.category_id, group) for group, segment in zip(inside, segments, strict=True)],
+            [SharedSegment(segment.class_id, group) for group, segment in zip(inside, segments, strict=True)],
             [label for label in labels if label > 0],
         )
         self._predict(
             [
-                Prediction(label, segment.category_id, segment.instance, segment.score)
+                Prediction(label, segment.class_id, segment.instance, segment.score)
                 for label, segment in zip(labels, segments, strict=True)
-                if label > 0 and segment.category_id > 0
+                if label > 0 and segment.class_id > 0
             ],
-            [label for label, segment in zip(labels, segments, strict=True) if label > 0 and segment.category_id == 0],
+            [label for label, segment in zip(labels, segments, strict=True) if label > 0 and segment.class_id == 0],
         )
         for label in labels:
             if label > 0:

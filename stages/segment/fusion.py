@@ -38,7 +38,7 @@ class FusedSegment:
     """What a fused segment is; its number is its value in FusedFrame.ids."""
 
     id: int
-    category_id: int
+    class_id: int
     instance: int
     is_thing: bool
     score: float
@@ -166,5 +166,5 @@ def describe(labels: np.ndarray, owner: np.ndarray, panoptic: PanopticFrame) -> 
             continue
         mask = panoptic.masks[mask_id]
         instance = instances.setdefault(mask_id, len(instances) + 1)
-        segments.append(FusedSegment(label, mask.category_id, instance, mask.is_thing, mask.score, int(areas[label])))
+        segments.append(FusedSegment(label, mask.class_id, instance, mask.is_thing, mask.score, int(areas[label])))
     return FusedFrame(ids=ids, segments=tuple(segments))

@@ -80,7 +80,7 @@ def run(
         height=info.camera.height,
         frames=tuple(annotations),
     ).write(context.output / "segments.json")
-    named = sum(1 for frame in annotations for segment in frame.segments if segment.category_id)
+    named = sum(1 for frame in annotations for segment in frame.segments if segment.class_id)
     total = sum(len(frame.segments) for frame in annotations)
     summary = {
         "label": backend.label,
@@ -95,6 +95,6 @@ def run(
 
 def recognised_share(frames: Iterable[FrameSegments], unnamed: int) -> float | None:
     """Return the share of the area of things that has another class than `unnamed`; None where no thing was found."""
-    things = [segment for frame in frames for segment in frame.segments if segment.is_thing and segment.category_id]
+    things = [segment for frame in frames for segment in frame.segments if segment.is_thing and segment.class_id]
     total = sum(segment.area for segment in things)
-    return sum(s.area for s in things if s.category_id != unnamed) / total if total else None
+    return sum(s.area for s in things if s.class_id != unnamed) / total if total else None

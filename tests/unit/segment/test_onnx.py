@@ -139,7 +139,7 @@ def found_by(weights: Path, color: np.ndarray | None = None, **inputs: Any) -> t
 
 
 def pixels_of(frame: Any, name: str) -> np.ndarray:
-    wanted = [k for k, mask in frame.masks.items() if VOCABULARY.by_id(mask.category_id).name == name]
+    wanted = [k for k, mask in frame.masks.items() if VOCABULARY.by_id(mask.class_id).name == name]
     return np.isin(frame.ids, wanted)
 
 
@@ -176,7 +176,7 @@ def test_panoptic_of_any_size_with_a_sidecar(tmp_path: Path) -> None:
 def test_yolo(tmp_path: Path) -> None:
     made, frame = found_by(yolo_network(tmp_path / "yolo.onnx"))
     assert made.label == "onnx yolo (yolo-seg, coco-80)"
-    names = sorted(VOCABULARY.by_id(mask.category_id).name for mask in frame.masks.values())
+    names = sorted(VOCABULARY.by_id(mask.class_id).name for mask in frame.masks.values())
     assert names == ["chair", "cup"]  # one cup, though it was boxed twice
     cup, chair = pixels_of(frame, "cup"), pixels_of(frame, "chair")
     expected = np.zeros((2, HEIGHT, WIDTH), dtype=bool)
@@ -189,7 +189,7 @@ def test_yolo(tmp_path: Path) -> None:
 def test_names_in_the_metadata_go_before_positions(tmp_path: Path) -> None:
     names = str({k: "bottle" if k == 41 else "sofa" if k == 56 else f"thing {k}" for k in range(80)})
     made, frame = found_by(yolo_network(tmp_path / "a.onnx", metadata={"names": names}))
-    found = sorted(VOCABULARY.by_id(mask.category_id).name for mask in frame.masks.values())
+    found = sorted(VOCABULARY.by_id(mask.class_id).name for mask in frame.masks.values())
     assert found == ["bottle", "sofa"] and "scenewright" in made.label
     for text in ("__import__('os')", "{", "[" * 5000, "3"):
         _, frame = found_by(yolo_network(tmp_path / "b.onnx", metadata={"names": text}))

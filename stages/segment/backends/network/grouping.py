@@ -36,7 +36,7 @@ class GroupingSettings:
 class Named:
     """Class of a logit."""
 
-    category_id: int
+    class_id: int
     is_thing: bool
 
 
@@ -72,7 +72,7 @@ def group(
         if mask.sum() >= settings.minimum_pixels:
             number = len(masks) + 1
             ids[mask] = number
-            masks[number] = PanopticMask(classes[index].category_id, classes[index].is_thing, min(score, 1.0))
+            masks[number] = PanopticMask(classes[index].class_id, classes[index].is_thing, min(score, 1.0))
 
     for index in np.flatnonzero(~thing):
         mask = likeliest == index

@@ -107,13 +107,11 @@ class ServiceBackend:
         ids = np.searchsorted(np.array([0, *numbers]), reply.ids).astype(np.int32)
         segments = {k + 1: reply.segments[number] for k, number in enumerate(numbers)}
         if self._speaks_ours:
-            return PanopticFrame(
-                ids, {k: PanopticMask(s.category_id, s.is_thing, s.score) for k, s in segments.items()}
-            )
+            return PanopticFrame(ids, {k: PanopticMask(s.class_id, s.is_thing, s.score) for k, s in segments.items()})
         named = {
-            k: NamedSegment(self._labels[s.category_id], s.score)
+            k: NamedSegment(self._labels[s.class_id], s.score)
             for k, s in segments.items()
-            if s.category_id in self._labels
+            if s.class_id in self._labels
         }
         return name_segments(ids, named, self._vocabulary, minimum_pixels=self._minimum_pixels)
 

@@ -97,7 +97,7 @@ def segment_request(request: SegmentRequest, backend: Backend, geometric: Geomet
     return Reply(
         panoptic.ids,
         {
-            number: ReplySegment(mask.category_id, mask.is_thing, float(mask.score))
+            number: ReplySegment(mask.class_id, mask.is_thing, float(mask.score))
             for number, mask in panoptic.masks.items()
         },
     )
