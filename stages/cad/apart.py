@@ -109,7 +109,7 @@ class Apart:
             for share in CLOSING:
                 joints = {name: share * value for name, value in placement.shape.joints.items()}
                 yield replace(placement, shape=shape_at(surface, placement.shape, joints))
-        yield from (other for other in alternatives if other is not placement)
+        yield from (candidate for candidate in alternatives if candidate is not placement)
 
 
 def about_its_foot(placement: Placement, surface: ModelSurface, share: float) -> Placement:

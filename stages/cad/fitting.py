@@ -122,8 +122,8 @@ def solve_within_limits(
     step = np.zeros(len(right))
     free = np.ones(len(right), dtype=bool)
     while True:
-        held = ~free
-        reduced = right[free] - matrix[np.ix_(free, held)] @ step[held]
+        fixed = ~free
+        reduced = right[free] - matrix[np.ix_(free, fixed)] @ step[fixed]
         step[free] = np.linalg.solve(matrix[np.ix_(free, free)], reduced)
         limited = np.clip(step[first:], low, high)
         beyond = np.flatnonzero(free[first:] & (np.abs(limited - step[first:]) > 1e-12))

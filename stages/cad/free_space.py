@@ -35,11 +35,11 @@ class FreeSpace:
             return np.zeros(len(points))
         voxel = np.floor(points / self.voxel_size).astype(np.int64)
         block, inner = voxel // SIDE, voxel % SIDE
-        wanted = _packed(block)
-        row = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
-        held = self.keys[row] == wanted
+        block_key = _packed(block)
+        row = np.minimum(np.searchsorted(self.keys, block_key), len(self.keys) - 1)
+        has_block = self.keys[row] == block_key
         column = inner[:, 0] + SIDE * inner[:, 1] + SIDE * SIDE * inner[:, 2]
-        return np.where(held, self.distance[row, column].astype(float), 0.0)
+        return np.where(has_block, self.distance[row, column].astype(float), 0.0)
 
 
 NOTHING_KNOWN = FreeSpace(np.zeros(0, dtype=np.int64), np.zeros((0, SIDE**3), dtype=np.float16), 1.0)

@@ -34,11 +34,11 @@ def handle_height(leaf: Leaf, seen: Seen) -> float | None:
     graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
     part = connected_components(graph, directed=False)[1]
     heights = [
-        float(own[:, 2].max())
-        for own in (points[part == number] for number in np.unique(part))
-        if len(own) >= FEWEST
-        and np.ptp(own[:, :2], axis=0).min() < NARROW
-        and _graspable(leaf, own[:, :2].mean(axis=0))
+        float(cluster[:, 2].max())
+        for cluster in (points[part == number] for number in np.unique(part))
+        if len(cluster) >= FEWEST
+        and np.ptp(cluster[:, :2], axis=0).min() < NARROW
+        and _graspable(leaf, cluster[:, :2].mean(axis=0))
     ]
     return round(max(heights), 4) if heights else None
 

@@ -80,9 +80,9 @@ class Ours:
         closed = [shape_of_state(model, model.states[0]) for model in target.models]
         shapes = [shape for state in closed for shape in shapes_of_model(target.surfaces[state.model.id], state)]
         matches, counts = self._matches(target, shapes)
-        kept = self._screened(target, matches)
-        rejected = Counter({**counts, "screening rank": len(matches) - len(kept)})
-        aligned = self._refined(target, self._aligned(target, kept, rejected))
+        screened = self._screened(target, matches)
+        rejected = Counter({**counts, "screening rank": len(matches) - len(screened)})
+        aligned = self._refined(target, self._aligned(target, screened, rejected))
         return Proposals([self._measured(target, match, placement) for match, placement in aligned], rejected)
 
     @property
@@ -143,8 +143,8 @@ class Ours:
                 keep=sys.maxsize,
                 upright_only=upright,
             )
-            kept = varied(matches, parameters.matched, _model)
-            return kept, {**counts, "matching rank": len(matches) - len(kept)}
+            best_matches = varied(matches, parameters.matched, _model)
+            return best_matches, {**counts, "matching rank": len(matches) - len(best_matches)}
 
         frames = target.frames(all_frames=True)
         if not target.movable:
@@ -249,7 +249,7 @@ class Ours:
         surface = target.surfaces[placement.shape.model.id]
         error = alignment_error(surface, placement, target.points)
         oriented = robust_error(surface, placement, target.points, target.normals, TRUNCATION)
-        name, named = target.node.class_name, placement.shape.model.class_name
-        stands_in = name != named and any(model.class_name == name for model in target.models)
+        name, model_class = target.node.class_name, placement.shape.model.class_name
+        stands_in = name != model_class and any(model.class_name == name for model in target.models)
         score = self._score(target, match, placement, oriented) + self.parameters.choice_margin * stands_in
         return replace(placement, alignment_error=error, score=score)

@@ -102,9 +102,9 @@ def measure_quality(
         frozenset(),
         parameters.match_iou,
     )
-    whole = agnostic.get(ANY_CLASS, ClassQuality())
-    part.set("pq_class_agnostic", whole.pq if whole.segments else None)
-    part.set("rq_class_agnostic", whole.rq if whole.segments else None)
+    agnostic_quality = agnostic.get(ANY_CLASS, ClassQuality())
+    part.set("pq_class_agnostic", agnostic_quality.pq if agnostic_quality.segments else None)
+    part.set("rq_class_agnostic", agnostic_quality.rq if agnostic_quality.segments else None)
     part.set("labelled_share", float(np.mean(labels[true_labels > 0] > 0)) if (true_labels > 0).any() else None)
     thesis = quality_thesis_code(truth, predicted, parameters)
     mean = average_quality_thesis_code([] if nameless else thesis.values())

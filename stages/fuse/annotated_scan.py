@@ -93,8 +93,8 @@ def read_scan(root: Path) -> AnnotatedScan:
     Raises BadInput when it is of none, broken, or larger than MOST_FACES or MOST_POINTS.
     """
     files = [root] if root.is_file() else sorted(file for file in root.rglob("*") if file.is_file())
-    for read in LAYOUTS:
-        scan = read(files)
+    for read_layout in LAYOUTS:
+        scan = read_layout(files)
         if scan is not None:
             break
     else:
@@ -113,8 +113,8 @@ def instances_by_class(
 
     Each part of the surface (F, 3) that hangs together is an instance; labels in `whole` are one, wherever they are.
     """
-    parts = connected_parts(labels, faces)
-    key = np.where(np.isin(labels, sorted(whole)), -1, parts)
+    components = connected_parts(labels, faces)
+    key = np.where(np.isin(labels, sorted(whole)), -1, components)
     pairs, inverse = np.unique(np.stack([labels, key], axis=1), axis=0, return_inverse=True)
     numbers = np.where(pairs[:, 0] > 0, np.cumsum(pairs[:, 0] > 0), 0)
     return numbers[inverse.reshape(-1)], {int(n): int(label) for n, (label, _) in zip(numbers, pairs, strict=True) if n}
@@ -151,8 +151,8 @@ def _scannet(files: list[Path]) -> AnnotatedScan | None:
         raise BadInput(f"{segments[0]}: segments that are not in 0..2^28", hint=HINT)
     names = {}
     for number, row in enumerate(rows, start=1):
-        own = _integers(row, "segments", group)
-        label_of[own[(own >= 0) & (own <= top)]] = number
+        segment_ids = _integers(row, "segments", group)
+        label_of[segment_ids[(segment_ids >= 0) & (segment_ids <= top)]] = number
         if isinstance(row.get("label"), str) and row["label"].strip():
             names[number] = row["label"]
     return _scan("ScanNet", mesh, label_of[of_vertex], names, True)
@@ -199,9 +199,11 @@ def _scenenn(files: list[Path]) -> AnnotatedScan | None:
         mesh, columns, _ = _read(ply)
         if "label" not in columns:
             raise BadInput(f"{ply}: its vertices have no property `label`", hint=HINT)
-        told = read_annotation(xml)
+        annotation = read_annotation(xml)
         names = {
-            number: entry.nyu_class or entry.text for number, entry in told.items() if entry.nyu_class or entry.text
+            number: entry.nyu_class or entry.text
+            for number, entry in annotation.items()
+            if entry.nyu_class or entry.text
         }
         return _scan("SceneNN", mesh, _whole(columns["label"], ply), names, True)
     return None
@@ -299,10 +301,10 @@ def _scan(
 
 
 def _whole(labels: np.ndarray, path: Path) -> np.ndarray:
-    whole = np.asarray(labels).reshape(-1).astype(np.int64)
-    if (whole != np.asarray(labels).reshape(-1)).any() or (whole < 0).any():
+    integers = np.asarray(labels).reshape(-1).astype(np.int64)
+    if (integers != np.asarray(labels).reshape(-1)).any() or (integers < 0).any():
         raise BadInput(f"{path}: labels that are no integers from 0 on", hint=HINT)
-    return whole
+    return integers
 
 
 def _json(path: Path) -> dict[str, Any]:

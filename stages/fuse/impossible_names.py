@@ -39,13 +39,15 @@ def without_impossible_names(
     """
     result, class_id = [], labelled.class_id.copy()
     for entity in entities:
-        said: Counter[int] = Counter()
+        class_scores: Counter[int] = Counter()
         for label in entity.segments:
-            said.update(scores.get(label, {}))
-        seen = max(1, sum(sightings.get(label, 0) for label in entity.segments))
+            class_scores.update(scores.get(label, {}))
+        sighting_count = max(1, sum(sightings.get(label, 0) for label in entity.segments))
         extent = extent_of(np.asarray(entity.mesh.vertices))
-        if not _possible(entity.class_id, extent, said[entity.class_id] / seen, vocabulary):
-            class_id[labelled.instance == entity.instance] = new = _next_name(said, extent, seen, vocabulary, unnamed)
+        if not _possible(entity.class_id, extent, class_scores[entity.class_id] / sighting_count, vocabulary):
+            class_id[labelled.instance == entity.instance] = new = _next_name(
+                class_scores, extent, sighting_count, vocabulary, unnamed
+            )
             entity = replace(entity, class_id=new)
         result.append(entity)
     return result, replace(labelled, class_id=class_id)

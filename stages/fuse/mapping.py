@@ -50,10 +50,10 @@ class PanopticMapper:
 
         It shares the voxel blocks and is good until the next frame.
         """
-        other = copy(self)
-        other.labels, other.merging = deepcopy(self.labels), deepcopy(self.merging)
-        other.sightings, other.seen_in = dict(self.sightings), dict(self.seen_in)
-        return other
+        mapper = copy(self)
+        mapper.labels, mapper.merging = deepcopy(self.labels), deepcopy(self.merging)
+        mapper.sightings, mapper.seen_in = dict(self.sightings), dict(self.seen_in)
+        return mapper
 
     def add_frame(
         self,

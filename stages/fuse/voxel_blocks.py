@@ -48,22 +48,22 @@ def mix(key: int, mask: int) -> int:
 def find(keys: np.ndarray, slots: np.ndarray, key: int) -> int:
     """Return the slot of `key` in the open-addressing table (keys (T,), -1 empty; slots (T,)), or -1."""
     mask = keys.shape[0] - 1
-    place = mix(key, mask)
-    while keys[place] != -1:
-        if keys[place] == key:
-            return slots[place]
-        place = (place + 1) & mask
+    hash_slot = mix(key, mask)
+    while keys[hash_slot] != -1:
+        if keys[hash_slot] == key:
+            return slots[hash_slot]
+        hash_slot = (hash_slot + 1) & mask
     return -1
 
 
 @njit(cache=True)
 def _insert(keys: np.ndarray, slots: np.ndarray, key: int, slot: int) -> None:
     mask = keys.shape[0] - 1
-    place = mix(key, mask)
-    while keys[place] != -1:
-        place = (place + 1) & mask
-    keys[place] = key
-    slots[place] = slot
+    hash_slot = mix(key, mask)
+    while keys[hash_slot] != -1:
+        hash_slot = (hash_slot + 1) & mask
+    keys[hash_slot] = key
+    slots[hash_slot] = slot
 
 
 @njit(cache=True)

@@ -44,15 +44,17 @@ def of_walls(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, 
 
     vertices (V, 3) [m], z up, the floor at 0; normals (V, 3); `voxel` [m], a vertex stands for one voxel of surface.
     """
-    found = np.zeros(len(vertices), bool)
+    on_walls = np.zeros(len(vertices), bool)
     for plane in _planes(vertices, normals, candidates, voxel):
         gaps = zip(plane.columns[:-1], plane.columns[1:], strict=True)
         hidden = [np.arange(a, b) for a, b in gaps if (b - a) * COLUMN < OPENING]
         span = np.concatenate([plane.columns, *hidden])
         distance = vertices[:, :2] @ plane.normal - plane.offset
-        near = (distance < THICKNESS) & (distance > -WITHIN)
-        found |= near & np.isin(_columns(vertices[:, :2], plane.normal), np.concatenate([span - 1, span, span + 1]))
-    return found & candidates
+        at_plane = (distance < THICKNESS) & (distance > -WITHIN)
+        on_walls |= at_plane & np.isin(
+            _columns(vertices[:, :2], plane.normal), np.concatenate([span - 1, span, span + 1])
+        )
+    return on_walls & candidates
 
 
 def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, voxel: float) -> list[_Plane]:
@@ -61,7 +63,7 @@ def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, v
     points, height = vertices[upright, :2], vertices[upright, 2]
     facing = normals[upright, :2] / np.linalg.norm(normals[upright, :2], axis=1, keepdims=True)
     fewest = COLUMN_AREA / voxel**2
-    left = np.ones(len(upright), bool)
+    unexplained = np.ones(len(upright), bool)
     views = []
     for angle in np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS:
         axis = np.array([np.cos(angle), np.sin(angle)])
@@ -71,7 +73,7 @@ def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, v
     while True:
         most, axis, start = 0, np.zeros(2), 0.0
         for direction, outermost, distance in views:
-            free = distance[left[outermost]]
+            free = distance[unexplained[outermost]]
             if len(free) > most:
                 counts = np.bincount(np.floor((free - free.min()) / THICKNESS).astype(int))
                 counts = counts + np.append(counts[1:], 0)
@@ -81,16 +83,18 @@ def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, v
         if most * voxel**2 < LEAST_AREA:
             return planes
         normal, offset = _fitted(points, facing, axis, start)
-        own = _outermost(points, np.flatnonzero(facing @ normal > FACING), normal, fewest)
-        own = own[np.abs(points[own] @ normal - offset) < THICKNESS]
-        left[own] = False
-        left &= (facing @ axis <= FACING) | (np.abs(points @ axis - start) > 1.01 * THICKNESS)  # all that was counted
-        columns, inverse = np.unique(_columns(points[own], normal), return_inverse=True)
+        on_plane = _outermost(points, np.flatnonzero(facing @ normal > FACING), normal, fewest)
+        on_plane = on_plane[np.abs(points[on_plane] @ normal - offset) < THICKNESS]
+        unexplained[on_plane] = False
+        unexplained &= (facing @ axis <= FACING) | (
+            np.abs(points @ axis - start) > 1.01 * THICKNESS
+        )  # all that was counted
+        columns, inverse = np.unique(_columns(points[on_plane], normal), return_inverse=True)
         top = np.full(len(columns), -np.inf)
-        np.maximum.at(top, inverse, height[own])
-        seen = np.bincount(inverse, minlength=len(columns)) >= fewest
-        if seen.sum() * COLUMN >= LEAST_LENGTH and np.quantile(top[seen], 0.75) >= LEAST_HEIGHT:
-            planes.append(_Plane(normal, offset, columns[seen]))
+        np.maximum.at(top, inverse, height[on_plane])
+        full_columns = np.bincount(inverse, minlength=len(columns)) >= fewest
+        if full_columns.sum() * COLUMN >= LEAST_LENGTH and np.quantile(top[full_columns], 0.75) >= LEAST_HEIGHT:
+            planes.append(_Plane(normal, offset, columns[full_columns]))
 
 
 def _columns(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -110,10 +114,10 @@ def _fitted(points: np.ndarray, facing: np.ndarray, axis: np.ndarray, start: flo
     """Return normal (2,) and offset of the plane that fits what lies around a first one best."""
     normal, offset = axis, start
     for _ in range(3):
-        own = points[(facing @ normal > FACING) & (np.abs(points @ normal - offset) < THICKNESS)]
-        if len(own) < 2:
+        inliers = points[(facing @ normal > FACING) & (np.abs(points @ normal - offset) < THICKNESS)]
+        if len(inliers) < 2:
             break
-        across = np.linalg.svd(own - own.mean(axis=0), full_matrices=False)[2][1]
+        across = np.linalg.svd(inliers - inliers.mean(axis=0), full_matrices=False)[2][1]
         normal = across * np.sign(across @ axis)
-        offset = float(np.median(own @ normal))
+        offset = float(np.median(inliers @ normal))
     return normal, offset

@@ -88,17 +88,21 @@ def leaning_relation(child: Entity, parent: str, entities: list[Entity]) -> Rela
     outward /= max(float(np.linalg.norm(outward)), 1e-9)
     high = child.points[child.points[:, 2] >= child.bottom + LEAST_HEIGHT * (child.top - child.bottom)]
     best: tuple[float, int, str] | None = None
-    for other in entities:
-        if other.name in (child.name, parent) or other.class_name in ("floor", "ceiling") or not len(other.points):
+    for support in entities:
+        if (
+            support.name in (child.name, parent)
+            or support.class_name in ("floor", "ceiling")
+            or not len(support.points)
+        ):
             continue
-        distance, nearest = cKDTree(other.points).query(high, distance_upper_bound=TOUCH)
+        distance, nearest = cKDTree(support.points).query(high, distance_upper_bound=TOUCH)
         touching = np.isfinite(distance)
         if np.count_nonzero(touching) < LEAST_TOUCHING:
             continue
-        contact = other.points[nearest[touching], :2].mean(axis=0)
+        contact = support.points[nearest[touching], :2].mean(axis=0)
         if (contact - middle) @ outward <= 0.0:
             continue
-        candidate = (float(np.sort(distance[touching])[LEAST_TOUCHING - 1]), other.instance, other.name)
+        candidate = (float(np.sort(distance[touching])[LEAST_TOUCHING - 1]), support.instance, support.name)
         best = candidate if best is None else min(best, candidate)
     if best is None:
         return None

@@ -144,10 +144,12 @@ def with_small_supports(
     free = np.ones(len(points), dtype=bool)
     for fit in fits:
         free[fit.inliers] = False
-    rest = np.flatnonzero(free)
+    unexplained = np.flatnonzero(free)
     least = max(5, math.ceil(small.minimum_area / search.spacing**2))
-    supports = small_support_planes(points[rest], normals[rest], search.distance, threshold, least, random)
-    fits += [PlaneFit(fit.normal, fit.offset, rest[fit.inliers]) for fit in supports]
+    supports = small_support_planes(
+        points[unexplained], normals[unexplained], search.distance, threshold, least, random
+    )
+    fits += [PlaneFit(fit.normal, fit.offset, unexplained[fit.inliers]) for fit in supports]
     fits = level_planes(points, fits, threshold, least)
     fits = merge_levels(points, fits, threshold)
     if small.split_distance is not None:
@@ -213,9 +215,9 @@ def level_planes(
         reach = np.searchsorted(ordered, ordered + SAME_HEIGHT, side="right") - np.arange(len(ordered))
         first = int(np.argmax(reach))
         height = float(np.median(ordered[first : first + reach[first]]))
-        kept = fit.inliers[np.abs(heights - height) <= SAME_HEIGHT]
-        if len(kept) >= minimum_count:
-            result.append(PlaneFit(np.array([0.0, 0.0, 1.0]), -height, kept))
+        at_height = fit.inliers[np.abs(heights - height) <= SAME_HEIGHT]
+        if len(at_height) >= minimum_count:
+            result.append(PlaneFit(np.array([0.0, 0.0, 1.0]), -height, at_height))
     return result
 
 
@@ -228,11 +230,11 @@ def merge_levels(points: np.ndarray, fits: list[PlaneFit], horizontal_threshold:
     for fit in fits:
         height = float(points[fit.inliers, 2].mean())
         if is_horizontal(fit.normal, horizontal_threshold):
-            for k, other in enumerate(result):
-                level = abs(float(points[other.inliers, 2].mean()) - height) < SAME_HEIGHT
-                if level and is_horizontal(other.normal, horizontal_threshold):
-                    inliers = np.sort(np.concatenate([other.inliers, fit.inliers]))
-                    result[k] = PlaneFit(other.normal, other.offset, inliers)
+            for k, larger in enumerate(result):
+                level = abs(float(points[larger.inliers, 2].mean()) - height) < SAME_HEIGHT
+                if level and is_horizontal(larger.normal, horizontal_threshold):
+                    inliers = np.sort(np.concatenate([larger.inliers, fit.inliers]))
+                    result[k] = PlaneFit(larger.normal, larger.offset, inliers)
                     break
             else:
                 result.append(fit)

@@ -50,15 +50,15 @@ def round_footprint(points: np.ndarray, normals: np.ndarray) -> RoundFootprint |
         return None
     ground = points[usable, :2]
     across = np.stack([-normals[usable, 1], normals[usable, 0]], axis=1) / level[usable, None]
-    kept = np.ones(len(ground), dtype=bool)
+    inliers = np.ones(len(ground), dtype=bool)
     for _ in range(2):
-        spread = across[kept].T @ across[kept]
+        spread = across[inliers].T @ across[inliers]
         if np.linalg.eigvalsh(spread)[0] < LEAST_TURN * np.trace(spread):
             return None
         offsets = np.einsum("ij,ij->i", across, ground)
-        center = np.linalg.solve(spread, across[kept].T @ offsets[kept])
+        center = np.linalg.solve(spread, across[inliers].T @ offsets[inliers])
         misses = np.abs(offsets - across @ center)
-        kept = misses <= np.quantile(misses, 0.75)
+        inliers = misses <= np.quantile(misses, 0.75)
     distances = np.linalg.norm(points[:, :2] - center, axis=1)
     radius = float(np.quantile(distances[usable], RADIUS_QUANTILE))
     if float(np.median(misses)) > LARGEST_MISS * radius:

@@ -45,9 +45,9 @@ def plan_close(
     value = model.joint_value(body, joint_name)
     tally = Tally()
     search = JointSearch(model, state, body, joint, request.budgets, request.random, tally, request.base)
-    whole = _push(search, value, -OVERSHOOT)
-    if whole is not None:
-        return (whole,)
+    single_push = _push(search, value, -OVERSHOOT)
+    if single_push is not None:
+        return (single_push,)
     for share in (0.5, 0.7, 0.3):
         middle = value * share
         first = _push(search, value, middle)

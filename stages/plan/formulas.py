@@ -64,12 +64,12 @@ class _Reader:
             either: Expression = ["or", ["not", listed[1]], listed[2]]
             return self.read(either, binding, holds, depth + 1)
         if head in ("and", "or"):
-            parts = (self.read(each, binding, holds, depth + 1) for each in listed[1:])
-            return self._joined(parts, (head == "and") == holds)
+            branches = (self.read(each, binding, holds, depth + 1) for each in listed[1:])
+            return self._joined(branches, (head == "and") == holds)
         if head in ("forall", "exists"):
             self._count(listed, 3, f"`{head}` takes variables and a part")
-            parts = (self.read(listed[2], inner, holds, depth + 1) for inner in self._bindings(listed[1], binding))
-            return self._joined(parts, (head == "forall") == holds)
+            branches = (self.read(listed[2], inner, holds, depth + 1) for inner in self._bindings(listed[1], binding))
+            return self._joined(branches, (head == "forall") == holds)
         terms = [word(each, "a term of the goal") for each in listed[1:]]
         for term in terms:
             if term.startswith("?") and term not in binding:
@@ -95,9 +95,12 @@ class _Reader:
             if not name.startswith("?") or name in binding:
                 raise self.refuse(f"{name} is no variable, or bound twice")
             if kind and kind not in self.names.objects.values():
-                known = ", ".join(sorted(set(self.names.objects.values()))[:12])
-                raise self.refuse(f"the scene has no {kind!r}; it has {known}")
-        choices = [[each for each, own in self.names.objects.items() if not kind or own == kind] for _, kind in pairs]
+                kinds = ", ".join(sorted(set(self.names.objects.values()))[:12])
+                raise self.refuse(f"the scene has no {kind!r}; it has {kinds}")
+        choices = [
+            [each for each, object_kind in self.names.objects.items() if not kind or object_kind == kind]
+            for _, kind in pairs
+        ]
         for values in product(*choices):
             self.left -= 1
             if self.left < 0:
@@ -106,11 +109,11 @@ class _Reader:
 
     def _joined(self, parts: Iterator[tuple[Alternative, ...]], together: bool) -> tuple[Alternative, ...]:
         if not together:
-            found = tuple(dict.fromkeys(alternative for part in parts for alternative in part))
-            return self._bounded(_least(found))
+            all_found = tuple(dict.fromkeys(alternative for part in parts for alternative in part))
+            return self._bounded(_least(all_found))
         result = TRUE
         for part in parts:
-            merged = (one | two for one in result for two in part)
+            merged = (first | two for first in result for two in part)
             result = self._bounded(_least(tuple(dict.fromkeys(each for each in merged if _sound(each)))))
         return result
 
@@ -128,7 +131,7 @@ def _least(found: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
     """Leave out alternatives that ask for more than another one (few are compared: the rest stays)."""
     if len(found) > 200:
         return found
-    return tuple(each for each in found if not any(other < each for other in found))
+    return tuple(each for each in found if not any(alternative < each for alternative in found))
 
 
 def alternatives(text: str, names: Names) -> tuple[Alternative, ...]:

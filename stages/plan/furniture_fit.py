@@ -79,7 +79,7 @@ def fit_furniture(
     `allowed` is none: where little but a door is seen, furniture that is turned as far explains it as well.
     """
     eyes = np.array([view.eye for view in views])
-    few, many = _sides(seen, eyes, FEW), _sides(seen, eyes, MANY)
+    few_sides, many_sides = _sides(seen, eyes, FEW), _sides(seen, eyes, MANY)
 
     def placed(sides: Surface, values: dict[str, float], start: np.ndarray) -> FittedFurniture:
         surface = facing(surface_at(values), eyes, start)
@@ -93,22 +93,24 @@ def fit_furniture(
         fits = [placed(sides, found.joints | {name: float(value)}, start) for start in starts for value in values]
         return min([found, *fits], key=lambda fit: fit.misfit)
 
-    found = placed(few, dict(believed), np.eye(4))
+    found = placed(few_sides, dict(believed), np.eye(4))
     for joint in ranges:
-        found = best_of(few, joint.name, np.linspace(joint.lower, joint.upper, STEPS), found, (np.eye(4), found.motion))
-    found = placed(many, found.joints, found.motion)
+        found = best_of(
+            few_sides, joint.name, np.linspace(joint.lower, joint.upper, STEPS), found, (np.eye(4), found.motion)
+        )
+    found = placed(many_sides, found.joints, found.motion)
     for joint in ranges:
         step = (joint.upper - joint.lower) / (STEPS - 1)
         for reach in (step, step / 2):  # place and joint come home together
             around = found.joints[joint.name] + np.linspace(-reach, reach, FINE)
-            found = best_of(many, joint.name, np.clip(around, joint.lower, joint.upper), found, (found.motion,))
-        for rest in (believed[joint.name], joint.lower, joint.upper):
-            resting = placed(many, found.joints | {joint.name: rest}, found.motion)
+            found = best_of(many_sides, joint.name, np.clip(around, joint.lower, joint.upper), found, (found.motion,))
+        for resting_value in (believed[joint.name], joint.lower, joint.upper):
+            resting = placed(many_sides, found.joints | {joint.name: resting_value}, found.motion)
             if resting.misfit < found.misfit + SURE:
                 found = resting
                 break
     surface = facing(surface_at(found.joints), eyes, np.eye(4))
-    unmoved = misfit(many[0], views, surface, np.eye(4))
+    unmoved = misfit(many_sides[0], views, surface, np.eye(4))
     return FittedFurniture(np.eye(4), found.joints, unmoved) if unmoved < found.misfit + STILL else found
 
 
@@ -126,9 +128,12 @@ def fit_place(seen: Surface, surface: Surface, start: np.ndarray) -> np.ndarray:
     for _ in range(ROUNDS):
         back = np.hstack([apply(inverse(motion), seen[0]), LEVER * seen[1] @ motion[:3, :3]])
         away, nearest = tree.query(back)
-        near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(back)))]
-        own, normal = apply(motion, points[nearest[near]]), normals[nearest[near]] @ motion[:3, :3].T
-        step = _level_step(own, normal, seen[0][near], beyond)
+        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(back)))]
+        surface_points, normal = (
+            apply(motion, points[nearest[nearest_rows]]),
+            normals[nearest[nearest_rows]] @ motion[:3, :3].T,
+        )
+        step = _level_step(surface_points, normal, seen[0][nearest_rows], beyond)
         motion = step @ motion
         if np.abs(step - np.eye(4)).max() < STILL:
             break
@@ -152,9 +157,9 @@ def _level_step(own: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond:
     matrix, side = np.concatenate(rows), np.concatenate(sides)
     reach = max(float(np.sqrt((x**2 + y**2).mean())), 1e-3)  # at which a turn is a shift
     matrix = matrix / (1.0, 1.0, reach)
-    told, ways = np.linalg.eigh(matrix.T @ matrix / len(own))
-    known = ways[:, told > LEAST_TOLD]
-    moved = known @ ((known.T @ matrix.T @ side) / (told[told > LEAST_TOLD] * len(own)))
+    eigenvalues, eigenvectors = np.linalg.eigh(matrix.T @ matrix / len(own))
+    certain_axes = eigenvectors[:, eigenvalues > LEAST_TOLD]
+    moved = certain_axes @ ((certain_axes.T @ matrix.T @ side) / (eigenvalues[eigenvalues > LEAST_TOLD] * len(own)))
     shift_x, shift_y, turn = moved / (1.0, 1.0, reach)
     step: np.ndarray = transform_from_yaw(float(turn), np.zeros(3))
     step[:2, 3] = middle + np.array([shift_x, shift_y]) - step[:2, :2] @ middle
@@ -164,11 +169,11 @@ def _level_step(own: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond:
 def facing(surface: Surface, eyes: np.ndarray, motion: np.ndarray) -> Surface:
     """Return the part of a surface, moved by a motion (4, 4), that faces one of the eyes (K, 3)."""
     points, normals = surface
-    shown = np.zeros(len(points), dtype=bool)
+    is_facing = np.zeros(len(points), dtype=bool)
     for eye in apply(inverse(motion), eyes):
         rays = eye - points
-        shown |= np.einsum("ij,ij->i", rays, normals) > FACING * np.linalg.norm(rays, axis=1)
-    return points[shown], normals[shown]
+        is_facing |= np.einsum("ij,ij->i", rays, normals) > FACING * np.linalg.norm(rays, axis=1)
+    return points[is_facing], normals[is_facing]
 
 
 def misfit(seen: np.ndarray, views: Sequence[View], surface: Surface, motion: np.ndarray) -> float:
@@ -183,7 +188,7 @@ def misfit(seen: np.ndarray, views: Sequence[View], surface: Surface, motion: np
     along = np.sqrt(np.maximum(away**2 - beside**2, 0.0))
     outward = float(np.minimum(np.where(along < _reach(tree, points), beside, away), FAR).mean())
     behind = [_seen_behind(apply(motion, points), view) for view in views]
-    in_sight = np.concatenate([own[np.isfinite(own)] for own in behind]) if behind else np.zeros(0)
+    in_sight = np.concatenate([depths[np.isfinite(depths)] for depths in behind]) if behind else np.zeros(0)
     return outward + (float(np.clip(in_sight, 0.0, FAR).mean()) if len(in_sight) else 0.0)
 
 
@@ -195,8 +200,8 @@ def _seen_behind(points: np.ndarray, view: View) -> np.ndarray:
     at = np.rint(np.nan_to_num(pixels, nan=-1.0)).astype(int)
     inside = np.all((at >= 0) & (at < (width, height)), axis=1)
     at[~inside] = 0
-    shown = view.picture.depth[at[:, 1], at[:, 0]]
-    behind: np.ndarray = np.where(inside & (shown > 0), shown - depth, np.nan)
+    picture_depth = view.picture.depth[at[:, 1], at[:, 0]]
+    behind: np.ndarray = np.where(inside & (picture_depth > 0), picture_depth - depth, np.nan)
     return np.where(behind > -FAR, behind, np.nan)
 
 

@@ -66,8 +66,8 @@ def level_place(
     assert state.tool_from_item is not None
     checker = model.checker
     touch = model.links(item)
-    held = base_pose(base, model.description) @ forward(model.chain, state.arm) @ state.tool_from_item
-    yaw = float(np.arctan2(held[1, 0], held[0, 0]))
+    held_pose = base_pose(base, model.description) @ forward(model.chain, state.arm) @ state.tool_from_item
+    yaw = float(np.arctan2(held_pose[1, 0], held_pose[0, 0]))
     for turn in (0.0, 0.4, -0.4):
         checker.carry(item, state.tool_from_item)
         checker.allow(touch=touch)

@@ -86,9 +86,9 @@ def _two_finger_grasps(
         )
 
     firm, loose = sampled(FRICTION_USED), sampled(np.inf)
-    wanted = _palm_free(points, firm, model.description.palm) or _palm_free(points, loose, model.description.palm)
-    kept = {id(grasp) for grasp in wanted}
-    return wanted, [grasp for grasp in (*firm, *loose) if id(grasp) not in kept]
+    preferred = _palm_free(points, firm, model.description.palm) or _palm_free(points, loose, model.description.palm)
+    preferred_ids = {id(grasp) for grasp in preferred}
+    return preferred, [grasp for grasp in (*firm, *loose) if id(grasp) not in preferred_ids]
 
 
 def _palm_free(points: np.ndarray, grasps: list[Grasp], palm: tuple[float, float]) -> list[Grasp]:
@@ -97,9 +97,9 @@ def _palm_free(points: np.ndarray, grasps: list[Grasp], palm: tuple[float, float
     half = np.array([palm[1], palm[0]]) / 2
 
     def free(grasp: Grasp) -> bool:
-        own = apply(inverse(grasp.body_from_tool), points)
-        behind = (own[:, 2] < PALM_ROOM - PALM_BEHIND) & (own[:, 2] > -HAND_END)
-        return not bool(np.any(behind & np.all(np.abs(own[:, :2]) < half, axis=1)))
+        points_in_hand = apply(inverse(grasp.body_from_tool), points)
+        behind = (points_in_hand[:, 2] < PALM_ROOM - PALM_BEHIND) & (points_in_hand[:, 2] > -HAND_END)
+        return not bool(np.any(behind & np.all(np.abs(points_in_hand[:, :2]) < half, axis=1)))
 
     return [grasp for grasp in grasps if free(grasp)]
 
@@ -264,14 +264,14 @@ def _try_pick(
     tool_from_item = inverse(world_from_tool) @ world_from_item
     # What overlaps the item where it is believed to be is an error of belief: it may overlap as much on the way out.
     within = {link: depth + 0.003 for link, depth in checker.overlaps(item).items()}
-    rest = {link: RESTING_DEPTH for link in (*model.links(source), *_supports(model, item))}
-    rest = {link: max(within.get(link, 0.0), depth) for link, depth in rest.items()} | {
-        link: depth for link, depth in within.items() if link not in rest
+    allowed_depths = {link: RESTING_DEPTH for link in (*model.links(source), *_supports(model, item))}
+    allowed_depths = {link: max(within.get(link, 0.0), depth) for link, depth in allowed_depths.items()} | {
+        link: depth for link, depth in within.items() if link not in allowed_depths
     }
     lifted = None
     laden = model.laden(item)
     checker.carry(item, tool_from_item)
-    checker.allow(touch=model.links(item), rest_on=rest)
+    checker.allow(touch=model.links(item), rest_on=allowed_depths)
     try:
         for lift in (RAISE,) if laden else (LIFT, 0.012):
             up = arm_planner.line(base, arm, _shifted(world_from_tool, np.array([0, 0, lift])), tally)
@@ -292,7 +292,7 @@ def _try_pick(
                     break
             if lifted is not None:
                 break
-            checker.allow(touch=model.links(item), rest_on=rest)
+            checker.allow(touch=model.links(item), rest_on=allowed_depths)
         if lifted is None:
             return None
         checker.allow(touch=model.links(item))
@@ -377,17 +377,19 @@ def plan_place(
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     checker.allow(touch=model.links(item))
-    for place in places[: max(4, budgets.bases // 6)]:
-        goal = place.world_from_item[:3, 3]
+    for placement in places[: max(4, budgets.bases // 6)]:
+        goal = placement.world_from_item[:3, 3]
         if base is None:
             bases = possible_bases(model.description, state.base, goal, model.room, budgets.bases // 8, random)
             bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
         else:
             bases = base[None]
-        queue += [(at, place) for at in bases]
+        queue += [(at, placement) for at in bases]
     queue = wish + queue[: budgets.pairs] if serves else queue[: budgets.pairs] + wish
     try:
-        attempts = (_try_place(model, state, item, target, at, place, arm_planner, tally) for at, place in queue)
+        attempts = (
+            _try_place(model, state, item, target, at, placement, arm_planner, tally) for at, placement in queue
+        )
         motion = _first_motion(attempts, budgets.paths)
         if motion is not None:
             return motion
@@ -413,18 +415,19 @@ def _liftable(
     first, and whether the preferred one (see `plan_place`) does what the best of them do: it was chosen on a tray that
     was believed to be another."""
     wish = [] if preferred is None else [preferred[1]]
-    poses = np.array([*(place.world_from_item for place in places), *wish])
-    left = lifts_left(model, tray, item, poses, budgets.size_uncertainty)
-    later = left
-    if further and left.any():
+    poses = np.array([*(placement.world_from_item for placement in places), *wish])
+    lifts_now = lifts_left(model, tray, item, poses, budgets.size_uncertainty)
+    later = lifts_now
+    if further and lifts_now.any():
         spots = sample_placements(model, further[0], tray, door, random)
         beside = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
         later = lifts_left_beside(model, tray, item, poses, further[0], beside, budgets.size_uncertainty)
     order = sorted(
-        range(len(places)), key=lambda index: (not later[index], not places[index].roomy, -later[index], -left[index])
+        range(len(places)),
+        key=lambda index: (not later[index], not places[index].roomy, -later[index], -lifts_now[index]),
     )
-    serves = all(counts[-1] or not counts.any() for counts in (left, later))
-    return [places[index] for index in order if left[index] or not left.any()], serves
+    serves = all(counts[-1] or not counts.any() for counts in (lifts_now, later))
+    return [places[index] for index in order if lifts_now[index] or not lifts_now.any()], serves
 
 
 def _cover(places: list[Placement], world_from_item: np.ndarray) -> tuple[bool, bool]:
@@ -453,19 +456,19 @@ def _try_place(
     item_from_tool = inverse(state.tool_from_item)
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
-    place = placement.world_from_item
+    item_pose = placement.world_from_item
     # a foot that is let down on a tray's rim tips over
     depth = 0.0 if model.records[target].carriable else RESTING_DEPTH
-    touch, rest = model.links(item), dict.fromkeys(model.links(target), depth)
-    checker.allow(touch=touch, rest_on=rest)
+    touch, allowed_depths = model.links(item), dict.fromkeys(model.links(target), depth)
+    checker.allow(touch=touch, rest_on=allowed_depths)
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
-    outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])
+    outward = np.arctan2(*(item_pose[:2, 3] - base[:2])[::-1])
     upright_from_item = model.standing(item)
     hand = (upright_from_item @ item_from_tool)[:3, 2]
     steep = abs(hand[2]) > 0.95
     for wish in (0.0, 0.6, -0.6):
-        yaw = float(np.arctan2(place[1, 0], place[0, 0])) if steep else outward - np.arctan2(hand[1], hand[0])
-        upright = transform_from_yaw(yaw + wish, place[:3, 3]) @ upright_from_item
+        yaw = float(np.arctan2(item_pose[1, 0], item_pose[0, 0])) if steep else outward - np.arctan2(hand[1], hand[0])
+        upright = transform_from_yaw(yaw + wish, item_pose[:3, 3]) @ upright_from_item
         world_from_tool = upright @ item_from_tool
         arm = arm_planner.reachable(base, world_from_tool, tally)
         if arm is None or not arm_planner.free(base, arm, tally):
@@ -480,7 +483,7 @@ def _try_place(
             flat = above[:3, 2] * np.array([1, 1, 0])
             out = arm_planner.line(base, down[-1], _shifted(above, -0.25 * flat), tally)
             if out is None:
-                checker.allow(touch=touch, rest_on=rest)
+                checker.allow(touch=touch, rest_on=allowed_depths)
                 continue
             down = np.concatenate([down, out[1:]])
         break

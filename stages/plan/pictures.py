@@ -57,7 +57,7 @@ class RoomPictures:
         low, high = [], []
         for number, (name, record) in enumerate(records.items(), start=1):
             shapes = link_shapes(texts[name], "visual")
-            parts = {joint.part for joint in record.joints}
+            joint_links = {joint.part for joint in record.joints}
             for link, meshes in shapes.items():
                 colored = [
                     mesh if has_colors(mesh) else _painted(mesh, PALETTE[number % len(PALETTE)]) for mesh in meshes
@@ -65,7 +65,7 @@ class RoomPictures:
                 if not any(len(mesh.faces) for mesh in colored):
                     continue
                 soup = build_soup([(number, mesh) for mesh in colored])
-                if record.movable or link in parts:
+                if record.movable or link in joint_links:
                     self._moving[link] = soup
                     continue
                 placed = _moved(soup, world.link_pose(name, link))

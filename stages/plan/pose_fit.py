@@ -33,8 +33,8 @@ def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = Fals
     for _ in range(ROUNDS):
         back = (seen - motion[:3, 3]) @ motion[:3, :3]
         away, nearest = tree.query(back)
-        near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
-        step = align_upright(apply(motion, shape[nearest[near]]), seen[near])
+        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
+        step = align_upright(apply(motion, shape[nearest[nearest_rows]]), seen[nearest_rows])
         motion = step @ motion
         if np.abs(step - np.eye(4)).max() < 1e-5:
             break

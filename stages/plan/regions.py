@@ -129,17 +129,17 @@ def _levels(shape: _Shape, number: int) -> list[tuple[np.ndarray, np.ndarray, fl
     up = np.flatnonzero((shape.owner == number) & (shape.mesh.face_normals[:, 2] > LEVEL))
     triangles = shape.mesh.triangles[up]
     heights, areas = triangles[:, :, 2].mean(axis=1), shape.mesh.area_faces[up]
-    left = np.ones(len(up), dtype=bool)
+    unused = np.ones(len(up), dtype=bool)
     levels = []
-    for place in np.argsort(-heights, kind="stable"):
-        if not left[place]:
+    for face in np.argsort(-heights, kind="stable"):
+        if not unused[face]:
             continue
-        group = left & (np.abs(heights - heights[place]) < MERGE_HEIGHT)
-        left &= ~group
+        group = unused & (np.abs(heights - heights[face]) < MERGE_HEIGHT)
+        unused &= ~group
         corners = triangles[group].reshape(-1, 3)
         low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
         if areas[group].sum() > LEAST_AREA and float((high - low).min()) > LEAST_WIDTH:
-            levels.append((low, high, float(heights[place])))
+            levels.append((low, high, float(heights[face])))
     return levels
 
 
@@ -215,9 +215,9 @@ def region_at(regions: Iterable[Region], feet: Iterable[np.ndarray]) -> Region |
     """Return the region on which a thing stands, None when it stands on none of them. `feet`: the middle of its foot
     (3,) in the closed body frame of each region."""
     best: tuple[float, Region] | None = None
-    for region, place in zip(regions, feet, strict=True):
-        off = abs(float(place[2]) - region.level)
-        over = bool(np.all(place[:2] > region.low - BESIDE) and np.all(place[:2] < region.high + BESIDE))
+    for region, foot in zip(regions, feet, strict=True):
+        off = abs(float(foot[2]) - region.level)
+        over = bool(np.all(foot[:2] > region.low - BESIDE) and np.all(foot[:2] < region.high + BESIDE))
         if over and off < (NEAR_LEVEL if best is None else best[0]):
             best = (off, region)
     return None if best is None else best[1]

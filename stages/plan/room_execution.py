@@ -291,13 +291,13 @@ def _differences(
     expected = replace(believed, parents={**believed.parents, **observed[START].parents})
     for number, step in enumerate(steps):
         if number in anew:
-            seen = anew[number]
+            tree_then = anew[number]
             expected = replace(
                 expected,
-                parents={**expected.parents, **seen.parents},
-                poses={**expected.poses, **seen.poses},
-                joints={**expected.joints, **seen.joints},
-                held=seen.held,
+                parents={**expected.parents, **tree_then.parents},
+                poses={**expected.poses, **tree_then.poses},
+                joints={**expected.joints, **tree_then.joints},
+                held=tree_then.held,
             )
         expected = after_step(expected, step)
         if number in observed:
@@ -320,8 +320,8 @@ def draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParame
     images: dict[int, np.ndarray] = {}
     if parameters.video_rate > 0:
         every = max(1, round(RECORD_RATE / parameters.video_rate))
-        wanted = list(range(0, len(recording.snapshots), every))
-        for index in context.progress.track(wanted, description="video"):
+        snapshot_indices = list(range(0, len(recording.snapshots), every))
+        for index in context.progress.track(snapshot_indices, description="video"):
             images[index] = pictures.overview(recording.snapshots[index], small)
     write_execution(
         context.output / "execution.mcap", recording.snapshots, images, small, pictures.overview_pose(small)

@@ -65,13 +65,13 @@ def seen_carrier(points: np.ndarray, load: np.ndarray, yaw: float) -> SeenCarrie
     near_load = np.zeros(len(points), dtype=bool)
     for x, y, radius in load:
         near_load |= np.hypot(points[:, 0] - x, points[:, 1] - y) < radius + BESIDE_LOAD
-    own = apply(inverse(transform_from_yaw(turn, np.array([*middle, 0.0]))), points)
-    heights = _heights(own, size)
-    seen = heights[np.isfinite(heights)]
-    if len(seen) < LEAST_CELLS:
+    points_in_box = apply(inverse(transform_from_yaw(turn, np.array([*middle, 0.0]))), points)
+    heights = _heights(points_in_box, size)
+    finite_heights = heights[np.isfinite(heights)]
+    if len(finite_heights) < LEAST_CELLS:
         return None
-    level = float(np.median(seen))
-    heights = _heights(own[~near_load | (own[:, 2] < level + WALL)], size)
+    level = float(np.median(finite_heights))
+    heights = _heights(points_in_box[~near_load | (points_in_box[:, 2] < level + WALL)], size)
     wall = _without_single(np.nan_to_num(heights, nan=-np.inf) > level + WALL)
     low = level - FLOOR
     floor = (np.array([0.0, 0.0, FLOOR / 2]), np.array([*size, FLOOR]))

@@ -36,15 +36,15 @@ class SeenThings:
         believed = _moved(pose, -self._middles.get(name, np.zeros(3)))
         best, shape, surface = None, planned, None
         for candidate in [planned, *([self._learned[name]] if name in self._learned else [])]:
-            own = _surface(candidate)
-            fit = fit_thing(points, eyes, own, believed)
+            candidate_surface = _surface(candidate)
+            fit = fit_thing(points, eyes, candidate_surface, believed)
             if best is None or fit.misfit < best.misfit:
-                best, shape, surface = fit, candidate, own
+                best, shape, surface = fit, candidate, candidate_surface
         assert best is not None and surface is not None
         if shape == planned:
-            more = sticking_out(apply(inverse(best.pose), points), best.scale * surface[0])
-            if more:
-                shape = with_boxes(planned, [(center / best.scale, size / best.scale) for center, size in more])
+            boxes = sticking_out(apply(inverse(best.pose), points), best.scale * surface[0])
+            if boxes:
+                shape = with_boxes(planned, [(center / best.scale, size / best.scale) for center, size in boxes])
                 self._learned[name] = shape
         middle = np.zeros(3)
         if shape != planned:

@@ -165,13 +165,15 @@ def stack_and_carry(facts: SceneFacts) -> Goals:
     surfaces = facts.bodies(*TABLES)
     ranked = []
     for tray in trays:
-        here = facts.on[tray]
-        beside = facts.small([item for item, where in facts.on.items() if where in (here, *surfaces)])
+        tray_support = facts.on[tray]
+        beside = facts.small([item for item, where in facts.on.items() if where in (tray_support, *surfaces)])
         beside = sorted(item for item in beside if facts.holds("fits", item, tray))
         for target in surfaces:
-            if target != here and facts.holds("fits", tray, target) and beside:
-                near = sorted(beside, key=lambda item: (facts.on[item] != here, facts.slenderness(item), item))
-                ranked.append((facts.distance(here, target), tray, target, tuple(near)))
+            if target != tray_support and facts.holds("fits", tray, target) and beside:
+                load_order = sorted(
+                    beside, key=lambda item: (facts.on[item] != tray_support, facts.slenderness(item), item)
+                )
+                ranked.append((facts.distance(tray_support, target), tray, target, tuple(load_order)))
     if not ranked:
         raise _missing(
             "stack-and-carry",

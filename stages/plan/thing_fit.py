@@ -60,15 +60,17 @@ def fit_thing(
     `seen` (N, 3): points of it that cameras at `eyes` (K, 3) saw; `shape`: points (M, 3) around it and their outward
     normals, own frame; `believed`: its pose (4, 4), from which another attitude must be better by `SURE`.
     """
-    few, many = _thinned(seen, FEW), _thinned(seen, MANY)
+    few_points, many_points = _thinned(seen, FEW), _thinned(seen, MANY)
     turned = [_yaw(2 * np.pi * k / HEADINGS) @ believed[:3, :3] for k in range(HEADINGS)]
-    first = _best_scale(many, eyes, shape, _hopeful(few, eyes, shape, turned, upright=True)[0], upright=True)
+    first = _best_scale(
+        many_points, eyes, shape, _hopeful(few_points, eyes, shape, turned, upright=True)[0], upright=True
+    )
     if first.misfit < FITS + SURE:
         return first
     others = [first]
-    for pose in _hopeful(few, eyes, shape, _attitudes(), upright=False)[:HOPEFUL]:
+    for pose in _hopeful(few_points, eyes, shape, _attitudes(), upright=False)[:HOPEFUL]:
         stands = abs(pose[2, 2]) > LEVEL
-        others.append(_best_scale(many, eyes, shape, _upright(pose) if stands else pose, upright=stands))
+        others.append(_best_scale(many_points, eyes, shape, _upright(pose) if stands else pose, upright=stands))
     best = min(others, key=lambda fit: fit.misfit)
     return best if best.misfit < first.misfit - SURE else first
 
@@ -106,26 +108,26 @@ def _upright(pose: np.ndarray) -> np.ndarray:
 
 def _attitudes() -> list[np.ndarray]:
     """Return rotations (3, 3) in which a thing that stood may lie: upright, upside down, on its side."""
-    found = []
+    rotations = []
     for heading in 2 * np.pi * np.arange(HEADINGS) / HEADINGS:
         axis = np.array([np.cos(heading), np.sin(heading), 0.0])
         across = np.array([-axis[1], axis[0], 0.0])
         for roll in 2 * np.pi * np.arange(ROLLS) / ROLLS:
             side = np.cos(roll) * across + np.sin(roll) * np.array([0.0, 0.0, 1.0])
-            found.append(np.column_stack([side, np.cross(axis, side), axis]))
+            rotations.append(np.column_stack([side, np.cross(axis, side), axis]))
     for k in range(ROLLS):
-        found += [_yaw(2 * np.pi * k / ROLLS), _yaw(2 * np.pi * k / ROLLS) @ np.diag([1.0, -1.0, -1.0])]
-    return found
+        rotations += [_yaw(2 * np.pi * k / ROLLS), _yaw(2 * np.pi * k / ROLLS) @ np.diag([1.0, -1.0, -1.0])]
+    return rotations
 
 
 def _over(seen: np.ndarray, shape: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Return the pose (4, 4) in an attitude in which the boxes' middles are one over the other, tops level."""
-    own = shape @ turn.T
+    turned_shape = shape @ turn.T
     low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
     pose = np.eye(4)
     pose[:3, :3] = turn
-    pose[:2, 3] = (low + high - own.min(axis=0) - own.max(axis=0))[:2] / 2
-    pose[2, 3] = high[2] - own[:, 2].max()
+    pose[:2, 3] = (low + high - turned_shape.min(axis=0) - turned_shape.max(axis=0))[:2] / 2
+    pose[2, 3] = high[2] - turned_shape[:, 2].max()
     return pose
 
 
@@ -135,8 +137,8 @@ def _fitted(seen: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: b
     tree = cKDTree(shape)
     for _ in range(ROUNDS):
         away, nearest = tree.query(apply(inverse(pose), seen))
-        near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
-        source, target = apply(pose, shape[nearest[near]]), seen[near]
+        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
+        source, target = apply(pose, shape[nearest[nearest_rows]]), seen[nearest_rows]
         pose = (align_upright if upright else align_rigidly)(source, target) @ pose
     return pose
 
@@ -147,11 +149,11 @@ def _best_scale(
     """Return the fit in the size that fits best, tops level with the top that it begins with."""
 
     def fitted(scale: float) -> FittedThing:
-        own = (scale * shape[0], shape[1])
+        scaled_shape = (scale * shape[0], shape[1])
         start = pose.copy()
         start[2, 3] += (1 - scale) * float((shape[0] @ pose[2, :3]).max())
-        found = _fitted(seen, own[0], start, upright=upright)
-        return FittedThing(found, scale, _misfit(seen, eyes, own, found))
+        fitted_pose = _fitted(seen, scaled_shape[0], start, upright=upright)
+        return FittedThing(fitted_pose, scale, _misfit(seen, eyes, scaled_shape, fitted_pose))
 
     best = min(map(fitted, SCALES.tolist()), key=lambda fit: fit.misfit)
     return min([best, *(fitted(best.scale + step) for step in FINER)], key=lambda fit: fit.misfit)
@@ -162,12 +164,12 @@ def _misfit(seen: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndar
     away, nearest = cKDTree(points).query(seen)
     beside = np.abs(np.einsum("ij,ij->i", seen - points[nearest], normals[nearest]))
     outward = float(np.minimum(np.where(away < BESIDE, beside, away), FAR).mean())
-    shown = np.zeros(len(points), dtype=bool)
+    visible = np.zeros(len(points), dtype=bool)
     for eye in eyes:
-        shown |= in_sight(points, normals, eye)
-    if not shown.any():
+        visible |= in_sight(points, normals, eye)
+    if not visible.any():
         return 2 * FAR
-    away = np.sort(np.minimum(cKDTree(seen).query(points[shown])[0], FAR))
+    away = np.sort(np.minimum(cKDTree(seen).query(points[visible])[0], FAR))
     return outward + float(away[: max(1, int(KEPT * len(away)))].mean())
 
 

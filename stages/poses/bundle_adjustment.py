@@ -79,8 +79,10 @@ def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[i
         return item
 
     for edge in edges:
-        for there, here in _agreeing(keys[edge.target].features, keys[edge.source].features, edge.target_from_source):
-            first, second = root((edge.target, there)), root((edge.source, here))
+        for target_feature, source_feature in _agreeing(
+            keys[edge.target].features, keys[edge.source].features, edge.target_from_source
+        ):
+            first, second = root((edge.target, target_feature)), root((edge.source, source_feature))
             parent[max(first, second)] = min(first, second)
     groups: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for item in sorted(parent):
@@ -94,8 +96,8 @@ def _agreeing(target: Features, source: Features, target_from_source: np.ndarray
         return []
     moved = apply(target_from_source, source.points[pairs[:, 1]].astype(float))
     points = target.points[pairs[:, 0]].astype(float)
-    near = np.linalg.norm(moved - points, axis=1) < 0.03 + 0.01 * points[:, 2] ** 2
-    return [(int(a), int(b)) for a, b in pairs[near]]
+    agreeing = np.linalg.norm(moved - points, axis=1) < 0.03 + 0.01 * points[:, 2] ** 2
+    return [(int(a), int(b)) for a, b in pairs[agreeing]]
 
 
 def _bundle(

@@ -113,11 +113,11 @@ class Verifier:
         if loop is None:
             return None
         moved = between(guess, loop.alignment.target_from_source)
-        near = distance_of(moved) <= LARGEST_CORRECTION[0] and angle_of(moved) <= LARGEST_CORRECTION[1]
-        return loop if near else None
+        is_small = distance_of(moved) <= LARGEST_CORRECTION[0] and angle_of(moved) <= LARGEST_CORRECTION[1]
+        return loop if is_small else None
 
     def _verified(self, target: int, source: int, guess: np.ndarray, found_by: FoundBy) -> Loop | None:
         first, second = self._pyramids(target), self._pyramids(source)
         coarsest = None if found_by == "place" else 1
-        there = agreed(first, second, guess, self._limits, use_color=self._use_color, coarsest=coarsest)
-        return None if there is None else Loop(target, source, there, found_by)
+        alignment = agreed(first, second, guess, self._limits, use_color=self._use_color, coarsest=coarsest)
+        return None if alignment is None else Loop(target, source, alignment, found_by)

@@ -79,5 +79,5 @@ class Ferns:
 
 def fern_likeness(code: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the share (N,) of ferns that agree between `code` (F,) and others (N, F), where both have depth."""
-    both = (code >= 0) & (others >= 0)
-    return ((code == others) & both).sum(axis=1) / np.maximum(both.sum(axis=1), 0.25 * len(code))
+    both_have_depth = (code >= 0) & (others >= 0)
+    return ((code == others) & both_have_depth).sum(axis=1) / np.maximum(both_have_depth.sum(axis=1), 0.25 * len(code))

@@ -142,12 +142,12 @@ def far_from_instance(
     if len(segments) < 2:
         return []
     flat = points.reshape(-1, 3)
-    kept = largest_cluster(
+    in_cluster = largest_cluster(
         [flat[pixels.of(label)[::step]] for label in segments],
         [len(pixels.of(label)) for label in segments],
         distance=distance,
     )
-    return [label for index, label in enumerate(segments) if index not in kept]
+    return [label for index, label in enumerate(segments) if index not in in_cluster]
 
 
 def describe(labels: np.ndarray, owner: np.ndarray, panoptic: PanopticFrame) -> FusedFrame:

@@ -58,11 +58,13 @@ def fuse(
     labels = split_shared(labels, panoptic.ids, minimum_pixels=least_claimed, minimum_share=settings.majority_share)
     owner = majority_labels(labels, panoptic.ids, majority_share=settings.majority_share)
     pixels = pixels_of_labels(labels)
-    for parts in parts_of_things(owner, panoptic):
-        if len(parts) > 1:
-            own = np.concatenate([pixels.of(part) for part in parts])
-            distance = max(settings.cluster_distance, reach_of(points.reshape(-1, 3)[own]))
-            owner[far_from_instance(pixels, parts, points, distance=distance, step=settings.cluster_step)] = BACKGROUND
+    for of_instance in parts_of_things(owner, panoptic):
+        if len(of_instance) > 1:
+            instance_pixels = np.concatenate([pixels.of(part) for part in of_instance])
+            distance = max(settings.cluster_distance, reach_of(points.reshape(-1, 3)[instance_pixels]))
+            owner[far_from_instance(pixels, of_instance, points, distance=distance, step=settings.cluster_step)] = (
+                BACKGROUND
+            )
     return describe(labels, owner, panoptic)
 
 

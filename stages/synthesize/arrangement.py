@@ -63,10 +63,10 @@ def arrange(
     the things that lie on its furniture, 0 the first. Raises BadInput when a class is missing from the library, or when
     no start satisfies the recipe's least counts and the objection.
     """
-    for place in recipe.place:
-        if place.count[0] > 0 and not catalogue.by_class.get(place.class_name):
+    for rule in recipe.place:
+        if rule.count[0] > 0 and not catalogue.by_class.get(rule.class_name):
             raise BadInput(
-                f"the CAD library has no {place.class_name!r}, which the recipe needs",
+                f"the CAD library has no {rule.class_name!r}, which the recipe needs",
                 hint="build the library with all classes",
             )
     reasons: list[str] = []
@@ -107,16 +107,16 @@ class _Arranger:
 
     def run(self) -> Arrangement:
         """Apply all rules in order. Raises _Impossible."""
-        for place in self.recipe.place:
-            least, most = place.count
-            if place.clutter:
+        for rule in self.recipe.place:
+            least, most = rule.count
+            if rule.clutter:
                 least, most = int(round(least * self.clutter)), int(round(most * self.clutter))
-            wanted = int(self.random.integers(least, most + 1))
+            target_count = int(self.random.integers(least, most + 1))
             placed = 0
-            for _ in range(wanted):
-                placed += self._place_one(place)
+            for _ in range(target_count):
+                placed += self._place_one(rule)
             if placed < least:
-                raise _Impossible(f"{place.class_name}: {placed} of at least {least} placed ({place.where})")
+                raise _Impossible(f"{rule.class_name}: {placed} of at least {least} placed ({rule.where})")
         return Arrangement(self.room, tuple(self.objects), self.first_object)
 
     def rearranged(self, random: np.random.Generator) -> Arrangement:
@@ -125,17 +125,17 @@ class _Arranger:
         self.random = random
         carried: dict[int, Place] = {}
         names: set[str] = set()
-        for thing, place in zip(self.objects, self.rules, strict=True):
+        for thing, rule in zip(self.objects, self.rules, strict=True):
             below = {thing.parent, *(entry.source for entry in thing.further)}
-            if (place.where == "on" and not thing.furnishing.model.joints) or below & names:
-                carried[thing.instance] = place
+            if (rule.where == "on" and not thing.furnishing.model.joints) or below & names:
+                carried[thing.instance] = rule
                 names.add(thing.name)
         self.objects = [thing for thing in self.objects if thing.name not in names]
         for name in names:
             del self.solid.shapes[name]
-        for instance, place in carried.items():
+        for instance, rule in carried.items():
             self.numbers = iter([instance])
-            self._place_one(place)
+            self._place_one(rule)
         return Arrangement(self.room, tuple(sorted(self.objects, key=lambda thing: thing.instance)), self.first_object)
 
     def _place_one(self, place: Place) -> bool:
@@ -253,12 +253,12 @@ class _Arranger:
         if not targets:
             return None
         target = targets[int(self.random.integers(len(targets)))]
-        size, own = target.furnishing.closed_size, furnishing.closed_size
+        size, closed_size = target.furnishing.closed_size, furnishing.closed_size
         side = 0 if place.where == "front" else int(self.random.integers(4))
         direction = np.array([(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)][side])
         across = np.array([-direction[1], direction[0]])
-        slack = max(0.0, float(abs(across) @ size[:2]) / 2 - own[0] / 2 - 0.02)
-        reach = float(abs(direction) @ size[:2]) / 2 + own[1] / 2 + self.random.uniform(*place.gap)
+        slack = max(0.0, float(abs(across) @ size[:2]) / 2 - closed_size[0] / 2 - 0.02)
+        reach = float(abs(direction) @ size[:2]) / 2 + closed_size[1] / 2 + self.random.uniform(*place.gap)
         at = direction * reach + across * self.random.uniform(-slack, slack)
         world = target.world_from_model
         middle = world[:2, :2] @ at + world[:2, 3]
@@ -293,10 +293,10 @@ class _Arranger:
         touching = {name: TOUCH for name in (pose.parent, *(entry.source for entry in pose.further))}
         if self.solid.conflict(trial, margin, margins=touching) is not None:
             return None
-        own = [name for name in self.kept_free.shapes if pose.at and name.startswith(f"{pose.at}/floor")]
+        may_overlap = [name for name in self.kept_free.shapes if pose.at and name.startswith(f"{pose.at}/floor")]
         if place.surface == "drawer":  # what lies in a drawer moves with it
-            own.append(f"{pose.at}/swing")
-        if self.kept_free.conflict(trial, 0.0, without=own) is not None:
+            may_overlap.append(f"{pose.at}/swing")
+        if self.kept_free.conflict(trial, 0.0, without=may_overlap) is not None:
             return None
         swing = furnishing.swing
         if swing is not None:

@@ -39,8 +39,8 @@ def plan_drive(
 
     Raises BadInput when the camera would come closer than CLEARANCE to a surface.
     """
-    there = _floor_path(shape, space)
-    legs = [there, there[::-1] if shape == "line" else there][:rounds]
+    outbound = _floor_path(shape, space)
+    legs = [outbound, outbound[::-1] if shape == "line" else outbound][:rounds]
     heights = np.repeat(HEIGHTS[:rounds], [len(leg) for leg in legs])
     path = smooth_path(np.concatenate(legs), space)
     eye = np.column_stack([path, gaussian_filter1d(heights, 0.25 / STEP, mode="nearest")])

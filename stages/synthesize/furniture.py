@@ -63,12 +63,12 @@ class Furnishing:
         """What the moving parts pass through over their whole range (model frame, scaled), None without joints."""
         if not self.model.joints:
             return None
-        parts = load_collision_parts(self.folder)
+        pieces_of_part = load_collision_parts(self.folder)
         pieces = []
         for joint in self.model.joints:
             for value in np.linspace(joint.lower, joint.upper, SWEEP_STEPS):
                 pose = part_transforms(self.model, {joint.name: float(value)})[joint.part]
-                for piece in parts.get(joint.part, []):
+                for piece in pieces_of_part.get(joint.part, []):
                     moved = piece.copy()
                     moved.apply_transform(pose)
                     moved.apply_scale(self.scale)
@@ -84,11 +84,13 @@ class Furnishing:
     @cached_property
     def planes(self) -> tuple[SurfacePlane, ...]:
         """Surface planes in the model frame, scaled: all of them when closed, those of the body when not."""
-        kept = list(self.model.states[0].planes)
+        lasting = list(self.model.states[0].planes)
         if any(abs(value) > 1e-9 for value in self.joints.values()):
             for state in self.model.states[1:]:
-                kept = [plane for plane in kept if any(same_plane(plane, other) for other in state.planes)]
-        return tuple(_scaled(plane, self.scale) for plane in kept)
+                lasting = [
+                    plane for plane in lasting if any(same_plane(plane, state_plane) for state_plane in state.planes)
+                ]
+        return tuple(_scaled(plane, self.scale) for plane in lasting)
 
     @cached_property
     def drawer_floors(self) -> tuple[SurfacePlane, ...]:
@@ -104,8 +106,12 @@ class Furnishing:
             travel = state.joints.get(joint.name, 0.0) * axis
             for plane in self.model.states[0].planes:
                 moved = _shifted(plane, travel)
-                went_along = any(same_plane(moved, other) for other in state.planes)
-                if plane.horizontal and went_along and not any(same_plane(plane, other) for other in state.planes):
+                went_along = any(same_plane(moved, state_plane) for state_plane in state.planes)
+                if (
+                    plane.horizontal
+                    and went_along
+                    and not any(same_plane(plane, state_plane) for state_plane in state.planes)
+                ):
                     floors.append(_scaled(_shifted(plane, value * axis), self.scale))
         return tuple(floors)
 
@@ -167,8 +173,8 @@ def main_joint(model: CadModel) -> Joint:
     """Return the door that matters: the revolute joint whose part is called `door`, otherwise the first revolute
     joint, otherwise the first. Raises IndexError for a rigid model."""
     doors = [joint for joint in model.joints if joint.type == "revolute"] or list(model.joints)
-    named = [joint for joint in doors if joint.part == "door"]
-    return (named or doors)[0]
+    called_door = [joint for joint in doors if joint.part == "door"]
+    return (called_door or doors)[0]
 
 
 class Catalogue:

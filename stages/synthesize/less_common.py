@@ -140,8 +140,8 @@ def carried_share(carrier: PlacedObject, furnishing: Furnishing, world_from_mode
         return 0.0
     plane = plane_in_world(carrier.furnishing.planes[index], carrier.world_from_model)
     half = 0.5 * furnishing.closed_size[:2]
-    own = box_from_bounds((-half[0], -half[1], 0.0), (half[0], half[1], 0.01))
-    corners = np.column_stack([footprint(own), np.zeros(4)])
+    footprint_box = box_from_bounds((-half[0], -half[1], 0.0), (half[0], half[1], 0.01))
+    corners = np.column_stack([footprint(footprint_box), np.zeros(4)])
     foot = apply(world_from_model, corners)[:, :2]
     shared = clip_polygon(foot, convex_hull(np.asarray(plane.corners)[:, :2]))
     return float(polygon_area(shared) / polygon_area(foot))

@@ -54,11 +54,15 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
         value = round(joint.lower + float(random.uniform(*OPENED)) * (joint.upper - joint.lower), 4)
         trial = replace(thing, furnishing=catalogue.furnishing(model, {name: value}, scale))
         shape = trial.furnishing.shape.placed(_lifted(thing))
-        own = {thing.name, thing.parent, *(other.name for other in arrangement.objects if other.parent == thing.name)}
+        may_touch = {
+            thing.name,
+            thing.parent,
+            *(other.name for other in arrangement.objects if other.parent == thing.name),
+        }
         inside = arrangement.room.holds(shape.minimum, shape.maximum)
         planes = planes_kept(thing, trial)
         carrying = {number for other in arrangement.objects for number in planes_under(other, thing.name)}
-        if not inside or not carrying <= set(planes) or solid.conflict(shape, CLEAR, without=own) is not None:
+        if not inside or not carrying <= set(planes) or solid.conflict(shape, CLEAR, without=may_touch) is not None:
             continue
         renumbered[thing.name] = planes
         solid.add(thing.name, shape)
@@ -83,18 +87,18 @@ def planes_kept(shut: PlacedObject, opened: PlacedObject) -> dict[int, int]:
     """Return index -> index: the surfaces of a thing that stands shut, among those that it has opened."""
     after = opened.furnishing.surfaces
     return {
-        k: other
+        k: opened_index
         for k, plane in enumerate(shut.furnishing.surfaces)
-        for other, candidate in enumerate(after)
+        for opened_index, candidate in enumerate(after)
         if same_plane(plane, candidate)
     }
 
 
 def planes_under(thing: PlacedObject, carrier: str) -> list[int]:
     """Return the indices of the carrier's surfaces that a thing stands on or touches."""
-    own = [thing.plane] if thing.parent == carrier else []
-    more = [entry.plane for entry in thing.further if entry.source == carrier]
-    return [plane for plane in (*own, *more) if plane is not None]
+    main_planes = [thing.plane] if thing.parent == carrier else []
+    further_planes = [entry.plane for entry in thing.further if entry.source == carrier]
+    return [plane for plane in (*main_planes, *further_planes) if plane is not None]
 
 
 def carried_as_numbered(thing: PlacedObject, numbers: Mapping[str, Mapping[int, int]]) -> PlacedObject:

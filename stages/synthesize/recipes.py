@@ -109,8 +109,8 @@ def rescaled(recipe: Recipe, share: float) -> Recipe:
     if not share:
         return recipe
     places = [
-        place.model_copy(update={"scale": (place.scale[0] * (1.0 - share), place.scale[1] * (1.0 + share))})
-        for place in recipe.place
+        rule.model_copy(update={"scale": (rule.scale[0] * (1.0 - share), rule.scale[1] * (1.0 + share))})
+        for rule in recipe.place
     ]
     return recipe.model_copy(update={"place": tuple(places)})
 

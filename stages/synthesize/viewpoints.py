@@ -142,8 +142,8 @@ def _surface_samples(
     soup = renderer.soup
     edges = np.cross(soup.corners[:, 1] - soup.corners[:, 0], soup.corners[:, 2] - soup.corners[:, 0])
     area = 0.5 * np.linalg.norm(edges, axis=1).astype(np.float64)
-    whole = np.bincount(soup.instance, weights=area)
-    share = area / np.sqrt(whole[soup.instance])
+    instance_area = np.bincount(soup.instance, weights=area)
+    share = area / np.sqrt(instance_area[soup.instance])
     pick = random.choice(len(area), SAMPLES, p=share / share.sum())
     u, v = np.sqrt(random.random(SAMPLES)), random.random(SAMPLES)
     corners = soup.corners[pick].astype(np.float64)
@@ -171,9 +171,9 @@ def _seen(renderer: SceneRenderer, camera: Camera, view: View, points: np.ndarra
     rows = np.flatnonzero(inside)
     lifted = points[rows] + 2e-3 * normals[rows]
     blocked = renderer.occluded(lifted, np.broadcast_to(view.eye, lifted.shape))
-    seen = np.zeros(len(points), dtype=bool)
-    seen[rows[~blocked]] = True
-    return seen
+    is_visible = np.zeros(len(points), dtype=bool)
+    is_visible[rows[~blocked]] = True
+    return is_visible
 
 
 def choose_views(
@@ -203,15 +203,15 @@ def choose_views(
         # A sensor in the hand looks a little down, and never steeper than this.
         target[2] = np.clip(target[2], eye[2] - 1.2 * flat, eye[2] - 0.1 * flat)
         candidates.append(View(eye, target))
-    seen = np.array([_seen(renderer, camera, view, points, normals) for view in candidates])
-    overview = int(np.argmax(seen @ weight))
-    missing &= ~seen[overview]
+    visible = np.array([_seen(renderer, camera, view, points, normals) for view in candidates])
+    overview = int(np.argmax(visible @ weight))
+    missing &= ~visible[overview]
     chosen = [candidates[overview], *required]
     for _ in range(extra):
-        gain = (seen & missing) @ weight
+        gain = (visible & missing) @ weight
         best = int(np.argmax(gain))
         if gain[best] < 0.006 * weight.sum():
             break
         chosen.append(candidates[best])
-        missing &= ~seen[best]
+        missing &= ~visible[best]
     return chosen

@@ -139,8 +139,8 @@ def contradictions(annotation: SupportAnnotation) -> Iterator[str]:
 
 def _repeated(values: Iterable[str | int]) -> list[str | int]:
     """Values that come a second time, in order."""
-    seen: set[str | int] = set()
-    return [value for value in values if value in seen or seen.add(value)]  # type: ignore[func-returns-value]
+    earlier: set[str | int] = set()
+    return [value for value in values if value in earlier or earlier.add(value)]  # type: ignore[func-returns-value]
 
 
 def _circle(carriers: dict[str, tuple[str, ...]]) -> str | None:

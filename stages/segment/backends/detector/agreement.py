@@ -50,10 +50,10 @@ def witnessed(
     names = {entry.name for entry in known.values()}
     for thing in things:
         kind = next((kind for kind in SAME_KIND if thing.semantic.name in kind), {thing.semantic.name})
-        seen = np.bincount(classes[thing.mask], minlength=256)
-        pixels = int(seen.sum())
-        confirming = sum(int(seen[number]) for number, entry in known.items() if entry.name in kind)
-        contradicting = sum(int(seen[number]) for number, entry in known.items() if entry.name not in kind)
+        class_pixels = np.bincount(classes[thing.mask], minlength=256)
+        pixels = int(class_pixels.sum())
+        confirming = sum(int(class_pixels[number]) for number, entry in known.items() if entry.name in kind)
+        contradicting = sum(int(class_pixels[number]) for number, entry in known.items() if entry.name not in kind)
         witness = pixels >= LEAST_SHARE * classes.size
         if witness and confirming >= CONFIRMING_SHARE * pixels:
             yield replace(thing, score=max(thing.score, SURE))

@@ -129,19 +129,19 @@ def merge_duplicates(things: list[Thing]) -> list[Thing]:
     boxed twice): it gets the union. Of two classes for nearly the same mask the better scored stays, but any class
     goes before `object`, which is what is left of a detection of impossible size.
     """
-    kept: list[Thing] = []
+    merged: list[Thing] = []
     for item in sorted(things, key=lambda thing: (thing.semantic.name == UNNAMED, -thing.score)):
-        for index, other in enumerate(kept):
-            shared = int((item.mask & other.mask).sum())
-            smaller, union = min(item.mask.sum(), other.mask.sum()), (item.mask | other.mask).sum()
-            if item.semantic.id == other.semantic.id and shared > DUPLICATE_OVERLAP * smaller:
-                kept[index] = Thing(other.semantic, other.score, other.mask | item.mask)
+        for index, larger in enumerate(merged):
+            shared = int((item.mask & larger.mask).sum())
+            smaller, union = min(item.mask.sum(), larger.mask.sum()), (item.mask | larger.mask).sum()
+            if item.semantic.id == larger.semantic.id and shared > DUPLICATE_OVERLAP * smaller:
+                merged[index] = Thing(larger.semantic, larger.score, larger.mask | item.mask)
                 break
             if shared > 0.6 * union:
                 break
         else:
-            kept.append(item)
-    return kept
+            merged.append(item)
+    return merged
 
 
 def paint(
@@ -174,13 +174,13 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
             hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
         )
     label = f"detector {request.weights.stem} + geometric segments"
-    witness, heard = None, parameters.score_threshold
+    witness, score_threshold = None, parameters.score_threshold
     if request.semantic_weights is not None:
-        witness, heard = SemanticSegmenter(request.semantic_weights), HEARD * parameters.score_threshold
+        witness, score_threshold = SemanticSegmenter(request.semantic_weights), HEARD * parameters.score_threshold
         label = f"detector {request.weights.stem}, witnessed by {request.semantic_weights.stem}, + geometric segments"
     detector = Detector(
         request.weights,
-        score_threshold=heard,
+        score_threshold=score_threshold,
         suppression_overlap=parameters.suppression_overlap,
         tile_side=min(reader.camera.width, reader.camera.height) if request.own(DetectorParameters).tiles else 0,
     )

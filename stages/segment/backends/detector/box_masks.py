@@ -75,13 +75,13 @@ def box_mask(
     foreground = np.zeros(labels.shape, dtype=bool)
     for label in np.flatnonzero(inside):
         share = inside[label] / geometry.segment_pixels[label]
-        own = available & (labels == label)
+        of_label = available & (labels == label)
         if label and (
             share >= INSIDE_SHARE or (large_face and share >= SURFACE_SHARE and inside[label] > 0.2 * labels.size)
         ):
-            foreground |= own
+            foreground |= of_label
         elif inside[label] >= 0.03 * labels.size:
-            foreground |= own & _over_support(int(label), (x0, y0, x1, y1), geometry)
+            foreground |= of_label & _over_support(int(label), (x0, y0, x1, y1), geometry)
     if flat_topped and geometry.world_points is not None:
         foreground &= ~_not_of_table(foreground, window, geometry)
     if foreground.any():

@@ -63,15 +63,15 @@ class SemanticSegmenter:
         try:
             self._interpreter: Any = runtime.Interpreter(str(weights), num_threads=1)
             self._interpreter.allocate_tensors()
-            (given,), (result,) = self._interpreter.get_input_details(), self._interpreter.get_output_details()
+            (input_tensor,), (result,) = self._interpreter.get_input_details(), self._interpreter.get_output_details()
         except (ValueError, RuntimeError) as error:
             reason = (str(error).splitlines() or [""])[0][:120]
             raise BadInput(f"{weights.name} is no TensorFlow Lite network: {reason}", hint=HINT) from None
-        shape, classes = tuple(given["shape"]), tuple(result["shape"])
-        pictures = len(shape) == 4 and shape[0] == 1 and shape[3] == 3 and given["dtype"] == np.uint8
+        shape, classes = tuple(input_tensor["shape"]), tuple(result["shape"])
+        pictures = len(shape) == 4 and shape[0] == 1 and shape[3] == 3 and input_tensor["dtype"] == np.uint8
         if not pictures or len(classes) != 3 or classes[0] != 1 or result["dtype"] not in (np.int64, np.int32):
             raise BadInput(f"{weights.name} does not take pictures (uint8) and give out classes", hint=HINT)
-        self._given, self._result = given["index"], result["index"]
+        self._given, self._result = input_tensor["index"], result["index"]
         self._size = (int(shape[2]), int(shape[1]))
 
     def classify(self, color: np.ndarray) -> np.ndarray:

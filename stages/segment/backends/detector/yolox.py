@@ -113,8 +113,8 @@ class Detector:
         if self.tile_side:
             windows += [self._detect_window(color, window) for window in tile_windows(width, height, self.tile_side)]
         boxes, scores, classes = (np.concatenate([part[k] for part in windows]) for k in range(3))
-        kept = suppress(boxes, scores, classes, self.suppression_overlap)
-        return Detections(boxes[kept], scores[kept], classes[kept])
+        unsuppressed = suppress(boxes, scores, classes, self.suppression_overlap)
+        return Detections(boxes[unsuppressed], scores[unsuppressed], classes[unsuppressed])
 
     def _detect_window(
         self, color: np.ndarray, window: tuple[int, int, int, int]

@@ -100,11 +100,11 @@ def find_centres(heat: np.ndarray, allowed: np.ndarray, settings: GroupingSettin
     (h, w) bool): the centre of a ring lies beside it.
     """
     window = np.ones((settings.peak_window, settings.peak_window), np.uint8)
-    near = cv2.dilate(allowed.astype(np.uint8), window) > 0
-    peak = (heat >= cv2.dilate(heat, window)) & (heat > settings.centre_threshold) & near
-    found = np.argwhere(peak)
+    near_allowed = cv2.dilate(allowed.astype(np.uint8), window) > 0
+    peak = (heat >= cv2.dilate(heat, window)) & (heat > settings.centre_threshold) & near_allowed
+    peaks = np.argwhere(peak)
     order = np.argsort(-heat[peak], kind="stable")[: settings.largest_number]
-    return found[order]
+    return peaks[order]
 
 
 @njit(cache=True)
@@ -158,9 +158,9 @@ def raise_to_depth(coarse: np.ndarray, coarse_depth: np.ndarray, depth: np.ndarr
                 for du in range(2):
                     column = min(columns - 1, max(0, low_column + du))
                     cost = abs(row - y) + abs(column - x)
-                    there = coarse_depth[row, column]
-                    if z > 0 and there > 0:
-                        cost += min(4.0, abs(there - z) / (0.02 * z))
+                    coarse_z = coarse_depth[row, column]
+                    if z > 0 and coarse_z > 0:
+                        cost += min(4.0, abs(coarse_z - z) / (0.02 * z))
                     if cost < best:
                         best = cost
                         result[v, u] = coarse[row, column]

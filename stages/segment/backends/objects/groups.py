@@ -109,10 +109,10 @@ def _candidate(a: int, b: int, sums: np.ndarray, borders: np.ndarray, boxes: np.
 @njit(cache=True)
 def _own_behind(hull: np.ndarray, k: int, sums: np.ndarray, groups: np.ndarray, inverse: np.ndarray) -> float:
     plane, residual = inverse_plane(sums[k])
-    own, hidden, missing, behind = hull_content(
+    covered, hidden, missing, behind = hull_content(
         hull, groups, inverse, k, k, plane, HIDING_MARGIN + 2 * residual, CONTENT_STEP
     )
-    return behind / max(1.0, own + hidden + missing + behind)
+    return behind / max(1.0, covered + hidden + missing + behind)
 
 
 @njit(cache=True)

@@ -112,19 +112,21 @@ def find_supports(depth: np.ndarray, camera: Camera, settings: SupportSettings) 
     xs, ys = x[::SAMPLE_STEP][columns].astype(np.float64), y[::SAMPLE_STEP][rows].astype(np.float64)
     design = np.stack([np.ones_like(xs), xs, ys, xs * xs, xs * ys, ys * ys], axis=1)
     pixel_area = SAMPLE_STEP**2 / (camera.fx * camera.fy)
-    rest = np.ones(len(inverse), dtype=bool)
+    unexplained = np.ones(len(inverse), dtype=bool)
     surfaces: list[SupportSurface] = []
     for _ in range(settings.surfaces):
-        plane = _best_plane(design[rest], inverse[rest], settings.thickness, 1 / inverse[rest] ** 2)
+        plane = _best_plane(
+            design[unexplained], inverse[unexplained], settings.thickness, 1 / inverse[unexplained] ** 2
+        )
         if plane is None or np.linalg.norm(plane) < 1e-6:
             break
         coefficients = np.concatenate([plane, np.zeros(3)])
-        inside = rest & (np.abs(design @ coefficients - inverse) < settings.thickness)
+        inside = unexplained & (np.abs(design @ coefficients - inverse) < settings.thickness)
         for _ in range(REFITS):
             if np.count_nonzero(inside) < 30:
                 break
             coefficients = _fitted(design[inside], inverse[inside])
-            inside = rest & (np.abs(design @ coefficients - inverse) < settings.thickness)
+            inside = unexplained & (np.abs(design @ coefficients - inverse) < settings.thickness)
         if np.count_nonzero(inside) < 30:
             break
         plane = _fitted(design[inside][:, :3], inverse[inside])
@@ -136,8 +138,8 @@ def find_supports(depth: np.ndarray, camera: Camera, settings: SupportSettings) 
         if area < settings.area * (1.0 if surfaces else 0.25):
             break
         surfaces.append(SupportSurface(coefficients, normal, 1.0 / length, area))
-        rest &= design @ coefficients - inverse > -settings.clearance
-        rest &= ~inside
+        unexplained &= design @ coefficients - inverse > -settings.clearance
+        unexplained &= ~inside
     return sorted(surfaces, key=lambda surface: -surface.area)
 
 

@@ -72,12 +72,12 @@ class OnnxBackend:
                 score_threshold=self._threshold,
                 stuff=self._labels.stuff(),
             )
-            named = {
+            named_segments = {
                 segment: NamedSegment(self._labels.labels[number], score)
                 for segment, (number, score) in segments.items()
                 if number in self._labels.labels
             }
-            return name_segments(ids, named, self._vocabulary, minimum_pixels=least)
+            return name_segments(ids, named_segments, self._vocabulary, minimum_pixels=least)
         if self._network.sidecar.layout == "yolo-seg":
             things = decoding.yolo_seg(
                 outputs["predictions"],
@@ -113,17 +113,17 @@ def _label_map(network: Network, given: LabelSet | None) -> LabelMap:
     if not sidecar.labels and (names := network.names()):
         return _warned(match_labels(names, given, where=name), name)
     count = class_count(network)
-    wanted = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
-    if not wanted:
+    set_name = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
+    if not set_name:
         raise BadInput(f"{name}: nothing says what its {count} classes are", hint=f"{HINT}: labels = [...]")
-    labels = load_label_set(wanted)
+    labels = load_label_set(set_name)
     if not sidecar.labels:
-        logger.info("%s: %d classes, taken for %s in its order", name, count, wanted)
+        logger.info("%s: %d classes, taken for %s in its order", name, count, set_name)
     if sidecar.numbering == "id":
         names = {label.id: label.name for label in labels.labels if label.id is not None}
     else:
         if count is not None and count != len(labels.labels):
-            raise BadInput(f"{name}: has {count} classes, {wanted} has {len(labels.labels)}", hint=HINT)
+            raise BadInput(f"{name}: has {count} classes, {set_name} has {len(labels.labels)}", hint=HINT)
         names = {number: label.name for number, label in enumerate(labels.labels)}
     return _warned(match_labels(names, given or labels, where=name), name)
 

@@ -49,13 +49,13 @@ def yolo_seg(
     order = np.flatnonzero(sound)[np.argsort(-best[sound], kind="stable")][:MOST_CANDIDATES]
     half = np.maximum(rows[order, 2:4], 0) / 2
     boxes = np.concatenate([rows[order, :2] - half, rows[order, :2] + half], axis=1)
-    kept = suppress(boxes, best[order], numbers[order], suppression_overlap)
+    unsuppressed = suppress(boxes, best[order], numbers[order], suppression_overlap)
     input_height, input_width = fitted.tensor.shape[-2:]
     things = []
-    for k in kept:
+    for k in unsuppressed:
         logits = np.tensordot(rows[order[k], -count:], prototypes[0].astype(np.float32), axes=1)
-        whole = cv2.resize(logits, (input_width, input_height), interpolation=cv2.INTER_LINEAR)
-        mask = _to_image(whole, fitted, shape) > 0
+        input_logits = cv2.resize(logits, (input_width, input_height), interpolation=cv2.INTER_LINEAR)
+        mask = _to_image(input_logits, fitted, shape) > 0
         x0, y0, x1, y1 = _scaled(boxes[k], fitted)
         things.append(Found(mask & _inside(x0, y0, x1, y1, shape), int(numbers[order[k]]), _unit(best[order[k]])))
     return things
@@ -111,26 +111,26 @@ def panoptic(
     probability = odds / odds.sum(axis=1, keepdims=True)
     numbers = probability.argmax(axis=1)
     scores = probability.max(axis=1)
-    kept = np.flatnonzero((numbers < probability.shape[1] - 1) & (scores >= score_threshold))
+    queries = np.flatnonzero((numbers < probability.shape[1] - 1) & (scores >= score_threshold))
     ids = np.zeros(shape, dtype=np.int32)
     segments: dict[int, tuple[int, float]] = {}
-    if not len(kept):
+    if not len(queries):
         return ids, segments
     height, width = fitted.tensor.shape[-2:]
-    whole = np.stack(
+    mask_probabilities = np.stack(
         [
             _sigmoid(
                 _to_image(cv2.resize(np.nan_to_num(masks[0, k].astype(np.float32)), (width, height)), fitted, shape)
             )
-            for k in kept
+            for k in queries
         ]
     )
-    winner = (whole * scores[kept, None, None]).argmax(axis=0)
+    winner = (mask_probabilities * scores[queries, None, None]).argmax(axis=0)
     fused: dict[int, int] = {}
-    for position, k in enumerate(kept):
-        own = whole[position] >= MASK_THRESHOLD
-        pixels = (winner == position) & own
-        if pixels.sum() <= OVERLAP_SHARE * own.sum():
+    for position, k in enumerate(queries):
+        of_query = mask_probabilities[position] >= MASK_THRESHOLD
+        pixels = (winner == position) & of_query
+        if pixels.sum() <= OVERLAP_SHARE * of_query.sum():
             continue
         number, score = int(numbers[k]), float(scores[k])
         target = fused.setdefault(number, len(segments) + 1) if number in stuff else len(segments) + 1

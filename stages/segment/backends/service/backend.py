@@ -42,12 +42,12 @@ class ServiceBackend:
 
     def __init__(self, request: BackendRequest) -> None:
         sequence, self._reader = request.log()
-        own, vocabulary = request.own(ServiceParameters), load_vocabulary()
+        options, vocabulary = request.own(ServiceParameters), load_vocabulary()
         labels = read_label_file(request.labels) if request.labels else None
-        connection = connected(request.parameters.backend, own)
+        connection = connected(request.parameters.backend, options)
         self._connection, self._vocabulary = connection, vocabulary
         self._seed, self._minimum_pixels = request.seed, request.parameters.small_object_pixels
-        expected = own.service_model
+        expected = options.service_model
         self.info = read_info(connection)
         if expected and self.info.identity != expected:
             raise BadInput(
@@ -108,12 +108,12 @@ class ServiceBackend:
         segments = {k + 1: reply.segments[number] for k, number in enumerate(numbers)}
         if self._speaks_ours:
             return PanopticFrame(ids, {k: PanopticMask(s.class_id, s.is_thing, s.score) for k, s in segments.items()})
-        named = {
+        named_segments = {
             k: NamedSegment(self._labels[s.class_id], s.score)
             for k, s in segments.items()
             if s.class_id in self._labels
         }
-        return name_segments(ids, named, self._vocabulary, minimum_pixels=self._minimum_pixels)
+        return name_segments(ids, named_segments, self._vocabulary, minimum_pixels=self._minimum_pixels)
 
 
 def connected(address: str, own: ServiceParameters) -> Connection:

@@ -22,9 +22,9 @@ logger = logging.getLogger("scenewright")
 
 def cache_folder() -> Path:
     """Return the folder; it need not exist yet."""
-    given = os.environ.get(ENVIRONMENT)
-    if given:
-        return Path(given)
+    environment_value = os.environ.get(ENVIRONMENT)
+    if environment_value:
+        return Path(environment_value)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "scenewright" / "replies"
 
 

@@ -59,10 +59,10 @@ def open_source(listing: Listing) -> MaskSource | None:
 def _arrays(path: Path) -> set[str]:
     """Return the arrays of a file that are read here. Raises BadInput when they claim more than is held at a time."""
     with zip_errors(path, HINT), zipfile.ZipFile(path) as archive:
-        wanted = [row for row in archive.infolist() if row.filename.removesuffix(".npy") in NAMES]
-        if sum(row.file_size for row in wanted) > LARGEST_FILE:
+        rows = [row for row in archive.infolist() if row.filename.removesuffix(".npy") in NAMES]
+        if sum(row.file_size for row in rows) > LARGEST_FILE:
             raise BadInput(f"unpacks to more than {LARGEST_FILE} bytes", hint="write one file a picture")
-        have = {row.filename.removesuffix(".npy") for row in wanted}
+        have = {row.filename.removesuffix(".npy") for row in rows}
     if ("masks" in have) == ("ids" in have):
         raise BadInput(f"{path}: needs either `masks` (N, H, W) or `ids` (H, W)", hint=HINT)
     return have
@@ -98,8 +98,8 @@ def _read(
     missing = sorted(set(present) - set(listed.tolist()))
     if missing:
         raise BadInput(f"{path}: nothing says what id {missing[0]} is ({len(missing)} such ids)", hint=HINT)
-    told = _told(path, arrays, len(listed), numbers)
-    return GivenFrame(ids, dict(zip(listed.tolist(), told, strict=True)))
+    masks = _told(path, arrays, len(listed), numbers)
+    return GivenFrame(ids, dict(zip(listed.tolist(), masks, strict=True)))
 
 
 def _told(path: Path, arrays: dict[str, np.ndarray], count: int, numbers: dict[str, int]) -> list[GivenMask]:
@@ -111,15 +111,15 @@ def _told(path: Path, arrays: dict[str, np.ndarray], count: int, numbers: dict[s
         raise BadInput(f"{path}: `classes` is {classes.dtype}, not integers or text", hint=HINT)
     if scores is not None and scores.dtype.kind not in "uif":
         raise BadInput(f"{path}: `scores` is {scores.dtype}, not numbers", hint=HINT)
-    told = []
+    masks = []
     for k in range(count):
         category = (
             None if classes is None else numbers.get(str(classes[k])) if classes.dtype.kind == "U" else int(classes[k])
         )
         # The shortest number that rounds to the same 32 bits: 0.9 stays 0.9, as the other formats have it.
         score = 1.0 if scores is None else score_of(float(str(scores[k])), str(path))
-        told.append(GivenMask(category, score))
-    return told
+        masks.append(GivenMask(category, score))
+    return masks
 
 
 FORMAT = MaskFormat("NPZ stacks", "`masks` (N, H, W) or `ids` (H, W), a file a picture", 40, open_source)
