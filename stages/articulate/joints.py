@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 PLANE = 0.015
 """Points so near to a plane are of it [m]."""
 LEAST_SHARE, MOST_PLANES = 0.06, 6
+"""Least share of a state's points in a face, and most faces of a state; by eye."""
 LEAST_AREA = 0.015
 """A face smaller than this is no leaf [m^2]."""
 GRID = 0.02
@@ -33,7 +34,7 @@ NEAR = 0.04
 PARALLEL, SQUARE = np.radians(10.0), np.radians(12.0)
 """Planes that slide into each other are parallel up to the first; those that turn differ by the second or more."""
 LEAST_SLIDE = 0.04
-"""[m]"""
+"""Least way of a drawer [m]."""
 HINGE = 0.25
 """The hinge is at most so far from the leaf's edge, in that state in which more of it was seen [m]."""
 MOST_STAYS = 0.4
@@ -41,7 +42,7 @@ MOST_STAYS = 0.4
 FARTHEST = 1.5
 """The middle of a leaf moves at most so far [m]."""
 LEAST_ARM = 0.02
-"""[m]"""
+"""Least distance of a leaf's middle from its axis [m]."""
 EXPLAINED = 0.3
 """A region of which a joint explains this share changed by it."""
 PIECE = 0.1

@@ -25,7 +25,7 @@ from scenewright.stages.kit.stage import Context, Progress
 from scipy import ndimage
 
 MOST_VOXELS = 20_000_000
-"""Above this the voxels are made larger."""
+"""Most voxels of the grid; above this they are made larger."""
 OUTLIERS = 0.5
 """Percentile of the seen points, at either end, that the grid leaves out."""
 SMALLEST_REGION = 20
@@ -33,6 +33,7 @@ SMALLEST_REGION = 20
 AGREED = 90
 """Percentile of the last frames that show what a region was: some voxels are noisy."""
 NEVER = 1_000_000_000
+"""Stands for the number of a frame after all others."""
 FITTING = 1
 """Random stream."""
 

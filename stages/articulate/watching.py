@@ -86,8 +86,8 @@ class Watched:
 
     def cells(self, points: np.ndarray) -> np.ndarray:
         """Return the cells (N, 3) of points (N, 3) [m], those outside moved to the nearest inside."""
-        cells = np.floor((points - self.origin) / self.edge).astype(int)
-        return np.asarray(np.clip(cells, 0, np.array(self.shape) - 1))
+        indices = np.floor((points - self.origin) / self.edge).astype(int)
+        return np.asarray(np.clip(indices, 0, np.array(self.shape) - 1))
 
     @property
     def moved_away(self) -> np.ndarray:

@@ -12,7 +12,7 @@ from numba import njit
 from scenewright.stages.cad.matching import CUBE_ROTATIONS, Match
 
 STEP = 1e-6
-"""Of the forward difference (the released code's)."""
+"""Step of the forward difference (the released code's)."""
 
 
 @dataclass(frozen=True)

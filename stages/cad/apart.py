@@ -25,7 +25,7 @@ from scenewright.stages.kit.geometry.convex_solids import Solid
 SHRINKING = (0.97, 0.94, 0.9)
 """Scales that are tried, as shares of the fitted one, for what is nowhere free."""
 FAR = 2.5
-"""What is free nowhere near is looked for so many times farther away."""
+"""How many times farther away a free place is looked for where there is none near."""
 CLOSING = (0.8, 0.5, 0.0)
 """Joint values that are tried, as shares of the fitted ones."""
 

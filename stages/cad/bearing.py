@@ -12,10 +12,12 @@ from scenewright.stages.kit.geometry.boxes import footprint
 REACH = 0.005
 """Surface this near below a point bears it [m]."""
 SPREAD = 0.6
-"""Where a thing is asked whether it is borne: its middle, and its corners drawn in to this share."""
+"""Share to which the corners of a thing's footprint are drawn in; there and in its middle it is asked whether it is
+borne."""
 STEP = 0.01
+"""Distance between two shifts that are tried [m]; by eye."""
 FARTHEST = 0.3
-"""[m]"""
+"""Longest shift towards the middle of the plane [m]."""
 
 
 def borne_share(parent: Placement, surface: ModelSurface, box: Box, height: float) -> float:

@@ -13,9 +13,9 @@ from scenewright.stages.cad.carcasses import Cells
 STRAIGHT = 0.95
 """Cosine from which on a leaf that was seen lies in a side of the carcass."""
 REACH = 0.05
-"""... so near [m]."""
+"""Largest distance between a leaf and the side of the carcass that it closes [m]."""
 THICKNESS, RIM, BOARD = 0.02, 0.015, 0.012
-"""Of a leaf; what of the opening it covers all around; of a drawer's boards [m]."""
+"""Thickness of a leaf, what it covers of the carcass around its opening, and thickness of a drawer's boards [m]."""
 DEEPEST, BEHIND = 0.55, 0.02
 """An opening is so deep at most, and leaves so much of the carcass [m]."""
 LEAST_DEPTH = 0.1

@@ -39,9 +39,9 @@ BUILT_IN = frozenset(
 )
 """Classes that are built of boards and fronts and stay where they are, and what has no name."""
 LEAST_EDGE = 0.5
-"""Of the longest edge [m]: smaller things are not built in (and nameless ones may be movable)."""
+"""Least length of the longest edge [m]: smaller things are not built in (and nameless ones may be movable)."""
 NEAR = 0.03
-"""What lies so near to a surface that faces its way is explained [m]."""
+"""Largest distance from a surface that faces its way at which surface is explained [m]."""
 EXPLAINED = 0.75
 """Share of what was seen that a built-in explains."""
 LEVEL_KEPT, SAME_LEVEL = 0.9, 0.02
@@ -52,6 +52,7 @@ boards, which hardly a camera sees, are guessed."""
 LEAST_LEVEL = 0.05
 """Less surface that looks up is no place to put things on [m²]."""
 MOST_BOXES = 60
+"""A carcass of more boxes is no piece of furniture; by eye."""
 TRUNCATION = 0.1
 """Distances are cut off here when a built-in is compared with the box [m]."""
 STRAYS = 0.005
@@ -59,8 +60,9 @@ STRAYS = 0.005
 FEWEST = 20
 """Patches of surface without which nothing can be said."""
 SPACING = 0.05
-"""Of points at which a built-in's surface is held against seen space [m]."""
+"""Distance between the points at which a built-in's surface is held against seen space [m]."""
 BODY, GREY = "body", (150, 150, 150)
+"""Name of the part that does not move, and its colour (sRGB) where none was seen."""
 
 
 @dataclass(frozen=True)

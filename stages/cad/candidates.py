@@ -15,6 +15,7 @@ from scenewright.stages.kit.geometry.boxes import points_in_box
 from scenewright.stages.kit.geometry.point_clouds import thin_to_grid
 
 GRID = 0.01
+"""Distance to which vertices are thinned out [m]; by eye."""
 BOX_MARGIN = 0.01
 """Vertices outside the observed box by more than this were stray to the graph and are so here [m]."""
 SAME_PLACE = (0.01, 0.03)

@@ -25,7 +25,8 @@ EDGE = 0.025
 ACROSS = 0.8
 """Surface lies across an axis from this cosine of its normal on."""
 BIN, CLOSEST, THIN = 0.01, 0.03, 0.012
-"""Of the histogram in which flat places are sought; how close two cuts may be, and the two sides of a board [m]."""
+"""Bin of the histogram in which flat places are sought, least distance of two cuts, and of the two sides of a board
+[m]."""
 LEAST_FLAT, FLAT_SHARE = 0.02, 0.04
 """A flat place has so much surface [m²], and this share of what faces the same way."""
 EDGE_BIN, EDGE_SHARE, LEAST_GAP = 0.03, 0.3, 0.12
@@ -35,15 +36,16 @@ YAW_BINS, YAW_REACH, YAW_ROUNDS = 45, math.radians(60.0), 5
 """Turns are counted in steps of two degrees; fronts within a quarter of this of the most frequent one say which it is,
 in so many rounds."""
 WALL = 0.02
-"""Of a cabinet that was seen from inside, where it was not from outside [m]."""
+"""Thickness of a cabinet's wall that was seen from inside and not from outside [m]."""
 BOARD = 0.04
-"""Below a level top a cut for its underside is offered: boards are about so thick, and rarely seen from below [m]."""
+"""Distance below a level top at which a cut for its underside is offered: boards are about so thick, and rarely seen
+from below [m]."""
 SAMPLE = 0.06
 """Distance of the points at which cells are asked whether they were seen to be empty [m]."""
 SEEN_EMPTY = 0.1
-"""So many metres of depth that were seen to be empty are worth one surface."""
+"""Depth that was seen to be empty [m] and is worth as much as surface."""
 SMOOTHNESS = 0.3
-"""What a boundary without surface costs beside what a patch against its side costs, the same area."""
+"""Cost of a boundary without surface beside that of a patch against its side, the same area."""
 CAPACITY = 1e5
 """Units of flow in a square metre."""
 

@@ -11,6 +11,7 @@ from scenewright.stages.kit.formats.numpy_files import read_arrays
 SIDE = 8
 """Voxels along the edge of a block."""
 REACH = 1 << 20
+"""Added to the coordinates of blocks, so that three of 21 bits make one number."""
 LEAST_WEIGHT = 0.5
 """Voxels that were hardly observed are not known to be empty."""
 
@@ -43,6 +44,7 @@ class FreeSpace:
 
 
 NOTHING_KNOWN = FreeSpace(np.zeros(0, dtype=np.int64), np.zeros((0, SIDE**3), dtype=np.float16), 1.0)
+"""The free space of a map that was made without a volume."""
 
 
 def _packed(blocks: np.ndarray) -> np.ndarray:

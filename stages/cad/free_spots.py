@@ -14,7 +14,7 @@ DIRECTIONS = 16
 STEPS = (0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.13, 0.16, 0.2)
 """Distances that are tried [m], up to the largest that is allowed."""
 CLEARANCE = 0.0005
-"""What is pushed out of a contact ends up this far from it [m]."""
+"""Distance at which what is pushed out of a contact ends up [m]."""
 
 
 @dataclass(frozen=True)

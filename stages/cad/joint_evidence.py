@@ -31,7 +31,7 @@ does not fit opens its doors where that brings them nearer to anything."""
 LEAST_OPEN = 0.25
 """Share of an open part's surface at which the map shows something (the inside of a drawer is hardly seen)."""
 REACH = 0.03
-"""... so near [m]."""
+"""Largest distance from the map at which a point of an open part counts as seen [m]."""
 
 
 @dataclass(frozen=True)

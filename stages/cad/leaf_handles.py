@@ -19,7 +19,7 @@ NARROW = 0.09
 LEAST_FLAT, MOST_NOISE = 0.75, 0.008
 """A leaf is flat: this share of it lies on one plane, with no more noise than this [m]."""
 LEAST_SEEN, CELL = 0.35, 0.03
-"""So much of it was seen, counted in cells of this edge [m]."""
+"""Least share of a leaf that was seen, counted in cells of this edge [m]."""
 
 
 def handle_height(leaf: Leaf, seen: Seen) -> float | None:

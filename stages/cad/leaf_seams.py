@@ -16,7 +16,7 @@ FEWEST = 3
 DARKER, DEEPER = 10.0, 0.004
 """A seam is darker than both sides by as much (sRGB, 0 to 255), or deeper [m]."""
 SEEN, ALONG = 0.5, 0.7
-"""Such a share of the edge's pieces was seen, and of those such a share shows the seam."""
+"""Least share of an edge's pieces that was seen, and of those the least share that shows the seam."""
 
 
 def seam_contrast(leaf: Leaf, seen: Seen) -> float | None:

@@ -20,9 +20,9 @@ LEVEL_BIN = 0.01
 LEAST_FACE = 0.3
 """A face of a part has this share of its largest face's area; the outermost of them is the leaf."""
 BEFORE, BEHIND = 0.12, 0.08
-"""What the map shows so far before and behind a leaf is looked at [m]."""
+"""How far before and behind a leaf the map is looked at [m]."""
 RIM, BESIDE = 0.01, 0.07
-"""What lies so far beside it is of it; what lies so far is its neighbourhood, where seams are looked for [m]."""
+"""How far beside a leaf surface is still of it, and how far its neighbourhood goes, where seams are looked for [m]."""
 FLATNESS = 0.012
 """Farther from the plane of the front is not of it [m]."""
 FEWEST = 30

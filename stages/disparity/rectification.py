@@ -17,6 +17,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 
 FEATURES = 1500
+"""Most SIFT features of an image; by eye."""
 MATCH_RATIO = 0.8
 """The best match must be this much nearer than the second (Lowe, IJCV 2004, section 7.1)."""
 LARGEST_ROW_SHARE = 0.05
@@ -26,6 +27,7 @@ LEAST_MATCHES = 40
 INLIER_ROWS = 1.5
 """Rows [px] within which a match agrees with a fitted turn."""
 ITERATIONS = 20
+"""Steps of reweighted least squares; by eye."""
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from scenewright.stages.evaluate.model_shapes import ModelShape, PlacedShape, su
 from scipy.spatial import cKDTree
 
 SIZE_RATIO = 0.20
-"""An extent is similar within this share of the true one ..."""
+"""An extent is similar within this share of the true one."""
 SIZE_SLACK = 0.02
-"""... or within this many metres (cups are small)."""
+"""Difference of an extent [m] that is similar whatever its share (cups are small)."""
 SHAPE_DISTANCE = 0.05
 """Shapes are similar up to this mean distance of their surfaces, as a share of the true box's diagonal."""
 COLOR_DIFFERENCE = 20.0

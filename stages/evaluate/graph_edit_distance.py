@@ -17,7 +17,9 @@ from scenewright.schemas.scene_parts import TREE_RELATIONS
 from scipy.optimize import linear_sum_assignment
 
 WRONG_SUPPORT_COST = 2
+"""Edits of a wrong support: the edge goes, and another one comes."""
 EXPANSION_BUDGET = 200_000
+"""Most nodes of the search tree that are expanded; by eye."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from scenewright.stages.kit.measurement.edge_agreement import edge_agreement
 from scenewright.stages.kit.measurement.tables import Table
 
 ANY_CLASS = "any"
+"""Stands for the class where classes do not count."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from scenewright.stages.kit.measurement.panoptic_quality import (
 from scenewright.stages.kit.measurement.tables import Cell, Table
 
 ANY_CLASS = "any"
+"""Stands for the class where classes do not count."""
 NAMELESS = "object"
 """The class of class-agnostic entities."""
 

@@ -63,6 +63,7 @@ HEADLINES = (
     "counts/entities",
     "counts/support_edges",
 )
+"""Figures that the summary of the artifact repeats, where there are any."""
 
 
 @dataclass

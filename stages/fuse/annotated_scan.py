@@ -22,9 +22,11 @@ from scenewright.stages.kit.formats.numpy_files import read_all_arrays, read_arr
 from scenewright.stages.kit.formats.scenenn_annotation import read_annotation
 
 LARGEST_JSON = 2**28
-"""Bytes."""
+"""Most bytes of a JSON file."""
 MOST_FACES = 30_000_000
+"""Most faces of a scan; a guard against what does not fit into memory, by eye."""
 MOST_POINTS = 20_000_000
+"""Most points of a scan without faces; a guard against what does not fit into memory, by eye."""
 HINT = "docs/MASKS.md lists the layouts of labelled meshes"
 NYU40 = (
     "wall",

@@ -23,6 +23,7 @@ from scenewright.stages.kit.stage import Context
 KEPT_FACES = 2_000_000
 """Finer meshes are thinned to one vertex in each cube of --voxel-size."""
 LEVEL = np.cos(np.radians(0.5))
+"""Least cosine between the floor's normal and z for a scan that is left as it is turned: half a degree; by eye."""
 VOID = frozenset(
     {"mirror", "otherstructure", "paper", "picture", "poster", "remove", "unannotated", "undefined", "unknown"}
 )

@@ -14,6 +14,7 @@ from scenewright.stages.fuse.hits import count_hits
 from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VoxelBlocks
 
 LARGEST_VOTE = 32000
+"""Largest lead of a voxel's label: it has 16 bits with a sign."""
 CHUNK = 64
 """Blocks that a thread takes at a time: blocks differ in how much of them is seen, threads in what else they do."""
 
@@ -127,8 +128,11 @@ def _integrate(
 
 
 NO_IMAGE = np.zeros((0, 0, 3), dtype=np.uint8)
+"""Stands for the image of a frame without colour."""
 NO_INDEX = np.zeros((0, 0), dtype=np.uint16)
+"""Stands for the segments of a frame without any."""
 NO_LABELS = np.zeros(1, dtype=np.int32)
+"""Stands for the labels of a frame without segments."""
 
 
 def integrate(

@@ -18,12 +18,13 @@ from scenewright.stages.fuse.merging import Grouping
 from scenewright.stages.fuse.regularization import PairEvidence
 
 SURE_VOTES = 3
-"""From so many predictions on, the leading class of a segment is believed."""
+"""Least predictions with which the leading class of a segment is believed."""
 APART_WEIGHT = 1
-"""How much a frame that saw two things weighs beside one that saw one."""
+"""Weight of a frame that saw two things beside one that saw one."""
 NAMED_SHARE = 0.2
 """A thing is nameless only where the masks that did name it add up to less than this share of all scores."""
 NOTHING = (0, 0)
+"""Class and instance of what belongs to no thing."""
 LEAST_WEIGHT = 2
 """Groups merge from this summed weight on; a single frame decides nothing."""
 

@@ -14,6 +14,7 @@ Pair = tuple[int, int]
 
 
 NONE: Counter[int] = Counter()
+"""The counts of a label that was never seen apart; not to be changed."""
 
 
 class MergedLabels:

@@ -17,7 +17,7 @@ LEAST_THING_SCORE = 0.3
 """Score of the masks of things, averaged over all frame segments that were matched to an entity (0 where no mask was),
 from which on it is kept as one thing."""
 SURE = 0.5
-"""... and over which geometry leaves it alone: most looks saw a thing."""
+"""Score over which geometry leaves a thing alone: most looks saw a thing."""
 
 
 def thing_score(

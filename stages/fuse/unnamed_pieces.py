@@ -24,21 +24,23 @@ FLOOR = 0.06
 LOWEST_TOP, LEAST_TOP_AREA = 0.6, 0.25
 """Height [m] and area [m^2] of a level top on which other things stand; seats are lower."""
 SAME_LEVEL = 0.03
-"""[m]"""
+"""Largest difference in height of points on one level [m]."""
 RISE = 1.5 * SAME_LEVEL
-"""What is higher than this over a level top is not of it; so is what bends away from it a voxel above [m]."""
+"""Height over a level top from which on nothing is part of it [m]; nor is what bends away from it by a voxel."""
 APRON = 0.15
-"""What hangs together with a thing so far under its top is its body [m]."""
+"""Depth under a thing's top from which on what hangs together with it is its body [m]."""
 SHADOW = 0.15
 """Gaps in a level top this wide are of it: what stands there hides it [m]."""
 STACKED_SHARE, STACKED_GAP = 0.5, 0.35
 """Pieces above each other with this share of the smaller footprint in common, and this gap at most [m], are one."""
 TOLD = 0.75
-"""What so many of its views had in a table's masks is of it whatever its shape. A detector's masks took along what
-stands at tables in at most half of the views, true ones a desk's own shelf in nearly all."""
+"""Share of a piece's views in a table's masks from which on it is of the table whatever its shape. A detector's masks
+took along what stands at tables in at most half of the views, true ones a desk's own shelf in nearly all."""
 LEAST_RISE = 0.75
-"""What is so many voxels over a level top is of what lies on it; the highest quarter of that is a voxel over it."""
+"""Height over a level top, in voxels, from which on points are of what lies on it; the highest quarter of that is a
+voxel over it."""
 BENDING_STEPS = 5
+"""Times the bending of a top is fitted anew without its outliers; by eye."""
 FEWEST = 50
 """Vertices of a part that is looked at, and of a thing on a level top."""
 SCRAP_SHARE, SCRAP_DISTANCE = 0.25, 0.1
@@ -50,6 +52,7 @@ TOP = 0.75
 SMALLEST, LEAST_HEIGHT = 0.1, 0.06
 """Extents of a piece [m]."""
 NO_PART = -1
+"""Part of vertices that are in none."""
 
 
 def unnamed_pieces(

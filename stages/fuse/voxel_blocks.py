@@ -11,7 +11,9 @@ import numpy as np
 from numba import njit
 
 SIDE = 8
+"""Voxels along the edge of a block."""
 VOXELS = SIDE**3
+"""Voxels of a block."""
 COORDINATE_LIMIT = 1 << 20
 """Block and voxel coordinates lie within +-2^20: three of them fit into one 64-bit key."""
 AWAY = 1 << 24
@@ -29,6 +31,7 @@ FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "coordinates": (np.int32, (3,)),
     "last_touched": (np.int32, ()),
 }
+"""What a block holds: array -> type and shape per block."""
 
 
 @njit(cache=True, inline="always")

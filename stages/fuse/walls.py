@@ -15,17 +15,18 @@ UPRIGHT = 0.25
 FACING = np.cos(np.radians(15))
 """Cosine to a wall's normal over which surface faces as it does."""
 DIRECTIONS = 72
-"""In which planes are looked for; each is fitted after."""
+"""Directions in which planes of walls are looked for; each plane is fitted after."""
 COLUMN, COLUMN_AREA = 0.15, 0.01
 """Width [m] of upright columns, and the area [m^2] under which nothing was seen in one."""
 THICKNESS = 0.06
-"""What lies no farther from the plane of a wall is the wall: frames, switches, errors of the map [m]."""
+"""Largest distance from the plane of a wall of what is the wall: frames, switches, errors of the map [m]."""
 BEHIND = 1.2
 """How far behind a surface another one is looked for [m]."""
 WITHIN = 0.3
-"""What lies so far behind the plane belongs to the wall: reveals, what shines through [m]."""
+"""Largest distance behind the plane of what belongs to the wall: reveals, what shines through [m]."""
 LEAST_AREA, LEAST_LENGTH, LEAST_HEIGHT = 0.3, 1.0, 1.3
-"""Of a wall: area [m^2], columns in all [m], and the height [m] over the floor that a quarter of them reach."""
+"""Least measures of a wall: area [m^2], columns in all [m], and the height [m] over the floor that a quarter of them
+reach."""
 OPENING = 1.2
 """Narrower gaps between columns belong to the wall: openings, and what hides it [m]."""
 

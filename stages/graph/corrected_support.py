@@ -41,7 +41,7 @@ HIDDEN_TOP_DISTANCE = 0.15
 NAMELESS = "object"
 """Class of things that masks found and nobody named."""
 HIGHEST_FOOT = 0.5
-"""What is farther above furniture does not stand on it [m]: a hood hangs over the hob. Legs on the floor are longer."""
+"""Largest height over furniture of what stands on it [m]: a hood hangs over the hob. Legs on the floor are longer."""
 LEAST_SEAM = 0.2
 """Share of its foot along which a plane must be seen to reach up to an object that is hardly over it."""
 LOWER_CELL = 0.03

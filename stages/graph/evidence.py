@@ -175,7 +175,7 @@ def shared_middle(first: Box, second: Box) -> Vector3 | None:
 
 
 EVERY = 64
-"""Of so many points one is looked up first."""
+"""Every so many points one is looked up first."""
 
 
 class Surfaces:

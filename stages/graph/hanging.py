@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 NEIGHBOURHOOD = 0.5
 """The ceiling over an object is what lies within this ground distance of its middle [m]; the object hides the rest."""
 LEAST_POINTS = 10
+"""With fewer points of the ceiling around, its height is that of the whole ceiling; by eye."""
 
 
 def ceiling_height(ceiling: Entity, at: np.ndarray) -> float | None:

@@ -14,6 +14,7 @@ from scenewright.stages.kit.geometry.planes import PlaneFit, level_plane, plane_
 from scenewright.stages.kit.geometry.point_clouds import clusters
 
 GRAVITY = np.array([0.0, 0.0, -1.0])
+"""Direction of gravity; z is up in every map."""
 CONTAINER_CLASSES = frozenset(
     {"shelf", "bin", "bowl", "box", "sink", "vase", "cup", "backpack", "cabinet", "wall_cabinet"}
 )
@@ -23,7 +24,7 @@ THINNEST_DISTANCE = 0.005
 SAME_HEIGHT = 0.02
 """Horizontal patches of one entity nearer than this in height are one plane."""
 MAXIMUM_TILT = math.radians(10.0)
-"""ours: planes that tilt by more are no supporting planes, although a_th lets 25 degrees pass [rad]."""
+"""Largest tilt of a supporting plane in `ours`, although a_th lets 25 degrees pass [rad]."""
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,11 @@ from scenewright.stages.kit.geometry.point_clouds import without_strays
 Extent = tuple[float, float]
 """Least and largest coordinate [m]."""
 QUARTER = np.pi / 2
+"""A quarter turn [rad]: by so much the sides of a box repeat."""
 UPRIGHT_SLOPE = 0.35
 """A surface whose normal rises by less than this belongs to a side."""
 LEAST_SIDE_POINTS = 30
+"""With fewer points on upright sides a box has no yaw of its own; by eye."""
 BIN = np.radians(2.0)
 """Width of the bins in which side directions are counted [rad]."""
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 LEAST_POINTS = 20
+"""With fewer usable normals no axis is sought; by eye."""
 LEVEL_SHARE = 0.3
-"""Only normals whose level part is longer than this say where the axis is."""
+"""Least level part of a normal that says where the axis is."""
 LEAST_TURN = 0.08
 """The sides must have been seen around a corner: smaller eigenvalue of the spread of their directions, of their sum."""
 LARGEST_MISS = 0.2
@@ -17,8 +18,9 @@ miss by 0.1 to 0.16, faces of a box by 0.2 and more."""
 LEAST_SIDES = 0.3
 """Share of the points that must lie on sides: those of a book are no evidence for its outline."""
 RADIUS_QUANTILE = 0.9
+"""Quantile of the distances from the axis that is the radius; what stands out farther is handle or noise. By eye."""
 HANDLE_REACH = 1.25
-"""What lies farther out than this many radii is no noise of the wall."""
+"""Distance from the axis, in radii, from which on points are no noise of the wall."""
 HANDLE_SHARE = 0.03
 """Share of the points from which on what lies farther out is a handle or a spout."""
 HANDLE_AGREEMENT = 0.8

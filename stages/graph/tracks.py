@@ -14,6 +14,7 @@ CELL = 0.04
 LEAST_SHARE = 0.5
 """Two nodes can be the same when so much of the smaller surface is in the larger one."""
 COORDINATE_LIMIT = 1 << 20
+"""Added to the coordinates of cells, so that three of 21 bits make one number."""
 
 
 def cells_of(points: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ USUAL: dict[str, tuple[float, float, float]] = {
 }
 """Diameter [m], height [m] and mass [kg] of classes that may be assumed."""
 COMFORT = 0.9
+"""An assumed thing is put where the height of the surface is nearest to this [m]; by eye."""
 _PRIOR = re.compile(r"^\s*(in|on)\s*\(\s*([a-z_]+)\s*,\s*(\w+)\s*\)\s*$")
 
 

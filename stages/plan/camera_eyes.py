@@ -25,15 +25,16 @@ from scenewright.stages.plan.seen_things import SeenThings
 from scenewright.stages.plan.world_model import WorldModel, body_planes, moved_record
 
 CAMERA = Camera(width=240, height=180, fx=260.0, fy=260.0, cx=119.5, cy=89.5)
+"""The camera of a look; **assumed**."""
 EYES = ((0.0, 1.35), (0.2, 0.85))
 """How far before the middle of the base and how high the cameras are [m]: the head's, and one that the hand holds up,
 which is not there while the hand holds something. **Assumed**: the arm gets there and back."""
 BEFORE_IT, OVER_IT = 1.2, (0.1, 0.45)
-"""What can be carried is looked at closely where it is nearer to the base than this [m], and by the free hand from over
-it: so far on the robot's side of it, so high [m]."""
+"""Largest distance from the base at which what can be carried is looked at closely [m], and where the free hand is for
+that: so far on the robot's side of it, and how high over it [m]."""
 HEADINGS, SWEPT, FALLEN = 8, (0.6, 1.4), 1.5
-"""What is not where it is believed is looked for in so many directions, on the floor so far from the base [m], up to so
-far from where it was [m]."""
+"""How a thing that is not where it is believed is looked for: in so many directions, on the floor so far from the base
+[m], up to so far from where it was [m]."""
 HIDDEN = 0.015
 """A carrier that looks smaller or larger than it is by more is partly hidden, or taken with what is beside it [m]."""
 MOST_TURNED = 0.2
@@ -41,8 +42,9 @@ MOST_TURNED = 0.2
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
+"""With fewer points a thing was not seen; by eye."""
 POINTS, FURNITURE_POINTS = 1500, 3000
-"""Of a shape that is fitted, and of each part of furniture."""
+"""Points of a shape that is fitted, and of each part of furniture."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class Look:
 
 
 NOTHING = Look(np.zeros((0, 3)), ())
+"""A look that shows nothing."""
 
 
 def _over(base: np.ndarray, target: np.ndarray) -> np.ndarray:

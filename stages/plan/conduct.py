@@ -29,7 +29,7 @@ from scenewright.stages.plan.world_model import RobotState, Snapshot, WorldModel
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
 LOOKS = 3
-"""From so many places at most an action is looked at before it is carried out."""
+"""Most places from which an action is looked at before it is carried out."""
 JOINT_TOLERANCE = 0.05
 """A joint further than this from where a motion should have left it is taken to be where it is [rad or m]."""
 

@@ -29,6 +29,7 @@ OVERSHOOT = 0.02
 PRESS = 0.006
 """The commanded finger tips are this far inside the door's surface, so that they stay in touch [m]."""
 GRIP_SLACK = 0.012
+"""Opening to which the fingers close on a handle [m]; by eye."""
 OPEN = 0.5
 """Share of a joint's range above which it counts as open."""
 

@@ -17,7 +17,7 @@ from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.world_model import WorldModel, moved_record, true_record
 
 NEAR_BY = 1.5
-"""From so near a look counts as one from near by [m]."""
+"""Largest distance of a look from near by [m]."""
 CELL = 0.05
 """A thing that was moved by more is seen anew [m]."""
 Seen = tuple[SceneBody, str, tuple[SurfacePlane, ...]]

@@ -18,10 +18,11 @@ from scenewright.stages.kit.tasks.pddl_expressions import Expression, entries, p
 from scenewright.stages.kit.tasks.strips import Atom
 
 MOST_INSTANCES, MOST_ALTERNATIVES, DEEPEST = 20_000, 512, 12
-"""Of a quantifier's bindings in all; of the goal; of nested parts."""
+"""Most bindings of a goal's quantifiers in all, most alternatives of a goal, and most nested parts."""
 Literal = tuple[Atom, bool]
 Alternative = frozenset[Literal]
 TRUE: tuple[Alternative, ...] = (frozenset(),)
+"""What always holds: one alternative without atoms. Without alternatives nothing holds."""
 HINT = "docs/PLANNING.md, Goals"
 _SHORT = re.compile(r"^\s*(not\s+)?(\w[\w-]*)\s*\(\s*([^()]*?)\s*\)\s*$")
 

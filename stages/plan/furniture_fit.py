@@ -20,6 +20,7 @@ from scenewright.stages.plan.pose_fit import FAR, KEPT, SURE
 from scipy.spatial import cKDTree
 
 ROUNDS = 15
+"""Steps of one fit; by eye."""
 FEW, MANY = 500, 2000
 """Points seen that a first and a last fit go by."""
 STEPS, FINE = 13, 7

@@ -34,7 +34,6 @@ FAMILIES = {"pick": ("pick", "lift", "take_out"), "place": ("place", "stack")}
 TAUGHT = "taught"
 """Added to the name of a learned predicate that the chain has with a meaning of its own."""
 HINT = "docs/PLANNING.md, A domain of your own"
-LARGEST_LEARNED = 64 * 2**20
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,9 @@ from scenewright.stages.kit.tasks.strips import Atom, GroundAction, atom_text
 from scenewright.stages.plan.action import schemas_of_hand
 
 TAKING, PUTTING = schemas_of_hand("takes"), schemas_of_hand("puts")
+"""Schemas of actions that take something into the hand, and that put it down."""
 MOVED = "moved"
+"""Predicate that is added to the task: the thing was taken at least once."""
 Key = tuple[str, tuple[str, ...]]
 
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 RAISE = 0.12
 """Height over the surface at which a laden tray is moved sideways [m]."""
 RETREAT = 0.14
+"""How far the tool goes back along its axis from what was put down [m]; by eye."""
 LEVEL_PACE = 0.25
 """Share of the full speed with a load."""
 DRAWN_IN = (0.0, 0.1, 0.2)

@@ -22,9 +22,13 @@ from scenewright.stages.plan.tray_loading import easiest_first, lifts_left, lift
 from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
+"""How far the tool comes along its axis, and over its place a thing arrives [m]; by eye."""
 LIFT = 0.03
+"""How far a thing is first lifted, and over its place under a cover a thing arrives [m]; by eye."""
 DRAWER_LIFT = 0.2
+"""How far over its place in a drawer a thing arrives [m]; by eye."""
 SLOW = 0.35
+"""Share of the arm's full speed beside things; by eye."""
 FRICTION_USED = 0.3
 """Half of the friction **assumed** of rubber on household things: grasps that ask for no more are tried first, as what
 is held is carried with starts and stops."""
@@ -41,6 +45,7 @@ PITCHES: dict[GraspStyle, tuple[float, ...]] = {
     "level": (0.0, 0.35, 0.7),
     "steep": (1.1, np.pi / 2),
 }
+"""How far the hand is tilted out of the level [rad], by how it may come; by eye."""
 
 
 @dataclass(frozen=True)

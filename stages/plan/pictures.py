@@ -20,6 +20,7 @@ from scenewright.stages.kit.simulation.world import PhysicsWorld
 HAND, FINGER, PEDESTAL, ARM = (70, 72, 78), (40, 42, 46), (58, 66, 84), (236, 238, 240)
 """Colours of the robot."""
 PALETTE = ((166, 143, 120), (139, 158, 171), (171, 139, 139), (146, 164, 136), (181, 166, 127), (150, 141, 168))
+"""Colours (sRGB) of furniture that has none of its own, in turn; by eye."""
 
 
 def _moved(soup: TriangleSoup, pose: np.ndarray) -> TriangleSoup:

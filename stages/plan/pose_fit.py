@@ -7,6 +7,7 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scipy.spatial import cKDTree
 
 ROUNDS = 25
+"""Steps of one fit; by eye."""
 KEPT = 0.8
 """Share of the seen points, the nearest, that a round goes by: the rest may be of something else."""
 FAR = 0.05

@@ -22,6 +22,7 @@ from scenewright.stages.plan.world_model import WorldModel
 MOST_GOALS, GOAL_STATES = 6, 6000
 """Alternatives of a goal that are given geometry; states of the search that ranks them."""
 REACHED = "goal-reached"
+"""Predicate that is added to the task: one of the goal's alternatives holds."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,8 @@ class Reading:
         plain = literal.removeprefix("not ")
         name, inner = plain.rstrip(")").split("(")
         atom = (name, *(word.strip() for word in inner.split(",") if word.strip()))
-        check = self.given.check(model, graph, atom, literal)
-        return check if check is None or plain == literal else negated(check)
+        verdict = self.given.check(model, graph, atom, literal)
+        return verdict if verdict is None or plain == literal else negated(verdict)
 
     def _atoms(
         self, model: WorldModel, objects: dict[str, str], literals: tuple[str, ...]

@@ -25,7 +25,7 @@ DRIVE = "drive"
 LADEN_PACE = 0.25
 """Share of the full speed at which the robot drives with a laden tray."""
 BASES = 3
-"""From so many bases is an action tried that the robot does not get to."""
+"""Most bases from which an action is tried that the robot does not get to."""
 FINAL = ("no_grasp",)
 """Failures that no other draw of the random choices can avoid."""
 

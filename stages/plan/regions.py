@@ -16,9 +16,13 @@ from scenewright.stages.kit.motion.doors import body_from_moved
 from scenewright.stages.kit.simulation.shapes import joined
 
 LEVEL = 0.98
+"""Least upward part of the normal of a face that things stand on (11 degrees); by eye."""
 MERGE_HEIGHT = 0.006
+"""Faces whose heights differ by less are one surface [m]; by eye."""
 LEAST_AREA = 0.005
+"""Smaller surfaces carry nothing [m^2]; by eye."""
 LEAST_WIDTH = 0.06
+"""Narrower surfaces carry nothing [m]; by eye."""
 LEAST_SURFACE = 0.2
 """Share of the rectangle that has to have surface."""
 LEAST_CLEARANCE = 0.04
@@ -32,11 +36,13 @@ LEAST_WAY_OUT = 0.4
 NEAR_LEVEL = 0.06
 """An item stands on a region when its bottom is at most this far from its level [m]."""
 BESIDE = 0.03
+"""How far the middle of a foot may lie outside of the region that it stands on [m]; by eye."""
 SLIDE_STEP = 0.015
-"""Of a drawer, between two looks at what is over it [m]: rails are not thinner."""
+"""Distance between two looks at what is over a drawer as it slides [m]: rails are not thinner."""
 CELL = 0.02
 """Edge of the cells on which surface and free height are noted [m]."""
 CIRCLE = np.column_stack([np.cos(np.pi / 4 * np.arange(8)), np.sin(np.pi / 4 * np.arange(8))])
+"""Eight directions around a spot (8, 2), of length 1."""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,9 @@ from scenewright.stages.plan.tree_state import after_step, graph_of_state, obser
 from scenewright.stages.plan.world_model import RobotState, WorldModel, body_planes
 
 RECORD_RATE = 10.0
+"""Snapshots of the simulation that are kept [1/s]."""
 SETTLE_SECONDS = 1.0
+"""How long the room is left alone before it is looked at [s]; by eye."""
 ROBOT_ERRORS, CAMERA_NOISE = 5, 6
 """Streams of the seed."""
 START = -1

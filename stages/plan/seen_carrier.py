@@ -20,19 +20,20 @@ from scipy.ndimage import convolve
 CELL = 0.005
 """Edge of a cell of the height map [m]."""
 LEAST_POINTS, LEAST_SHARE = 2, 0.4
-"""Of a cell, and of what cells have in the middle: beside an edge single pixels take the depth of what lies behind."""
+"""Least points of a cell, and their share of what cells have in the middle: beside an edge single pixels take the
+depth of what lies behind."""
 TOP = 80
 """Percentile of the heights of a cell's points that is its height: a thin wall has floor beside it."""
 WALL = 0.008
-"""What is higher over the floor is the rim [m]."""
+"""Height over the floor from which on cells are the rim [m]."""
 FLOOR = 0.004
 """A floor is this thick; its lower side is not seen [m]."""
 STEP = 0.006
 """Heights of the rim are told apart by this [m]."""
 BESIDE_LOAD = 0.015
-"""So near to what stands on it pixels may have that thing's depth [m]."""
+"""Distance from what stands on it within which pixels may have that thing's depth [m]."""
 LEAST_CELLS = 100
-"""Of a floor that was seen."""
+"""Least cells of a floor that was seen."""
 
 
 @dataclass(frozen=True)

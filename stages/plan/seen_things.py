@@ -10,7 +10,7 @@ from scenewright.stages.plan.sticking_out import sticking_out
 from scenewright.stages.plan.thing_fit import fit_thing
 
 POINTS = 3000
-"""On a shape that is fitted."""
+"""Points on a shape that is fitted."""
 
 
 class SeenThings:

@@ -15,8 +15,11 @@ from scenewright.stages.plan.world_model import WorldModel
 TaskName = Literal["fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"]
 Goals = list[tuple[str, ...]]
 TABLES = ("table", "desk")
+"""Classes that a task means by tables."""
 SHELVES = ("shelf", "wall_shelf", "cabinet")
+"""Classes that a task means by shelves."""
 MOST_GOALS = 6
+"""Most goals that a task gives; by eye."""
 MOST_STACKED = 2
 """Things put on a tray before it is carried."""
 
@@ -196,3 +199,4 @@ RULES: dict[TaskName, Callable[[SceneFacts], Goals]] = {
     "put-away-in-drawer": put_away_in_drawer,
     "stack-and-carry": stack_and_carry,
 }
+"""Task -> what sets its goals in a scene."""

@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 FEW, MANY = 300, 800
 """Points seen that a first and a last fit go by."""
 ROUNDS = 16
+"""Steps of one fit; by eye."""
 KEPT = 0.95
 """Share of the seen points, the nearest, that a round goes by: a handle, which tells the heading, is a tenth."""
 SCALES, FINER = np.linspace(0.8, 1.25, 10), (-0.025, -0.0125, 0.0125, 0.025)
@@ -38,7 +39,7 @@ BESIDE = 0.008
 FACING = 0.3
 """Least cosine between a surface's normal and the way to the camera: flatter ones depth cameras hardly see."""
 CELL, BEHIND = 0.01, 0.015
-"""What lies farther than this behind what the same bundle of rays of this breadth meets is hidden by it [m]."""
+"""Breadth of a bundle of rays, and how far behind what it meets first a surface is hidden by it [m]."""
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.plan.refinement import Step
 
 PERIOD = 0.05
-"""Between rows of the planned motion [s]."""
+"""Time between rows of the planned motion [s]."""
 GRIPPER_SECONDS = 0.6
+"""How long the fingers take to close or open [s]; **assumed**."""
 
 
 def planned_rows(steps: list[Step], robot: RobotDescription) -> tuple[dict[str, np.ndarray], list[tuple[int, int]]]:

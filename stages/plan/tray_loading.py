@@ -16,6 +16,7 @@ PALM_ROOM = 0.008
 BESIDE = 0.012
 """Things stand at least this far apart [m]: a finger is between them as one is put down."""
 GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
 
 
 def free_lanes(tool_poses: np.ndarray, feet: np.ndarray, palm: tuple[float, float]) -> np.ndarray:

@@ -22,6 +22,7 @@ from scenewright.stages.poses.world import laid_onto
 LEAST_TRACKS = 30
 """Fewer tracks than this adjust nothing."""
 BELIEVED = 0.5
+"""Least weight, after optimisation, of an edge whose features make tracks; by eye."""
 CONTRADICTION = 4.0
 """The edges that dense alignment gave may contradict the adjusted poses so much more than those before [times]."""
 LOSS_SCALE = 2.0

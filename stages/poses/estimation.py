@@ -18,6 +18,7 @@ from scenewright.stages.poses.places import Ferns
 from scenewright.stages.poses.tracking import Seen, Track, Tracker, TrackingLimits
 
 LEVELS = 3
+"""Levels of the image pyramids in which frames are aligned; by eye."""
 
 
 @dataclass(frozen=True)

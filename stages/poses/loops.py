@@ -24,7 +24,9 @@ from scenewright.stages.poses.tracking import KeyFrame
 LEAST_FEATURES = 15
 """Feature matches that must agree before dense alignment is tried."""
 LEAST_WORDS = 0.02
+"""Least likeness by words of two key frames that may show one place; by eye."""
 LEAST_FERNS = 0.55
+"""Least share of ferns that agree between two key frames that may show one place; by eye."""
 LARGEST_CORRECTION = (0.4, math.radians(20.0))
 """A pair that was chosen for where it should be must not move farther than this."""
 PYRAMIDS = 24

@@ -14,7 +14,9 @@ from collections import defaultdict
 import numpy as np
 
 TABLES, WORD_BITS = 12, 16
+"""Words of a descriptor, and bits of a word; by eye."""
 FERNS = 400
+"""Ferns of a depth image, each of three tests of one pixel; by eye."""
 FERN_SIZE = (30, 40)
 """Rows and columns to which the depth image is thinned out for the ferns."""
 

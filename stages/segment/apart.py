@@ -23,7 +23,8 @@ from scenewright.stages.segment.choice import Backend, BackendRequest, choose_ba
 from scenewright.stages.segment.one_frame import describe, segment_frame
 
 LEAST_FRAMES_EACH = 60
-"""Under these a process is not worth its start, which takes as long as some ten to twenty frames."""
+"""Least frames of a process: with fewer it is not worth its start, which takes as long as some ten to twenty
+frames."""
 MOST_WORKERS = 8
 """Each holds a few hundred megabytes."""
 AHEAD = 3

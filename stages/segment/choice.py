@@ -17,6 +17,7 @@ from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.registry import AUTO, BackendDeclaration, all_backends, automatic, backend_for
 
 STREAM_WORDS = {"color": "colour", "labels": "ground-truth labels"}
+"""What a missing stream of the sequence is called in messages."""
 
 Own = TypeVar("Own", bound=Parameters)
 

@@ -18,6 +18,7 @@ from scenewright.stages.segment.overlaps import LabelPixels, overlap_table, pixe
 from scenewright.stages.segment.panoptic import PanopticFrame
 
 BACKGROUND = 0
+"""Owner of geometric segments that no mask claims."""
 
 
 @dataclass(frozen=True)

@@ -23,12 +23,13 @@ from scipy.sparse.csgraph import dijkstra
 
 Shape = Literal["line", "loop", "eight"]
 HEIGHTS = (1.5, 0.9)
-"""Of the camera, one round each [m]."""
+"""Heights of the camera, one round each [m]."""
 PITCH = -0.25
 """A robot's camera looks a little down [rad]."""
 WAYPOINTS = 16
+"""Points of a round; by eye."""
 REACH = 0.8
-"""Of the free floor's half extent."""
+"""Share of the free floor's half extent that a drive reaches."""
 
 
 def plan_drive(

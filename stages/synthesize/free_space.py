@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 CELL = 0.05
-"""[m]"""
+"""Edge of a cell of the floor [m]."""
 BODY_HEIGHTS = (0.12, 0.35, 0.6, 0.85, 1.1, 1.35, 1.6)
 """Heights at which the clearance is measured; its minimum counts [m]."""
 BODY_RADIUS = 0.36

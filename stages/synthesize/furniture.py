@@ -23,6 +23,7 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.synthesize.collision import ConvexShape, convex_shape
 
 SWEEP_STEPS = 9
+"""Values of a joint at which its parts are looked at for what they pass through; by eye."""
 CONTACT_BAND = 1.5e-3
 """Vertices this close to the lowest one are what a thing stands on [m]."""
 

@@ -16,9 +16,9 @@ from scenewright.stages.synthesize.placement import PlacedObject
 OPENED = (0.35, 1.0)
 """Share of its range by which a joint is opened."""
 KINDS = ("door", "drawer")
-"""What is opened: on lids things may stand."""
+"""Kinds of joints that are opened: on lids things may stand."""
 CLEAR = 0.01
-"""Between what was opened and everything else [m]."""
+"""Distance between what was opened and everything else [m]."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,9 @@ from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, UsageError, first_problem
 
 RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "recipes"
+"""What `--recipe` names lie here."""
 CLUTTER_FACTOR = {"none": 0.0, "low": 0.5, "medium": 1.0, "high": 2.0}
+"""By what `--clutter` multiplies the number of small things."""
 Range = tuple[float, float]
 Rgb = tuple[int, int, int]
 

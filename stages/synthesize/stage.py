@@ -33,8 +33,9 @@ from scenewright.stages.synthesize.walk import Walk, frame_times, plan_walk
 from scipy.spatial.transform import Rotation
 
 CAMERAS = {CAMERA_FRAME: 0.0, "camera_left": 60.0, "camera_right": -60.0}
-"""By name: how far each is turned to the left of the one ahead, about the vertical [deg]."""
+"""Cameras by name: how far each is turned to the left of the one ahead, about the vertical [deg]."""
 VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM, PICTURE_STREAM, OPENED_STREAM = 1, 2, 3, 4, 5
+"""Numbers of the streams of random draws; what draws from one leaves the others as they are."""
 
 
 @dataclass(frozen=True)

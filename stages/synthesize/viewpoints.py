@@ -18,13 +18,15 @@ from scenewright.stages.synthesize.free_space import CELL, FreeSpace, find_free_
 from scenewright.stages.synthesize.placement import PlacedObject
 
 EYE_HEIGHT = 1.5
-"""[m]"""
+"""Height of the camera over the floor [m]."""
 CANDIDATES, SAMPLES = 260, 5000
+"""Views that are tried, and points of the room that they are judged by; by eye."""
 NEAR, FAR, STEEPEST = 0.6, 3.5, 0.25
 """A sample counts as seen between these depths [m] and with at least this cosine of incidence."""
 LEAST_FLOOR = 3.0
-"""[m^2]"""
+"""Least free floor of a room that is walked through [m^2]."""
 LAYOUT_WEIGHT = {"floor": 1.0, "wall": 0.3, "ceiling": 0.0}
+"""Weight of the room's own surfaces beside that of things (1); by eye."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 SPACING = 0.01
 """Edge of the cubes of which each holds one point [m]."""
 LABEL_BITS = 16
+"""Bits of a label where it shares a number with its cube."""
 
 
 def seen_points(

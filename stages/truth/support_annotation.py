@@ -19,7 +19,7 @@ from scenewright.schemas.hand_written import Point, UprightBox
 from scenewright.schemas.vocabulary import load_vocabulary
 
 LARGEST_FILE = 4 * 2**20
-"""Bytes. A scene has a few dozen things."""
+"""Most bytes of an annotation. A scene has a few dozen things."""
 HINT = 'docs/FORMATS.md, "Support annotations", shows one'
 
 

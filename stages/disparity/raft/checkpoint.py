@@ -14,7 +14,7 @@ from scenewright.stages.kit.formats.safetensors_file import read_safetensors, wr
 
 FORMAT = "RAFT-Stereo checkpoint"
 PREFIX = "module."
-"""Before every name in the authors' files, which were saved from several devices at once."""
+"""Prefix of every name in the authors' files, which were saved from several devices at once."""
 
 
 def load_network(path: Path) -> RaftStereo:

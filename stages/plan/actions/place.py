@@ -17,7 +17,7 @@ from scenewright.stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, p
 from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 MOST_TILT = 0.35
-"""What was put down stands when it is tilted by less [rad]."""
+"""Largest tilt of what was put down and stands [rad]."""
 
 
 class Place(PlanAction):

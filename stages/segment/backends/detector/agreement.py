@@ -9,11 +9,11 @@ import numpy as np
 from scenewright.schemas.vocabulary import SemanticClass
 
 CONFIRMING_SHARE = 0.3
-"""The witness confirms a detection when it gives this share of its mask a name of the same kind, ..."""
+"""The second network confirms a detection when it gives this share of its mask a name of the same kind."""
 CONTRADICTING_SHARE = 0.5
-"""... and contradicts it when it gives this share a name of another kind."""
+"""The second network contradicts a detection when it gives this share of its mask a name of another kind."""
 SAME_KIND = ({"chair", "sofa", "bench"}, {"table", "desk"}, {"monitor", "laptop"})
-"""What the networks call each other when they see a part of it."""
+"""Classes that the networks take for each other when they see a part of a thing."""
 SURE = 0.6
 """A detection of this score needs nobody's agreement."""
 LEAST_SHARE = 0.02

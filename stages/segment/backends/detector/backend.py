@@ -23,12 +23,14 @@ from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 from scenewright.stages.segment.settings import geometric_settings
 
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
-"""A box around a part of these is still a detection of the whole: one face fills most of the box."""
+"""Classes of which a box around a part is still a detection of the whole: one face fills most of the box."""
 FLAT_TOPPED = frozenset({"table", "desk"})
+"""Classes whose upper side is a level top, over which nothing of them rises."""
 LARGEST_UNNAMED = 0.8
 """A detection of impossible size still points at some item when that is small; at furniture size it says nothing, and
 its votes would drown those of the frames in which the thing was recognised [m]."""
 SAMPLED_FRAMES = 25
+"""Frames, spread over the log, of whose surface the room is made; by eye."""
 DUPLICATE_OVERLAP = 0.5
 """Two masks of one class that share this much of the smaller one are the same thing."""
 

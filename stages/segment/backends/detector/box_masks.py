@@ -17,7 +17,7 @@ SURFACE_SHARE = 0.35
 RING_FACTOR = 1.6
 """The support of a thing is measured in a ring around its box, up to this many times its size."""
 TOP_CLEARANCE = 0.03
-"""What rises this far [m] over a table's top is no part of the table."""
+"""Height over a table's top from which on nothing is part of the table [m]."""
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 HEIGHT_BIN = 0.02
+"""Width of the bins of heights in which floor and ceiling are sought [m]; by eye."""
 OFFSET_BIN = 0.04
+"""Width of the bins of a wall's distance from the origin [m]; by eye."""
 AZIMUTH_BIN = np.radians(3.0)
+"""Width of the bins of a wall's direction [rad]; by eye."""
 MINIMUM_WALL_HEIGHT = 1.0
+"""Least height of a plane's points, bottom to top, for a wall [m]; by eye."""
 MINIMUM_WALL_TOP = 1.25
 """A wall is seen up to here over the floor [m]: kitchen units and desks end below."""
 MINIMUM_HIGH_SHARE = 0.3

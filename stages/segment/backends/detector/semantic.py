@@ -33,7 +33,7 @@ VOC_NAMES = (
     "train",
     "tvmonitor",
 )
-"""In the order of the networks' outputs."""
+"""PASCAL VOC's classes and the background, in the order of the networks' outputs."""
 FROM_VOC = {
     "bottle": "bottle",
     "chair": "chair",

@@ -12,7 +12,9 @@ from scenewright.stages.segment.coco import COCO_NAMES
 from scenewright.stages.segment.suppression import suppress
 
 STRIDES = (8, 16, 32)
+"""Input pixels per cell of each of the network's three grids (YOLOX, Ge et al. 2021)."""
 PAD_VALUE = 114
+"""Grey with which a picture is padded to a square, as YOLOX was trained (0..255)."""
 INPUT_SIZES = (416, 640)
 """Square inputs of the published YOLOX models (nano and tiny; small to extra large)."""
 

@@ -23,6 +23,7 @@ from scenewright.stages.segment.suppression import suppress
 MOST_TOKENS = 200
 """Tokens of one prompt; published models read 256. Longer lists of words are asked in several goes."""
 WORD_END = ". "
+"""What Grounding DINO separates the words of a prompt with."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from scenewright.stages.segment.naming import NamedSegment, name_segments
 from scenewright.stages.segment.panoptic import PanopticFrame
 
 UNCLASSED = Label(name=ANYTHING, class_name=ANYTHING)
+"""What masks without a class are: things that nobody named."""
 
 logger = logging.getLogger("scenewright")
 

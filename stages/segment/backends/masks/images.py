@@ -12,7 +12,7 @@ from scenewright.stages.kit.formats.image_headers import image_size, may_be_deco
 from scenewright.stages.kit.formats.masks import decode_panoptic_png
 
 LARGEST_PNG = 512 * 2**20
-"""Bytes."""
+"""Most bytes of a PNG file."""
 
 
 def read_panoptic(path: Path, shape: tuple[int, int]) -> np.ndarray:

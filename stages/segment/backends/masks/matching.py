@@ -17,7 +17,9 @@ SECONDS = re.compile(r"\d{1,10}\.\d+", re.ASCII)
 TICKS = re.compile(r"\d{13,19}", re.ASCII)
 """Milliseconds to nanoseconds since 1970, by their number of digits."""
 WAYS = ("name", "number", "time stamp")
+"""How a picture may be matched to a frame, in the order in which that is tried."""
 SHOWN = 3
+"""Pictures without a frame that an error names."""
 
 
 def match_pictures(

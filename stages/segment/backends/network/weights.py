@@ -16,8 +16,9 @@ from scenewright.stages.segment.backends.network.model import PanopticNetwork, W
 
 FORMAT = "scenewright panoptic network"
 VERSION = 1
+"""Of the layout of a checkpoint; others are refused."""
 BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "panoptic.safetensors"
-"""What comes with the project."""
+"""The checkpoint that comes with the project."""
 _OTHER = "give a checkpoint that `make train-network` wrote, or leave --weights out"
 
 

@@ -31,7 +31,7 @@ SCORERS: dict[str, Callable[[], PairScorer]] = {
     "learned": lambda: by_trees(read_trees(BUNDLED, FEATURES)),
     "rules": lambda: BY_SET_RULES,
 }
-"""What `--grouping` chooses from. The trees raise BadInput when they cannot be read."""
+"""Scorers of pairs by the name that `--grouping` gives. The trees raise BadInput when they cannot be read."""
 
 
 class ObjectsBackend:

@@ -16,9 +16,9 @@ from scenewright.stages.segment.backends.objects.regions import Regions
 
 LARGEST_GAP = 3.0
 """Groups that do not touch are a pair when their hulls' corners are closer than this times the root of the pixels of
-the smaller one ..."""
+the smaller one."""
 SMALLEST_APART = 250.0
-"""... and both have at least so many pixels."""
+"""Least pixels of both groups of a pair that does not touch."""
 
 
 class Groups:

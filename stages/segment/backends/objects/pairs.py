@@ -49,7 +49,9 @@ FEATURES = (
 )
 """Names of the features, in order."""
 COUNT = len(FEATURES)
+"""Number of features of a pair."""
 CONTENT_STEP = 3
+"""Every so many pixels across and down, the content of a hull is looked at [px]; by eye."""
 HIDING_MARGIN = 0.02
 """Nearer by this hides [1/m]: 2 cm at 1 m."""
 

@@ -18,7 +18,7 @@ from scenewright.stages.segment.backends.objects.support import SupportSettings
 from scenewright.stages.segment.geometric import pixels_at, relabel
 
 UP_WITHOUT_SURFACE = np.array([0.0, -1.0, 0.0])
-"""Where no support surface is seen, the camera is taken to be upright."""
+"""Direction upwards in the camera frame where no support surface is seen: the camera is taken to be upright."""
 BY_SET_RULES = by_rules(rule_table(RULES, START))
 """The scorer that needs no training."""
 

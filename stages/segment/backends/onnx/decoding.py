@@ -13,6 +13,7 @@ from scenewright.stages.segment.suppression import suppress
 MOST_CANDIDATES = 300
 """Instances of one image that are looked at, the best scored."""
 MASK_THRESHOLD = 0.5
+"""Least probability of a mask's pixel; the published networks' own."""
 OVERLAP_SHARE = 0.8
 """A panoptic segment of which others leave less than this is dropped (Cheng et al. 2022)."""
 

@@ -18,6 +18,7 @@ DEFAULT_SIZE = (640, 640)
 LONGEST_METADATA = 100_000
 """Characters."""
 PAD_VALUE = 114
+"""Grey with which a picture is padded, as YOLO networks were trained (0..255)."""
 HINT = "say what goes in and what comes out with --sidecar FILE.toml (docs/SEGMENTATION.md)"
 
 

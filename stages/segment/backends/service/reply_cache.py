@@ -15,7 +15,7 @@ from pathlib import Path
 
 ENVIRONMENT = "SCENEWRIGHT_REPLIES"
 LARGEST_CACHE = 2**30
-"""Bytes; the oldest files go first."""
+"""Most bytes of the cache; the oldest files go first."""
 
 logger = logging.getLogger("scenewright")
 

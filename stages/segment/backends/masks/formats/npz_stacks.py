@@ -29,8 +29,9 @@ from scenewright.stages.segment.backends.masks.overlapping import flatten
 
 HINT = "np.savez(name, masks=..., classes=..., scores=...); docs/MASKS.md"
 NAMES = ("masks", "ids", "id", "classes", "scores")
+"""Arrays that are read; of `ids` and `id` either."""
 LARGEST_FILE = 2**30 + 2**16
-"""Bytes of the arrays of one picture, unpacked."""
+"""Most bytes of the arrays of one picture, unpacked."""
 
 
 def open_source(listing: Listing) -> MaskSource | None:
