@@ -47,7 +47,7 @@ class Apart:
         best: tuple[float, Placed] | None = None
         for reach in (self.maximum_shift, FAR * self.maximum_shift):
             for option in options:
-                depth, placed = self._placed(option, seat, others, reach)
+                depth, placed = self._try_placing(option, seat, others, reach)
                 if best is None or depth < best[0]:
                     best = (depth, placed)
                 if depth == 0.0:
@@ -55,7 +55,9 @@ class Apart:
         assert best is not None  # the placement itself is an option
         return best[1]
 
-    def _placed(self, option: Placement, seat: Seat, others: Sequence[Solid], reach: float) -> tuple[float, Placed]:
+    def _try_placing(
+        self, option: Placement, seat: Seat, others: Sequence[Solid], reach: float
+    ) -> tuple[float, Placed]:
         """Return how deep [m] an option still lies in something, moved by at most `reach` [m], and where."""
         surface = self.surfaces[option.shape.model.id]
         moved, box, stand = seat.standing(option, surface)

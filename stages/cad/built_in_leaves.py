@@ -72,7 +72,7 @@ def leaves_of(
         axis = np.asarray(entry.axis) @ world_from_cells
         if opening and _square(second):
             cells = cells.without(second.min(axis=0) - 2 * THICKNESS, second.max(axis=0) + 2 * THICKNESS)
-        opened = _cut(cells, side, corners, drawer=entry.type == "prismatic")
+        opened = _cut_opening(cells, side, corners, drawer=entry.type == "prismatic")
         if opened is None:
             continue
         cells, boxes = opened
@@ -120,7 +120,9 @@ def _side(cells: Cells, corners: np.ndarray) -> _Shut | None:
     return None if not sides_near else _Shut(axis, min(sides_near)[1], min(sides_near)[2])
 
 
-def _cut(cells: Cells, side: _Shut, corners: np.ndarray, *, drawer: bool) -> tuple[Cells, tuple[Span, ...]] | None:
+def _cut_opening(
+    cells: Cells, side: _Shut, corners: np.ndarray, *, drawer: bool
+) -> tuple[Cells, tuple[Span, ...]] | None:
     """Return the carcass with an opening, and the boxes of the leaf before it; None where nothing is behind it."""
     axis, inwards = side.axis, -1.0 if side.up else 1.0
     others = [a for a in range(3) if a != axis]

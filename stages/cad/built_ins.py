@@ -141,7 +141,7 @@ def built_in(
     if reason:
         return reason
     cells, leaves = leaves_of(cells, rotation, articulations)
-    placement, surface = _made(node, cells, leaves, rotation, folder)
+    placement, surface = _write_built_in(node, cells, leaves, rotation, folder)
     return BuiltIn(placement, surface, len(cells.boxes()), len(leaves), fit, plain)
 
 
@@ -227,7 +227,7 @@ def _from_the_front(patches: Patches) -> tuple[Patches, np.ndarray]:
     return patches.turned(rotation), rotation
 
 
-def _made(
+def _write_built_in(
     node: GraphNode, cells: Cells, leaves: Sequence[BuiltInLeaf], rotation: np.ndarray, folder: Path
 ) -> tuple[Placement, ModelSurface]:
     """Write the model of a built-in and return where it stands, and its surface."""

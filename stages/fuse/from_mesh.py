@@ -66,7 +66,7 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
             instance = joined_parts(turned, instance, class_of, vocabulary)
         surface, order = canonical_order(replace(surface, vertices=turned))
         instance = instance[order]
-        entities, meshes, instance = _listed(surface, instance, class_of, vocabulary, parameters)
+        entities, meshes, instance = _list_entities(surface, instance, class_of, vocabulary, parameters)
     with context.progress.step("write the map"):
         (context.output / "entities").mkdir(parents=True, exist_ok=True)
         EntitiesFile(
@@ -242,7 +242,7 @@ def _over_each_other(low: np.ndarray, high: np.ndarray, small: int, large: int) 
     return bool(shared >= 0.5 * small_area and gap <= GAP)
 
 
-def _listed(
+def _list_entities(
     surface: ColoredMesh,
     instance: np.ndarray,
     class_of: Mapping[int, int],

@@ -88,7 +88,7 @@ def attach_unseen_pairs(groups: list[list[int]], evidence: PairEvidence, counts:
     votes = [_total(group, counts) for group in groups]
     leading: dict[tuple[int, int], list[int]] = {}
     for number, group in enumerate(groups):
-        best = _leading(group, counts)
+        best = _leading_instance(group, counts)
         if best is not None:
             leading.setdefault(best, []).append(number)
     target = list(range(len(groups)))
@@ -213,7 +213,7 @@ def _total(group: Iterable[int], counts: TripleCounts) -> int:
     return sum(sum(counts.by_segment[segment].values()) for segment in group)
 
 
-def _leading(group: Iterable[int], counts: TripleCounts) -> tuple[int, int] | None:
+def _leading_instance(group: Iterable[int], counts: TripleCounts) -> tuple[int, int] | None:
     votes: dict[tuple[int, int], int] = {}
     for segment in group:
         for key, count in counts.by_segment[segment].items():

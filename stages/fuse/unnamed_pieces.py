@@ -99,16 +99,16 @@ def unnamed_pieces(
     for _, top in _tops(vertices, normals, names, voxel):
         if names[top[0]] > 0:
             level, footprint = float(np.median(vertices[top, 2])), _Footprint(vertices[top, :2], voxel)
-            standing |= _standing_on(level, footprint, points, components)
+            standing |= _parts_standing_on(level, footprint, points, components)
     alone, of_named = np.ones(len(points), bool), instance.astype(np.int32)
     for name in np.unique(names[names > 0]).tolist():
         thing = vertices[names == name]
         of_thing = alone & _of_named(points, components, thing) & ~np.isin(components, sorted(freed))
         alone &= ~of_thing
         if name not in tables:
-            of_named[members[_touching(points, np.where(of_thing, components, NO_PART), thing, voxel)]] = name
+            of_named[members[_points_touching(points, np.where(of_thing, components, NO_PART), thing, voxel)]] = name
     members, points, components = members[alone], points[alone], components[alone]
-    components = _joined(points, normals[members], components, standing, proposed_parts, voxel, minimum_area)
+    components = _join_parts(points, normals[members], components, standing, proposed_parts, voxel, minimum_area)
     pieces = []
     for part in np.unique(components):
         own = members[components == part]
@@ -190,7 +190,7 @@ def _cut_at_tops(
     for part, top in _tops(points, normals, parts, voxel):
         level, footprint = float(np.median(points[top, 2])), _Footprint(points[top, :2], voxel)
         if part in kept_whole:
-            standing |= _standing_on(level, footprint, points, result) - {part}
+            standing |= _parts_standing_on(level, footprint, points, result) - {part}
             continue
         of_part = np.flatnonzero(result == part)
         over, inside = points[of_part, 2] - level, footprint.holds(points[of_part])
@@ -217,7 +217,7 @@ def _cut_at_tops(
                 beside &= ~inside & _Footprint(points[of_part[beside & rising], :2], voxel).holds(points[of_part])
             result[of_part[beside]] = after
             after += 1
-        standing |= _standing_on(level, footprint, points, result)
+        standing |= _parts_standing_on(level, footprint, points, result)
     return result, standing
 
 
@@ -262,7 +262,7 @@ def _cut_from_named(
     return set(part_of[rising].tolist()), {first + part for part in on_top if part}
 
 
-def _standing_on(level: float, footprint: _Footprint, points: np.ndarray, parts: np.ndarray) -> set[int]:
+def _parts_standing_on(level: float, footprint: _Footprint, points: np.ndarray, parts: np.ndarray) -> set[int]:
     """Return the parts that begin on a level top and lie over it."""
     standing = set()
     for part in np.unique(parts[(points[:, 2] > level) & footprint.holds(points)]):
@@ -294,7 +294,7 @@ def _of_named(points: np.ndarray, parts: np.ndarray, thing: np.ndarray) -> np.nd
     return result
 
 
-def _touching(points: np.ndarray, parts: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
+def _points_touching(points: np.ndarray, parts: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
     """Return which points (N,) are of parts that touch a thing (M, 3) and are smaller than it."""
     of_part = np.flatnonzero(parts != NO_PART)
     touching = of_part[cKDTree(thing).query(points[of_part], distance_upper_bound=2.0 * voxel)[0] < 2.0 * voxel]
@@ -302,7 +302,7 @@ def _touching(points: np.ndarray, parts: np.ndarray, thing: np.ndarray, voxel: f
     return np.isin(parts, np.intersect1d(parts[touching], names[sizes < len(thing)]))
 
 
-def _joined(
+def _join_parts(
     points: np.ndarray,
     normals: np.ndarray,
     parts: np.ndarray,

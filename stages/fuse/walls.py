@@ -83,7 +83,7 @@ def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, v
                     start = float(free.min()) + (int(counts.argmax()) + 1) * THICKNESS
         if most * voxel**2 < LEAST_AREA:
             return planes
-        normal, offset = _fitted(points, facing, axis, start)
+        normal, offset = _fit_plane(points, facing, axis, start)
         on_plane = _outermost(points, np.flatnonzero(facing @ normal > FACING), normal, fewest)
         on_plane = on_plane[np.abs(points[on_plane] @ normal - offset) < THICKNESS]
         unexplained[on_plane] = False
@@ -111,7 +111,7 @@ def _outermost(points: np.ndarray, chosen: np.ndarray, normal: np.ndarray, fewes
     return chosen[behind < fewest]
 
 
-def _fitted(points: np.ndarray, facing: np.ndarray, axis: np.ndarray, start: float) -> tuple[np.ndarray, float]:
+def _fit_plane(points: np.ndarray, facing: np.ndarray, axis: np.ndarray, start: float) -> tuple[np.ndarray, float]:
     """Return normal (2,) and offset of the plane that fits what lies around a first one best."""
     normal, offset = axis, start
     for _ in range(3):

@@ -241,7 +241,7 @@ class CameraEyes:
             clouds = [
                 points
                 for number in np.unique(picture.instance)
-                if self._made_out(int(number), picture.instance == number, class_name)
+                if self._is_recognised(int(number), picture.instance == number, class_name)
                 and len(points := cloud(picture, picture.instance == number, map_from_true @ pose, whole=not carriable))
                 and not self._of_another(body, class_name, points)
             ]
@@ -273,7 +273,7 @@ class CameraEyes:
         nearest = min(map(away, others), default=np.inf)
         return nearest < min(SAME, away(body))
 
-    def _made_out(self, number: int, mask: np.ndarray, class_name: str) -> bool:
+    def _is_recognised(self, number: int, mask: np.ndarray, class_name: str) -> bool:
         """Whether the segmentation takes an instance of a picture for something of a class."""
         name = self._names.get(number, "")
         if not name or mask.sum() < LEAST_PIXELS:

@@ -138,7 +138,7 @@ class Conduct:
             self.physical.action = number
             anchor = self._anchor(group[-1]) if attempt == 0 else None
             try:
-                preferred = self._looked(group[-1], anchor)
+                preferred = self._look_again(group[-1], anchor)
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
                 further = put_there_later(name, arguments, following)
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style, further=further)
@@ -160,12 +160,12 @@ class Conduct:
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 lost = state.holding is not None and self.physical.held is None
-                recovered = self._recovered(state, name, arguments)
+                recovered = self._try_recovering(state, name, arguments)
                 if recovered is None or lost:  # what was held is gone: nothing left to place
                     return recovered, False
                 state = recovered
                 continue
-            state = self._perceived(after)
+            state = self._perceive(after)
             try:
                 state = action.after_motion(self, state, arguments)
                 self._check_effect(name, arguments)
@@ -175,7 +175,7 @@ class Conduct:
                 if action.when_unmet == "stay":
                     return state, False
                 if action.when_unmet == "back":  # the tray was lost, or something is in the way of levelling it
-                    return self._recovered(state, name, arguments), False
+                    return self._try_recovering(state, name, arguments), False
         return state, False
 
     def _look_from_there(
@@ -190,15 +190,15 @@ class Conduct:
             self._execute(drive)
             arrived = replace(state, base=drive.segments[-1].path[-1, :3])
             self.model.restore(before)
-            arrived = self._perceived(arrived)
+            arrived = self._perceive(arrived)
             hold_for_checks(self.model, arrived)
-            preferred = self._looked(step, self._anchor(step))
+            preferred = self._look_again(step, self._anchor(step))
             if preferred is not None:
                 preferred = (arrived.base, preferred[1])
             before = self.model.snapshot()
             wish = replace(request, preferred=preferred)
             try:
-                measured = self._measured(wish, arrived.base)
+                measured = self._without_uncertainty(wish, arrived.base)
                 return refine_action(self.model, arrived, step.name, measured, origin)
             except MotionFailed:
                 steps, after = refine_action(self.model, arrived, step.name, wish, origin)
@@ -208,11 +208,11 @@ class Conduct:
         return steps, after
 
     @staticmethod
-    def _measured(request: MotionRequest, base: np.ndarray) -> MotionRequest:
+    def _without_uncertainty(request: MotionRequest, base: np.ndarray) -> MotionRequest:
         """Return a request for a motion from where a look was taken, which has shown how wide things are."""
         return replace(request, base=base, budgets=replace(request.budgets, size_uncertainty=0.0))
 
-    def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
+    def _try_recovering(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
         """Return the state after the way back, None (and a note) when the arm does not get there either."""
         try:
             return self._recover(state)
@@ -278,7 +278,7 @@ class Conduct:
         body = step.arguments[tied_to]
         return Anchor(body, self.model.pose(body), self.model.text(body))
 
-    def _looked(self, step: Step, before: Anchor | None) -> tuple[np.ndarray, np.ndarray] | None:
+    def _look_again(self, step: Step, before: Anchor | None) -> tuple[np.ndarray, np.ndarray] | None:
         """Look, and return base pose and grasp (or place) of the planned step, moved along with the body they are tied
         to; None where there is no such body, and where eyes which err give it another shape than the motion was planned
         for: its frame is another, its rim or its handle elsewhere.
@@ -330,7 +330,7 @@ class Conduct:
         joint = next(joint for joint in self.room.records[body].joints if joint.name == room_joint)
         return joint, self.physical.world.joint_value(body, room_joint)
 
-    def _perceived(self, state: RobotState) -> RobotState:
+    def _perceive(self, state: RobotState) -> RobotState:
         """Correct what the robot believes of itself and of what it holds by what the joints and a look say."""
         base, arm = state.base, state.arm
         if self.physical.held is None:
@@ -359,7 +359,7 @@ class Conduct:
         if path is None:
             return state
         self.physical.follow(Segment(whole_body(state.base, path), 0.0, LEVEL_PACE, "", state.holding), None)
-        return self._perceived(replace(state, arm=path[-1]))
+        return self._perceive(replace(state, arm=path[-1]))
 
     def _take_along(self, item: str) -> None:
         """Join what is held with what stands on it, as they are in the room now: the load counts in collision checks.
@@ -386,7 +386,7 @@ class Conduct:
         self.physical.recording.keyframe(self.physical.action, "failed")
         self.physical.follow(Segment(rows, self.model.description.opening, 0.5), None)
         base, arm = rows[-1, :3], rows[-1, 3:]
-        return self._perceived(RobotState(base, arm, state.holding, state.tool_from_item, state.body_from_tool))
+        return self._perceive(RobotState(base, arm, state.holding, state.tool_from_item, state.body_from_tool))
 
     # --- open loop --------------------------------------------------------------------------------------------
 

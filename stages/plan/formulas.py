@@ -66,11 +66,11 @@ class _Reader:
             return self.read(either, binding, holds, depth + 1)
         if head in ("and", "or"):
             branches = (self.read(each, binding, holds, depth + 1) for each in listed[1:])
-            return self._joined(branches, (head == "and") == holds)
+            return self._combine(branches, (head == "and") == holds)
         if head in ("forall", "exists"):
             self._count(listed, 3, f"`{head}` takes variables and a part")
             branches = (self.read(listed[2], inner, holds, depth + 1) for inner in self._bindings(listed[1], binding))
-            return self._joined(branches, (head == "forall") == holds)
+            return self._combine(branches, (head == "forall") == holds)
         terms = [word(each, "a term of the goal") for each in listed[1:]]
         for term in terms:
             if term.startswith("?") and term not in binding:
@@ -108,17 +108,17 @@ class _Reader:
                 raise self.refuse(f"more than {MOST_INSTANCES} cases to look at; quantify over fewer things")
             yield {**binding, **dict(zip((name for name, _ in pairs), values, strict=True))}
 
-    def _joined(self, parts: Iterator[tuple[Alternative, ...]], together: bool) -> tuple[Alternative, ...]:
+    def _combine(self, parts: Iterator[tuple[Alternative, ...]], together: bool) -> tuple[Alternative, ...]:
         if not together:
             all_found = tuple(dict.fromkeys(alternative for part in parts for alternative in part))
-            return self._bounded(_least(all_found))
+            return self._check_count(_least(all_found))
         result = TRUE
         for part in parts:
             merged = (first | two for first in result for two in part)
-            result = self._bounded(_least(tuple(dict.fromkeys(each for each in merged if _sound(each)))))
+            result = self._check_count(_least(tuple(dict.fromkeys(each for each in merged if _sound(each)))))
         return result
 
-    def _bounded(self, found: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+    def _check_count(self, found: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
         if len(found) > MOST_ALTERNATIVES:
             raise self.refuse(f"more than {MOST_ALTERNATIVES} ways to reach it; name some of the things")
         return found
@@ -173,7 +173,7 @@ def _long_form(text: str, reader: _Reader) -> Expression:
 def together(parts: list[tuple[Alternative, ...]], text: str) -> tuple[Alternative, ...]:
     """Return the alternatives of several goals that all have to hold. Raises UsageError for too many."""
     reader = _Reader(Names({}, lambda atom, where, quantified: None), text)
-    return reader._joined(iter(parts), True)
+    return reader._combine(iter(parts), True)
 
 
 def literal_text(literal: Literal) -> str:

@@ -188,12 +188,12 @@ def misfit(seen: np.ndarray, views: Sequence[View], surface: Surface, motion: np
     beside = np.abs(np.einsum("ij,ij->i", back - points[nearest], normals[nearest]))
     along = np.sqrt(np.maximum(away**2 - beside**2, 0.0))
     outward = float(np.minimum(np.where(along < _reach(tree, points), beside, away), FAR).mean())
-    behind = [_seen_behind(apply(motion, points), view) for view in views]
+    behind = [_depth_behind(apply(motion, points), view) for view in views]
     in_sight = np.concatenate([depths[np.isfinite(depths)] for depths in behind]) if behind else np.zeros(0)
     return outward + (float(np.clip(in_sight, 0.0, FAR).mean()) if len(in_sight) else 0.0)
 
 
-def _seen_behind(points: np.ndarray, view: View) -> np.ndarray:
+def _depth_behind(points: np.ndarray, view: View) -> np.ndarray:
     """Return how far behind points (N, 3) a picture shows something [m] (N,); nan where it shows nothing, where they
     are out of it, and where something before them hides them."""
     pixels, depth = project(apply(inverse(view.map_from_camera), points), view.picture.camera)
@@ -214,7 +214,7 @@ def _reach(tree: cKDTree, points: np.ndarray) -> float:
 def _sides(seen: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
     """Return about `most` of the points (N, 3) that cameras at `eyes` (K, 3) saw, and the normals (N, 3) there, towards
     the nearest camera: of the plane through the points around."""
-    points, cloud = _thinned(seen, most), _thinned(seen, AROUND_OF)
+    points, cloud = _thin_out(seen, most), _thin_out(seen, AROUND_OF)
     around = cloud[cKDTree(cloud).query(points, k=min(AROUND, len(cloud)))[1]]
     offset = around - around.mean(axis=1, keepdims=True)
     normals: np.ndarray = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))[1][:, :, 0]
@@ -222,5 +222,5 @@ def _sides(seen: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
     return points, normals * np.where(np.einsum("ij,ij->i", normals, rays) < 0, -1.0, 1.0)[:, None]
 
 
-def _thinned(points: np.ndarray, most: int) -> np.ndarray:
+def _thin_out(points: np.ndarray, most: int) -> np.ndarray:
     return points[:: max(1, len(points) // most)]

@@ -115,13 +115,13 @@ class GivenDomain:
         by_body: dict[tuple[str, ...], list[GroundAction]] = {}
         for operator in operators:
             for schema_name in _ways(operator.name):
-                key = (schema_name, *operator.arguments[: _compared(schema_name)])
+                key = (schema_name, *operator.arguments[: _compared_count(schema_name)])
                 by_body.setdefault(key, []).append(operator)
         for action in own_actions:
             for operator in by_body.get((action.name, *_bodies(action)), ()):
                 merged.append(_both(action, operator))
-            if _bodies(action) != action.arguments[: _compared(action.name)]:
-                for operator in by_body.get((action.name, *action.arguments[: _compared(action.name)]), ()):
+            if _bodies(action) != action.arguments[: _compared_count(action.name)]:
+                for operator in by_body.get((action.name, *action.arguments[: _compared_count(action.name)]), ()):
                     merged.append(_both(action, operator))
         if len(merged) == before:
             raise BadInput(f"{self.source}: none of its operators can be done in this scene", hint=HINT)
@@ -169,14 +169,14 @@ def _ways(operator: str) -> tuple[str, ...]:
     return tuple(name for name in FAMILIES.get(base, (base,)) if name in schema_names)
 
 
-def _compared(way: str) -> int:
+def _compared_count(way: str) -> int:
     """Return how many of the first arguments have to be those of the operator: what is put needs a place too."""
     return 2 if action_named(way).hand == "puts" else 1
 
 
 def _bodies(action: GroundAction) -> tuple[str, ...]:
     """Return the arguments that are compared, the owners of joints for joints."""
-    return tuple(name.split(PART_SEPARATOR)[0] for name in action.arguments[: _compared(action.name)])
+    return tuple(name.split(PART_SEPARATOR)[0] for name in action.arguments[: _compared_count(action.name)])
 
 
 def _is(domain: Domain, name: str, own: str, class_name: str, kind: str) -> bool:
@@ -219,7 +219,7 @@ def _with_opposites(actions: list[GroundAction], goal: frozenset[Atom]) -> list[
 def read_given_domain(path: Path) -> GivenDomain:
     """Read `--domain`: a PDDL file, or the folder of a domain that was learned in rooms. Raises BadInput."""
     if path.is_dir():
-        return _learned(path)
+        return _read_learned(path)
     domain = parse_domain(file_text(path, LARGEST_SETTINGS))
     for name, kinds in domain.predicates.items():
         scene_kinds = DOMAIN.predicates.get(name)
@@ -231,7 +231,7 @@ def read_given_domain(path: Path) -> GivenDomain:
     return GivenDomain(str(path), domain)
 
 
-def _learned(path: Path) -> GivenDomain:
+def _read_learned(path: Path) -> GivenDomain:
     if not (path / "domain.json").is_file():
         raise BadInput(f"{path}: no domain.json there", hint="give the folder that `predicates teach` wrote, or PDDL")
     document = LearnedDomainFile.read(path / "domain.json")

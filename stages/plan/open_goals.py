@@ -47,10 +47,10 @@ def named_goal(
     nodes = {node.instance: node for node in graph.nodes if node.instance and node.id in objects}
     if not any(region.instance in nodes for region in language.info.regions):
         raise BadInput(f"{language.root}: none of its places is in the scene", hint="label the map of this scene")
-    return tuple(_named(literal, objects, nodes, finder) for literal in literals)
+    return tuple(_replace_quoted(literal, objects, nodes, finder) for literal in literals)
 
 
-def _named(literal: str, objects: Mapping[str, str], nodes: Mapping[int, GraphNode], finder: Finder) -> str:
+def _replace_quoted(literal: str, objects: Mapping[str, str], nodes: Mapping[int, GraphNode], finder: Finder) -> str:
     predicate = literal.split("(")[0].strip()
     kinds = DOMAIN.predicates.get(predicate, ())
 

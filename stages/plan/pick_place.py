@@ -109,7 +109,7 @@ def _palm_free(points: np.ndarray, grasps: list[Grasp], palm: tuple[float, float
     return [grasp for grasp in grasps if free(grasp)]
 
 
-def _bearable(model: WorldModel, item: str, grasps: list[Grasp]) -> list[Grasp]:
+def _bearable_grasps(model: WorldModel, item: str, grasps: list[Grasp]) -> list[Grasp]:
     """Return the grasps in which the fingers bear the moment of a carrier and its load. Raises MotionFailed `no_grasp`
     when it turns in all of them."""
     if not grasps:
@@ -134,7 +134,7 @@ def _retreat(world_from_tool: np.ndarray, distance: float) -> np.ndarray:
     return pose
 
 
-def _shifted(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
+def _shifted_pose(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
     moved = pose.copy()
     moved[:3, 3] += shift
     return moved
@@ -178,7 +178,7 @@ def plan_pick(
     widest = model.description.opening + budgets.size_uncertainty
     # what is laden is held straight from above: the load stays level while the arm moves
     grasps = (
-        _bearable(model, item, rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty))
+        _bearable_grasps(model, item, rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty))
         if model.laden(item)
         else []
     )
@@ -256,7 +256,7 @@ def _try_pick(
     world_from_tool = world_from_item @ grasp.body_from_tool
     checker = model.checker
     opening = model.description.opening
-    model.robot.set(_open(state, opening))
+    model.robot.set(_opened_configuration(state, opening))
     checker.allow(touch=model.links(item))
     arm = arm_planner.reachable(base, world_from_tool, tally)
     if arm is None or not arm_planner.free(base, arm, tally):
@@ -279,7 +279,7 @@ def _try_pick(
     checker.allow(touch=model.links(item), rest_on=allowed_depths)
     try:
         for lift in (RAISE,) if laden else (LIFT, 0.012):
-            up = arm_planner.line(base, arm, _shifted(world_from_tool, np.array([0, 0, lift])), tally)
+            up = arm_planner.line(base, arm, _shifted_pose(world_from_tool, np.array([0, 0, lift])), tally)
             if up is None:
                 continue
             checker.allow(touch=model.links(item), rest_on=within)
@@ -288,10 +288,10 @@ def _try_pick(
                 break
             steep = grasp.pitch > 1.2
             for distance in (0.25, 0.15):
-                goal = _shifted(world_from_tool, np.array([0.0, 0.0, lift]))
+                goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
                 flat = goal[:3, 2] * np.array([1, 1, 0])
                 shift = np.array([0, 0, distance]) if steep else -flat / max(np.linalg.norm(flat), 1e-6) * distance
-                back = arm_planner.line(base, up[-1], _shifted(goal, shift), tally)
+                back = arm_planner.line(base, up[-1], _shifted_pose(goal, shift), tally)
                 if back is not None:
                     lifted = np.concatenate([up, back[1:]])
                     break
@@ -312,7 +312,7 @@ def _try_pick(
     finally:
         checker.put_down(world_from_item)
         checker.allow(touch=model.links(item))
-    model.robot.set(_open(state, opening))
+    model.robot.set(_opened_configuration(state, opening))
     checker.allow()
     try:
         reach = arm_planner.path(base, state.arm, approach[0])
@@ -332,7 +332,7 @@ def _try_pick(
     )
 
 
-def _open(state: RobotState, opening: float) -> Configuration:
+def _opened_configuration(state: RobotState, opening: float) -> Configuration:
     return Configuration(state.base, state.arm, opening)
 
 
@@ -373,13 +373,13 @@ def plan_place(
         )
     serves = True
     if on_tray and places:
-        places, serves = _liftable(model, item, target, door, budgets, random, places, preferred, further)
+        places, serves = _liftable_places(model, item, target, door, budgets, random, places, preferred, further)
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     checker = model.checker
     queue: list[tuple[np.ndarray, Placement]] = []
     wish = [] if preferred is None else [(preferred[0], Placement(preferred[1], *_cover(places, preferred[1])))]
-    model.robot.set(_open(state, model.description.opening))
+    model.robot.set(_opened_configuration(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     checker.allow(touch=model.links(item))
     for placement in places[: max(4, budgets.bases // 6)]:
@@ -405,7 +405,7 @@ def plan_place(
     raise AssertionError("unreachable")
 
 
-def _liftable(
+def _liftable_places(
     model: WorldModel,
     item: str,
     tray: str,
@@ -459,7 +459,7 @@ def _try_place(
         return level_place(model, state, item, base, placement, rest_on, arm_planner, tally)
     checker = model.checker
     item_from_tool = inverse(state.tool_from_item)
-    model.robot.set(_open(state, model.description.opening))
+    model.robot.set(_opened_configuration(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     item_pose = placement.world_from_item
     # a foot that is let down on a tray's rim tips over
@@ -479,14 +479,14 @@ def _try_place(
         if arm is None or not arm_planner.free(base, arm, tally):
             continue
         height = LIFT if placement.covered else DRAWER_LIFT if placement.in_drawer else APPROACH
-        above = _shifted(world_from_tool, np.array([0, 0, height]))
+        above = _shifted_pose(world_from_tool, np.array([0, 0, height]))
         down = arm_planner.line(base, arm, above, tally)
         if down is None:
             continue
         checker.allow(touch=touch)
         if placement.covered:
             flat = above[:3, 2] * np.array([1, 1, 0])
-            out = arm_planner.line(base, down[-1], _shifted(above, -0.25 * flat), tally)
+            out = arm_planner.line(base, down[-1], _shifted_pose(above, -0.25 * flat), tally)
             if out is None:
                 checker.allow(touch=touch, rest_on=allowed_depths)
                 continue
@@ -502,7 +502,7 @@ def _try_place(
     checker.put_down(upright)
     try:
         opening = model.description.opening
-        model.robot.set(_open(state, opening))
+        model.robot.set(_opened_configuration(state, opening))
         checker.allow(touch=touch)
         away_pose = _retreat(world_from_tool, APPROACH + 0.02)
         away = arm_planner.line(base, arm, away_pose, tally)

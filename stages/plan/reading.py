@@ -68,11 +68,11 @@ class Reading:
             texts += [text] if words is None else [literal_text((atom, True)) for atom in sorted(words)]
         if self.given is None and all(_plain(text) for text in texts):
             return [parse_goal(tuple(texts), objects)[1]]
-        names = Names(_classes(model) | _joints(objects), partial(self._meant, objects))
+        names = Names(_classes(model) | _joints(objects), partial(self._meaning, objects))
         alternatives_found = together([alternatives(text, names) for text in texts], " ".join(goal))
         if not alternatives_found:
             raise UsageError(f"goal {' '.join(goal)[:200]!r} can never hold", hint="docs/PLANNING.md, Goals")
-        return self._ranked(model, graph, objects, initial, alternatives_found)
+        return self._rank(model, graph, objects, initial, alternatives_found)
 
     def check(self, model: WorldModel, graph: ContactGraphFile, literal: str) -> Check | None:
         """Return whether a literal of a learned predicate holds; None for one that the room itself is asked for."""
@@ -89,14 +89,14 @@ class Reading:
     ) -> tuple[frozenset[Atom], frozenset[Atom]]:
         to_hold: set[Atom] = set()
         unwanted: set[Atom] = set()
-        names = Names(_classes(model) | _joints(objects), partial(self._meant, objects))
+        names = Names(_classes(model) | _joints(objects), partial(self._meaning, objects))
         for literal in literals:
             (alternative, *_) = alternatives(literal, names) or (frozenset(),)
             to_hold |= {atom for atom, holds in alternative if holds}
             unwanted |= {atom for atom, holds in alternative if not holds}
         return frozenset(to_hold), frozenset(unwanted)
 
-    def _meant(self, objects: dict[str, str], atom: Atom, text: str, quantified: bool) -> frozenset[Atom] | None:
+    def _meaning(self, objects: dict[str, str], atom: Atom, text: str, quantified: bool) -> frozenset[Atom] | None:
         """Return what an atom of a goal stands for: the chain's, or a predicate of the given domain."""
         name = atom[0].removesuffix(f"-{TAUGHT}")
         if self.given is None or name not in self.given.domain.predicates:
@@ -111,7 +111,7 @@ class Reading:
             return _of_chain(objects, atom, quantified)
         return frozenset({(self.given.name_here(name), *atom[1:])})
 
-    def _ranked(
+    def _rank(
         self,
         model: WorldModel,
         graph: ContactGraphFile,

@@ -91,7 +91,7 @@ def refine_action(
     snapshot = model.snapshot()
     for tries_left in reversed(range(BASES)):
         try:
-            return _refined(model, state, name, request, origin)
+            return _refine_from_bases(model, state, name, request, origin)
         except _NoWay as no_way:
             model.restore(snapshot)
             if not tries_left:
@@ -111,7 +111,7 @@ class _NoWay(Exception):
         self.failed = failed
 
 
-def _refined(
+def _refine_from_bases(
     model: WorldModel, state: RobotState, name: str, request: MotionRequest, origin: str
 ) -> tuple[list[Step], RobotState]:
     """As `refine_action`, by the first bases that manipulations are found from. Raises MotionFailed and _NoWay."""
@@ -254,7 +254,7 @@ def _no_task_plan(problem: Problem, plan: TaskPlan, lessons: Lessons) -> Failure
     without = f" ({'; '.join(lessons.words)})" if lessons.words else ""
     if plan.unreachable:
         names = ", ".join(atom_text(atom) for atom in plan.unreachable)
-        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, plan.unreachable)}"
+        message = f"no sequence of actions makes {names} true{without}{_lacking_affordances(problem, plan.unreachable)}"
     elif plan.exhausted:
         names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
         message = f"each of {names} can be reached, but not all together{without}"
@@ -269,7 +269,7 @@ def _no_task_plan(problem: Problem, plan: TaskPlan, lessons: Lessons) -> Failure
     )
 
 
-def _lacking(problem: Problem, unreachable: tuple[Atom, ...]) -> str:
+def _lacking_affordances(problem: Problem, unreachable: tuple[Atom, ...]) -> str:
     """Return the affordances that goals lack, in words: why they cannot be reached, as far as single things say it."""
     words = []
     for predicate, *names in unreachable:

@@ -205,7 +205,7 @@ def execute(
         conduct.steps,
         executed_in="reconstructed" if order.ground_truth is None else "ground_truth",
         checks=checks,
-        matches=tuple(match for name, match in matches.items() if name in _named(conduct.steps, planned)),
+        matches=tuple(match for name, match in matches.items() if name in _names_in_steps(conduct.steps, planned)),
         assumptions=(*used, LOOK_AROUND) if replanning.places else used,
         failures=(*failures, *conduct.failures, *replanning.failures),
         tried=tuple(replanning.tried),
@@ -275,7 +275,7 @@ def _start_failures(physical: PhysicalRobot) -> list[Failure]:
     return []
 
 
-def _named(steps: list[Step], planned: dict[str, SceneBody]) -> set[str]:
+def _names_in_steps(steps: list[Step], planned: dict[str, SceneBody]) -> set[str]:
     """Return the names in the steps' arguments, and the owners of joints among them."""
     arguments = {argument for step in steps for argument in step.arguments}
     return arguments | {name for name in planned for argument in arguments if argument.startswith(f"{name}__")}

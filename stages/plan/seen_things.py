@@ -33,7 +33,7 @@ class SeenThings:
         all of it, as places and radii of feet are counted from there.
         """
         planned = self._planned.setdefault(name, text)
-        believed = _moved(pose, -self._middles.get(name, np.zeros(3)))
+        believed = _moved_pose(pose, -self._middles.get(name, np.zeros(3)))
         best, shape, surface = None, planned, None
         for candidate in [planned, *([self._learned[name]] if name in self._learned else [])]:
             candidate_surface = _surface(candidate)
@@ -51,10 +51,10 @@ class SeenThings:
             own_points = best.scale * _surface(shape)[0]
             middle[:2] = (own_points.min(axis=0) + own_points.max(axis=0))[:2] / 2
         self._middles[name] = middle
-        return _moved(best.pose, middle), shifted_text(scaled_text(shape, best.scale), -middle)
+        return _moved_pose(best.pose, middle), shifted_text(scaled_text(shape, best.scale), -middle)
 
 
-def _moved(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
+def _moved_pose(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
     """Return a pose (4, 4) moved by a shift (3,) of its own frame."""
     moved = pose.copy()
     moved[:3, 3] += pose[:3, :3] @ shift

@@ -164,7 +164,7 @@ def _find(
     """Return where the robot starts, and the plan of the first goal that has one (or the first goal, without)."""
     planning, model = Found(), scene.model
     carry = model.description.carry
-    planning.ungrounded = _ungrounded(scene, parameters, context)
+    planning.ungrounded = _warn_of_ungrounded(scene, parameters, context)
     goals = [(scene.problem(literals), literals) for literals in _candidates(scene, parameters, planning.failures)]
     if not goals and not planning.failures:
         planning.failures.append(_nothing_to_do(model, scene.graph, scene.initial))
@@ -216,7 +216,7 @@ def _start(
     return base
 
 
-def _ungrounded(scene: Scene, parameters: PlanParameters, context: Context) -> tuple[str, ...]:
+def _warn_of_ungrounded(scene: Scene, parameters: PlanParameters, context: Context) -> tuple[str, ...]:
     """Return what can't be grounded of a given domain, and say it in one line."""
     domain = scene.reading.given
     if domain is None:

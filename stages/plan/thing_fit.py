@@ -61,7 +61,7 @@ def fit_thing(
     `seen` (N, 3): points of it that cameras at `eyes` (K, 3) saw; `shape`: points (M, 3) around it and their outward
     normals, own frame; `believed`: its pose (4, 4), from which another attitude must be better by `SURE`.
     """
-    few_points, many_points = _thinned(seen, FEW), _thinned(seen, MANY)
+    few_points, many_points = _thin_out(seen, FEW), _thin_out(seen, MANY)
     turned = [_yaw(2 * np.pi * k / HEADINGS) @ believed[:3, :3] for k in range(HEADINGS)]
     first = _best_scale(
         many_points, eyes, shape, _hopeful(few_points, eyes, shape, turned, upright=True)[0], upright=True
@@ -85,11 +85,11 @@ def _hopeful(
     upright: bool,
 ) -> list[np.ndarray]:
     """Return the poses (4, 4) that a fit from each of the attitudes (3, 3) ends in, those that fit best first."""
-    poses = [_fitted(seen, shape[0], _over(seen, shape[0], turn), upright=upright) for turn in attitudes]
+    poses = [_fit_pose(seen, shape[0], _over(seen, shape[0], turn), upright=upright) for turn in attitudes]
     return sorted(poses, key=lambda pose: _misfit(seen, eyes, shape, pose))
 
 
-def _thinned(points: np.ndarray, most: int) -> np.ndarray:
+def _thin_out(points: np.ndarray, most: int) -> np.ndarray:
     return points[:: max(1, len(points) // most)]
 
 
@@ -132,7 +132,7 @@ def _over(seen: np.ndarray, shape: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return pose
 
 
-def _fitted(seen: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: bool) -> np.ndarray:
+def _fit_pose(seen: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: bool) -> np.ndarray:
     """Return the pose (4, 4) near a first one at which the seen points lie nearest to the shape, trimmed; `upright`: it
     is turned about the vertical only."""
     tree = cKDTree(shape)
@@ -153,7 +153,7 @@ def _best_scale(
         scaled_shape = (scale * shape[0], shape[1])
         start = pose.copy()
         start[2, 3] += (1 - scale) * float((shape[0] @ pose[2, :3]).max())
-        fitted_pose = _fitted(seen, scaled_shape[0], start, upright=upright)
+        fitted_pose = _fit_pose(seen, scaled_shape[0], start, upright=upright)
         return FittedThing(fitted_pose, scale, _misfit(seen, eyes, scaled_shape, fitted_pose))
 
     best = min(map(fitted, SCALES.tolist()), key=lambda fit: fit.misfit)

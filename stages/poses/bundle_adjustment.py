@@ -80,7 +80,7 @@ def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[i
         return item
 
     for edge in edges:
-        for target_feature, source_feature in _agreeing(
+        for target_feature, source_feature in _agreeing_features(
             keys[edge.target].features, keys[edge.source].features, edge.target_from_source
         ):
             first, second = root((edge.target, target_feature)), root((edge.source, source_feature))
@@ -91,7 +91,7 @@ def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[i
     return [group for group in groups.values() if len(group) > 1 and len({key for key, _ in group}) == len(group)]
 
 
-def _agreeing(target: Features, source: Features, target_from_source: np.ndarray) -> list[tuple[int, int]]:
+def _agreeing_features(target: Features, source: Features, target_from_source: np.ndarray) -> list[tuple[int, int]]:
     pairs = match_features(target, source)
     if not len(pairs):
         return []

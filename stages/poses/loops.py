@@ -106,19 +106,19 @@ class Verifier:
             match = ransac_motion(first, second, self._random)
             if match is None or match.inliers < LEAST_FEATURES:
                 return None
-            return self._verified(target, source, match.target_from_source, "place")
-        return self._verified(target, source, np.eye(4), "place")
+            return self._verify(target, source, match.target_from_source, "place")
+        return self._verify(target, source, np.eye(4), "place")
 
     def by_position(self, target: int, source: int, guess: np.ndarray) -> Loop | None:
         """Register two key frames that should see the same where they are now."""
-        loop = self._verified(target, source, guess, "overlap")
+        loop = self._verify(target, source, guess, "overlap")
         if loop is None:
             return None
         moved = between(guess, loop.alignment.target_from_source)
         is_small = distance_of(moved) <= LARGEST_CORRECTION[0] and angle_of(moved) <= LARGEST_CORRECTION[1]
         return loop if is_small else None
 
-    def _verified(self, target: int, source: int, guess: np.ndarray, found_by: FoundBy) -> Loop | None:
+    def _verify(self, target: int, source: int, guess: np.ndarray, found_by: FoundBy) -> Loop | None:
         first, second = self._pyramids(target), self._pyramids(source)
         coarsest = None if found_by == "place" else 1
         alignment = agreed(first, second, guess, self._limits, use_color=self._use_color, coarsest=coarsest)

@@ -152,7 +152,7 @@ class _Arranger:
             best: tuple[float, Pose, PlacedShape] | None = None
             accepted = 0
             for pose in self._poses(furnishing, place):
-                shape = self._acceptable(furnishing, pose, place)
+                shape = self._acceptable_shape(furnishing, pose, place)
                 if shape is None:
                     continue
                 accepted += 1
@@ -281,7 +281,7 @@ class _Arranger:
 
     # Whether a pose is good.
 
-    def _acceptable(self, furnishing: Furnishing, pose: Pose, place: Place) -> PlacedShape | None:
+    def _acceptable_shape(self, furnishing: Furnishing, pose: Pose, place: Place) -> PlacedShape | None:
         """Return the shape at the pose, or None."""
         on_something = place.where in ("on", "across")
         lift = np.eye(4)

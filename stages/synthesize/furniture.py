@@ -91,7 +91,7 @@ class Furnishing:
                 lasting = [
                     plane for plane in lasting if any(same_plane(plane, state_plane) for state_plane in state.planes)
                 ]
-        return tuple(_scaled(plane, self.scale) for plane in lasting)
+        return tuple(_scaled_plane(plane, self.scale) for plane in lasting)
 
     @cached_property
     def drawer_floors(self) -> tuple[SurfacePlane, ...]:
@@ -106,14 +106,14 @@ class Furnishing:
             axis = np.asarray(joint.axis)
             travel = state.joints.get(joint.name, 0.0) * axis
             for plane in self.model.states[0].planes:
-                moved = _shifted(plane, travel)
+                moved = _shifted_plane(plane, travel)
                 went_along = any(same_plane(moved, state_plane) for state_plane in state.planes)
                 if (
                     plane.horizontal
                     and went_along
                     and not any(same_plane(plane, state_plane) for state_plane in state.planes)
                 ):
-                    floors.append(_scaled(_shifted(plane, value * axis), self.scale))
+                    floors.append(_scaled_plane(_shifted_plane(plane, value * axis), self.scale))
         return tuple(floors)
 
     @property
@@ -122,7 +122,7 @@ class Furnishing:
         return (*self.planes, *self.drawer_floors)
 
 
-def _shifted(plane: SurfacePlane, shift: np.ndarray) -> SurfacePlane:
+def _shifted_plane(plane: SurfacePlane, shift: np.ndarray) -> SurfacePlane:
     return plane.model_copy(
         update={
             "offset": plane.offset - float(np.asarray(plane.normal) @ shift),
@@ -141,7 +141,7 @@ def same_plane(a: SurfacePlane, b: SurfacePlane) -> bool:
     )
 
 
-def _scaled(plane: SurfacePlane, scale: float) -> SurfacePlane:
+def _scaled_plane(plane: SurfacePlane, scale: float) -> SurfacePlane:
     if scale == 1.0:
         return plane
     return plane.model_copy(

@@ -39,13 +39,13 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
     affordances = {entry.model: entry for entry in catalogue.library.info.affordances}
     solid = CollisionWorld()
     for thing in arrangement.objects:
-        solid.add(thing.name, thing.furnishing.shape.placed(_lifted(thing)))
+        solid.add(thing.name, thing.furnishing.shape.placed(_lifted_pose(thing)))
     shut: dict[str, PlacedObject] = {}
     opened: dict[str, PlacedObject] = {}
     renumbered: dict[str, dict[int, int]] = {}
     for k in random.permutation(len(arrangement.objects)):
         thing = arrangement.objects[int(k)]
-        names = _openable(thing, affordances.get(thing.furnishing.model.id))
+        names = _openable_joints(thing, affordances.get(thing.furnishing.model.id))
         if len(opened) == count or not names:
             continue
         model, scale = thing.furnishing.model, thing.furnishing.scale
@@ -53,7 +53,7 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
         joint = next(entry for entry in model.joints if entry.name == name)
         value = round(joint.lower + float(random.uniform(*OPENED)) * (joint.upper - joint.lower), 4)
         trial = replace(thing, furnishing=catalogue.furnishing(model, {name: value}, scale))
-        shape = trial.furnishing.shape.placed(_lifted(thing))
+        shape = trial.furnishing.shape.placed(_lifted_pose(thing))
         may_touch = {
             thing.name,
             thing.parent,
@@ -111,7 +111,7 @@ def carried_as_numbered(thing: PlacedObject, numbers: Mapping[str, Mapping[int, 
     return replace(thing, plane=anew(thing.parent, thing.plane), further=further)
 
 
-def _openable(thing: PlacedObject, affordances: Affordances | None) -> list[str]:
+def _openable_joints(thing: PlacedObject, affordances: Affordances | None) -> list[str]:
     """Return the doors and drawers of a thing that stands shut and stays where it is."""
     furnishing = thing.furnishing
     if affordances is None or furnishing.model.movable or any(furnishing.joints.values()):
@@ -119,6 +119,6 @@ def _openable(thing: PlacedObject, affordances: Affordances | None) -> list[str]
     return [use.joint for use in affordances.joints if use.kind in KINDS and not use.behind]
 
 
-def _lifted(thing: PlacedObject) -> np.ndarray:
+def _lifted_pose(thing: PlacedObject) -> np.ndarray:
     """Return its pose a little over what it stands on, so that standing is no touch."""
     return transform_from(np.eye(3), np.array([0.0, 0.0, 2 * TOUCH])) @ thing.world_from_model

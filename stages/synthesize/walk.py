@@ -139,7 +139,7 @@ def smooth_path(path: np.ndarray, space: FreeSpace) -> np.ndarray:
         candidate = gaussian_filter1d(path, sigma / STEP, axis=0, mode="nearest")
         fine = (space.clearance_at(candidate) >= least_clearance).astype(float)
         # Blend with a smooth weight, so that switching filters makes no corner.
-        weight = gaussian_filter1d(np.where(_eroded(fine, int(0.5 / STEP)), 1.0, 0.0), 0.15 / STEP)[:, None]
+        weight = gaussian_filter1d(np.where(_erode(fine, int(0.5 / STEP)), 1.0, 0.0), 0.15 / STEP)[:, None]
         mixed = weight * candidate + (1 - weight) * result
         good = space.clearance_at(mixed) >= CLEARANCE
         if good.all():
@@ -147,7 +147,7 @@ def smooth_path(path: np.ndarray, space: FreeSpace) -> np.ndarray:
     return result
 
 
-def _eroded(flags: np.ndarray, reach: int) -> np.ndarray:
+def _erode(flags: np.ndarray, reach: int) -> np.ndarray:
     bad = np.convolve(1.0 - flags, np.ones(2 * reach + 1), mode="same")
     return bad < 0.5
 

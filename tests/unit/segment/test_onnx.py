@@ -11,7 +11,7 @@ import pytest
 from scenewright.schemas.errors import BadInput, MissingDependency
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.frames import Frame
-from scenewright.stages.segment.backends.onnx.decoding import _pasted
+from scenewright.stages.segment.backends.onnx.decoding import _paste_mask
 from scenewright.stages.segment.backends.onnx.network import fit
 from scenewright.stages.segment.backends.onnx.sidecar import Sidecar, find_layout, read_sidecar
 from scenewright.stages.segment.choice import BackendRequest, choose_backend
@@ -206,12 +206,12 @@ def test_mask_rcnn(tmp_path: Path, whole: bool) -> None:
 
 
 def test_small_masks_fill_their_boxes() -> None:
-    mask = _pasted(np.ones((4, 4), np.float32), (-5.0, 2.0, 6.5, 30.0), (20, 30))
+    mask = _paste_mask(np.ones((4, 4), np.float32), (-5.0, 2.0, 6.5, 30.0), (20, 30))
     expected = np.zeros((20, 30), dtype=bool)
     expected[2:, :7] = True
     assert np.array_equal(mask, expected)
-    assert not _pasted(np.ones((4, 4), np.float32), (3.0, 3.0, 3.0, 9.0), (20, 30)).any()
-    assert not _pasted(np.ones((4, 4), np.float32), (40.0, 3.0, 50.0, 9.0), (20, 30)).any()
+    assert not _paste_mask(np.ones((4, 4), np.float32), (3.0, 3.0, 3.0, 9.0), (20, 30)).any()
+    assert not _paste_mask(np.ones((4, 4), np.float32), (40.0, 3.0, 50.0, 9.0), (20, 30)).any()
 
 
 def test_fitting() -> None:

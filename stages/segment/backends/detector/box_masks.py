@@ -108,7 +108,7 @@ def _over_support(label: int, box: tuple[int, int, int, int], geometry: FrameGeo
     if len(support) < 40:
         return nothing
     support = support[:: max(1, len(support) // 2000)]
-    center, normal, residual = _trimmed_plane(support)
+    center, normal, residual = _fit_trimmed_plane(support)
     depth = geometry.points[y0:y1, x0:x1, 2]
     noise = 0.008 + 0.004 * depth**2
     if residual > 0.01 + 0.004 * float(center[2]) ** 2:
@@ -118,7 +118,7 @@ def _over_support(label: int, box: tuple[int, int, int, int], geometry: FrameGeo
     return (geometry.points[y0:y1, x0:x1] - center) @ normal > noise
 
 
-def _trimmed_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _fit_trimmed_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Return centre, normal and root mean square residual [m] of a plane, after dropping the worst points twice."""
     for keep in (0.8, 0.8, 1.0):
         center = points.mean(axis=0)

@@ -86,7 +86,7 @@ class MasksBackend:
         least = pixels_at(self._settings[1], (height, width))
         try:
             masks = self._source.read(picture_index, (height, width), ReadSettings(self._settings[0], least))
-            segments = {number: segment for number, segment in self._named(masks)}
+            segments = {number: segment for number, segment in self._named_segments(masks)}
         except BadInput as error:
             raise BadInput(f"frame {frame.index}: {error.message}", hint=error.hint) from None
         self._count(masks)
@@ -98,7 +98,7 @@ class MasksBackend:
         listed = {k: segments[number] for k, number in enumerate(numbers, start=1) if number in segments}
         return name_segments(ids, listed, self._vocabulary, minimum_pixels=least)
 
-    def _named(self, given: GivenFrame) -> list[tuple[int, NamedSegment]]:
+    def _named_segments(self, given: GivenFrame) -> list[tuple[int, NamedSegment]]:
         segments = []
         for number, mask in given.masks.items():
             if mask.category is None:

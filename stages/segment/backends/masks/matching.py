@@ -39,7 +39,7 @@ def match_pictures(
     for index, picture in enumerate(pictures):
         frame, matching = _frame_of(picture, varying[index], times, tolerance)
         if frame is None:
-            astray.append(f"{picture.name or 'image'} ({matching} {_told(picture, varying[index])})")
+            astray.append(f"{picture.name or 'image'} ({matching} {_stated_text(picture, varying[index])})")
             continue
         if frame in picture_of_frame:
             first = pictures[picture_of_frame[frame]].name
@@ -96,7 +96,7 @@ def _stamp(picture: Picture) -> float | None:
     return None
 
 
-def _told(picture: Picture, number: int | None) -> str:
+def _stated_text(picture: Picture, number: int | None) -> str:
     stamp = _stamp(picture)
     stated = number if number is not None else picture.number
     return f"{stamp:.6f} s" if stamp is not None else "none" if stated is None else str(stated)

@@ -58,9 +58,9 @@ def load_checkpoint(path: Path, vocabulary: Vocabulary) -> Checkpoint:
         raise BadInput(
             f"{path}: checkpoint version {metadata.get('version')!r}, this code reads {VERSION}", hint=_OTHER
         )
-    if _listed(path, metadata, "channels") != list(CHANNELS) or metadata.get("input_width") != str(INPUT_WIDTH):
+    if _text_list(path, metadata, "channels") != list(CHANNELS) or metadata.get("input_width") != str(INPUT_WIDTH):
         raise BadInput(f"{path}: trained for other inputs than this code makes", hint=_OTHER)
-    classes = tuple(_listed(path, metadata, "classes"))
+    classes = tuple(_text_list(path, metadata, "classes"))
     class_names = {entry.name for entry in vocabulary.classes}
     unknown = [name for name in classes if name not in class_names]
     if unknown or not classes or len(set(classes)) != len(classes):
@@ -73,7 +73,7 @@ def load_checkpoint(path: Path, vocabulary: Vocabulary) -> Checkpoint:
     return Checkpoint(network, classes, metadata.get("description", ""))
 
 
-def _listed(path: Path, metadata: dict[str, str], key: str) -> list[str]:
+def _text_list(path: Path, metadata: dict[str, str], key: str) -> list[str]:
     try:
         value: Any = json.loads(metadata.get(key, "null"))
     except (ValueError, RecursionError):

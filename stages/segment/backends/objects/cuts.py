@@ -36,7 +36,7 @@ class CutSettings:
 
 
 @njit(cache=True)
-def _unrolled(
+def _unroll_patch(
     rows: np.ndarray,
     columns: np.ndarray,
     points: np.ndarray,
@@ -203,7 +203,7 @@ def cut_patches(
             view = some_points.mean(axis=0)
             seen_share = float(np.linalg.norm(np.cross(direction, view / np.linalg.norm(view))))
             size = cell / max(0.4, seen_share)
-            color, filled, low = _unrolled(rows, columns, points, lab, direction, across, size)
+            color, filled, low = _unroll_patch(rows, columns, points, lab, direction, across, size)
             support = _line_support(color, filled, settings.step)
             places = _peaks(support, settings.support, max(3, round(settings.margin / size)), settings.most)
             if not places:

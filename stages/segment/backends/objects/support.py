@@ -94,7 +94,7 @@ def _weight_within(
     return result
 
 
-def _fitted(design: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+def _fit_coefficients(design: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     """Least-squares coefficients by the normal equations: slopes are of order one, so that they are well enough
     conditioned, and a tenth of the time of an orthogonal decomposition. Pixels in a line have the smallest solution."""
     coefficients: np.ndarray = np.linalg.lstsq(design.T @ design, design.T @ inverse, rcond=None)[0]
@@ -127,11 +127,11 @@ def find_supports(depth: np.ndarray, camera: Camera, settings: SupportSettings) 
         for _ in range(REFITS):
             if np.count_nonzero(inside) < 30:
                 break
-            coefficients = _fitted(design[inside], inverse[inside])
+            coefficients = _fit_coefficients(design[inside], inverse[inside])
             inside = unexplained & (np.abs(design @ coefficients - inverse) < settings.thickness)
         if np.count_nonzero(inside) < 30:
             break
-        plane = _fitted(design[inside][:, :3], inverse[inside])
+        plane = _fit_coefficients(design[inside][:, :3], inverse[inside])
         # a + b x + c y = 1/z means (b, c, a) . p = 1; the camera is on the side where the form is below 1.
         length = float(np.linalg.norm(plane))
         normal = -np.array([plane[1], plane[2], plane[0]]) / length

@@ -57,7 +57,7 @@ def yolo_seg(
         logits = np.tensordot(rows[order[k], -count:], prototypes[0].astype(np.float32), axes=1)
         input_logits = cv2.resize(logits, (input_width, input_height), interpolation=cv2.INTER_LINEAR)
         mask = _to_image(input_logits, fitted, shape) > 0
-        x0, y0, x1, y1 = _scaled(boxes[k], fitted)
+        x0, y0, x1, y1 = _scaled_box(boxes[k], fitted)
         things.append(Found(mask & _inside(x0, y0, x1, y1, shape), int(numbers[order[k]]), _unit(best[order[k]])))
     return things
 
@@ -88,7 +88,7 @@ def instances(
         if masks.shape[1:] == fitted.tensor.shape[-2:]:
             mask = _to_image(masks[k], fitted, shape) > MASK_THRESHOLD
         else:
-            mask = _pasted(masks[k], _scaled(boxes[k], fitted), shape)
+            mask = _paste_mask(masks[k], _scaled_box(boxes[k], fitted), shape)
         things.append(Found(mask, int(labels[k]), _unit(scores[k])))
     return things
 
@@ -147,7 +147,7 @@ def _to_image(values: np.ndarray, fitted: Fitted, shape: tuple[int, int]) -> np.
     return inner if inner.shape == shape else cv2.resize(inner, (width, height), interpolation=cv2.INTER_LINEAR)
 
 
-def _scaled(box: np.ndarray, fitted: Fitted) -> tuple[float, float, float, float]:
+def _scaled_box(box: np.ndarray, fitted: Fitted) -> tuple[float, float, float, float]:
     x0, y0, x1, y1 = (float(value) for value in box)
     return x0 / fitted.scale_x, y0 / fitted.scale_y, x1 / fitted.scale_x, y1 / fitted.scale_y
 
@@ -157,7 +157,7 @@ def _inside(x0: float, y0: float, x1: float, y1: float, shape: tuple[int, int]) 
     return (rows >= y0) & (rows <= y1) & (columns >= x0) & (columns <= x1)
 
 
-def _pasted(small: np.ndarray, box: tuple[float, float, float, float], shape: tuple[int, int]) -> np.ndarray:
+def _paste_mask(small: np.ndarray, box: tuple[float, float, float, float], shape: tuple[int, int]) -> np.ndarray:
     """Return the mask (H, W) of a small one (h, w) 0..1 that fills a box; its pixels are sampled at their centres."""
     x0, y0, x1, y1 = box
     mask = np.zeros(shape, dtype=bool)

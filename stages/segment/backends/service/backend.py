@@ -78,7 +78,7 @@ class ServiceBackend:
         stored = self._reader.encoded(frame.index) if frame.color is not None else None
         request = SegmentRequest(frame, camera, self._seed)
         body, content_type = encode_request(request, self.info.streams, stored)
-        return self._named(self._ask(frame.index, body, content_type, (shape[0], shape[1])))
+        return self._panoptic_frame(self._ask(frame.index, body, content_type, (shape[0], shape[1])))
 
     def _ask(self, index: int, body: bytes, content_type: str, shape: tuple[int, int]) -> Reply:
         kept_reply = self._replies.find(body)
@@ -101,7 +101,7 @@ class ServiceBackend:
         self._replies.keep(body, answer.body)
         return reply
 
-    def _named(self, reply: Reply) -> PanopticFrame:
+    def _panoptic_frame(self, reply: Reply) -> PanopticFrame:
         # Small numbers in the same order: tables over ids stay small, and ties are broken as the service had them.
         numbers = sorted(reply.segments)
         ids = np.searchsorted(np.array([0, *numbers]), reply.ids).astype(np.int32)

@@ -34,7 +34,8 @@ def open_source(listing: Listing) -> MaskSource | None:
         return None
     beside = {file.with_suffix(""): file for file in listing.ending(".json")}
     entries_by_file = [
-        _said(listing, beside[file.with_suffix("")]) if file.with_suffix("") in beside else None for file in files
+        _read_entries(listing, beside[file.with_suffix("")]) if file.with_suffix("") in beside else None
+        for file in files
     ]
     classes, divisor = read_classes(listing)
     words = sorted({word for entries in entries_by_file for word, _ in (entries or {}).values() if word})
@@ -75,7 +76,7 @@ def _range(listed: Any) -> str:
     return f"{min(listed)}..{max(listed)}" if listed else "none"
 
 
-def _said(listing: Listing, path: Path) -> dict[int, tuple[str, float]]:
+def _read_entries(listing: Listing, path: Path) -> dict[int, tuple[str, float]]:
     """Return value -> (class name, empty: none; score) of one picture."""
     data = listing.json(path)
     if not isinstance(data, dict):

@@ -84,7 +84,7 @@ def _read(
         )
     if "masks" in have:
         check_amount(len(image), shape, str(path))
-        return flatten(list(image != 0), _told(path, arrays, len(image), numbers), settings, shape)
+        return flatten(list(image != 0), _given_masks(path, arrays, len(image), numbers), settings, shape)
     if image.size and not 0 <= int(image.min()) <= int(image.max()) < 2**31:
         raise BadInput(f"{path}: ids that are not in 0..2^31", hint=HINT)
     ids = image.astype(np.int32)
@@ -99,11 +99,11 @@ def _read(
     missing = sorted(set(present) - set(listed.tolist()))
     if missing:
         raise BadInput(f"{path}: nothing says what id {missing[0]} is ({len(missing)} such ids)", hint=HINT)
-    masks = _told(path, arrays, len(listed), numbers)
+    masks = _given_masks(path, arrays, len(listed), numbers)
     return GivenFrame(ids, dict(zip(listed.tolist(), masks, strict=True)))
 
 
-def _told(path: Path, arrays: dict[str, np.ndarray], count: int, numbers: dict[str, int]) -> list[GivenMask]:
+def _given_masks(path: Path, arrays: dict[str, np.ndarray], count: int, numbers: dict[str, int]) -> list[GivenMask]:
     for name in ("classes", "scores"):
         if name in arrays and arrays[name].shape != (count,):
             raise BadInput(f"{path}: `{name}` is {arrays[name].shape} for {count} masks", hint=HINT)
