@@ -217,8 +217,8 @@ def gather(used: Used, grid: Watched, regions: list[Regions], parameters: Articu
     return [[_cloud(rows) for rows in state] for state in rows_of_region]
 
 
-def _cloud(parts: list[np.ndarray]) -> Cloud:
-    rows = np.concatenate([np.zeros((0, 6)), *parts])
+def _cloud(chunks: list[np.ndarray]) -> Cloud:
+    rows = np.concatenate([np.zeros((0, 6)), *chunks])
     return Cloud(rows[:, :3], rows[:, 3:])
 
 

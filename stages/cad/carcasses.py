@@ -311,15 +311,16 @@ def _labels(patches: Patches, grid: Grid, seen_empty: Callable[[np.ndarray], np.
     return label[: number.size].reshape(shape)
 
 
-def _on_cuts(patches: Patches, grid: Grid, axis: int, way: int) -> np.ndarray:
-    """Return the surface [m²] on the faces across an axis that looks along it (`way` 1) or against it (0): (cuts, first
-    other axis, second other axis). A patch lies at the nearest cut that is faced its way, `CLOSEST` away at most."""
+def _on_cuts(patches: Patches, grid: Grid, axis: int, facing: int) -> np.ndarray:
+    """Return the surface [m²] on the faces across an axis that looks along it (`facing` 1) or against it (0):
+    (cuts, first other axis, second other axis). A patch lies at the nearest cut that is faced its way, `CLOSEST`
+    away at most."""
     cuts = grid.cuts
     others = [a for a in range(3) if a != axis]
     shape = (len(cuts[axis]), len(cuts[others[0]]) - 1, len(cuts[others[1]]) - 1)
     areas = np.zeros(shape)
-    faced = np.flatnonzero(grid.faced[axis][:, way])
-    rows = np.flatnonzero((1.0 if way else -1.0) * patches.normals[:, axis] > ACROSS)
+    faced = np.flatnonzero(grid.faced[axis][:, facing])
+    rows = np.flatnonzero((1.0 if facing else -1.0) * patches.normals[:, axis] > ACROSS)
     if len(faced) == 0 or len(rows) == 0:
         return areas
     points = patches.points[rows]

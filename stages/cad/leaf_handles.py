@@ -43,16 +43,16 @@ def handle_height(leaf: Leaf, seen: Seen) -> float | None:
     return round(max(heights), 4) if heights else None
 
 
-def _seen_share(leaf: Leaf, seen: Seen) -> float:
-    cells = np.unique(np.floor(seen.places[seen.front] / CELL).astype(int), axis=0)
+def _seen_share(leaf: Leaf, leaf_view: Seen) -> float:
+    cells = np.unique(np.floor(leaf_view.places[leaf_view.front] / CELL).astype(int), axis=0)
     return float(len(cells) / np.prod(np.ceil(leaf.size / CELL)))
 
 
-def _graspable(leaf: Leaf, place: np.ndarray) -> bool:
+def _graspable(leaf: Leaf, position: np.ndarray) -> bool:
     """Whether a place (2,) of a leaf is on the half away from its hinge; anywhere, where it slides."""
     if leaf.joint.type == "prismatic":
         return True
     hinge = leaf.scale * np.asarray(leaf.joint.origin)[leaf.others] - leaf.low
     along = np.asarray(leaf.joint.axis)[leaf.others]
     across = int(np.argmin(np.abs(along)))
-    return bool(abs(place[across] - hinge[across]) > 0.5 * leaf.size[across])
+    return bool(abs(position[across] - hinge[across]) > 0.5 * leaf.size[across])

@@ -27,7 +27,7 @@ def seam_contrast(leaf: Leaf, seen: Seen) -> float | None:
     return round(best, 4) if best >= ALONG else None
 
 
-def _share(leaf: Leaf, seen: Seen, axis: int, end: int) -> float | None:
+def _share(leaf: Leaf, leaf_view: Seen, axis: int, end: int) -> float | None:
     """Return which share of the pieces of one edge show a seam: the edge across `axis` at its least (0) or greatest
     end.
 
@@ -37,10 +37,10 @@ def _share(leaf: Leaf, seen: Seen, axis: int, end: int) -> float | None:
     inside = leaf.low[axis] + edge - leaf.body_low[axis]
     if min(inside, leaf.body_size[axis] - inside) < INNER:
         return None
-    across, along = seen.places[:, axis] - edge, seen.places[:, 1 - axis]
+    across, along = leaf_view.places[:, axis] - edge, leaf_view.places[:, 1 - axis]
     pieces = max(1, int(leaf.size[1 - axis] / PIECE))
     number = np.floor(along / leaf.size[1 - axis] * pieces).astype(int)
-    light = seen.colors.mean(axis=1)
+    light = leaf_view.colors.mean(axis=1)
     line = np.abs(across) < BAND
     sides = [(sign * across > SIDES[0]) & (sign * across < SIDES[1]) for sign in (-1, 1)]
     has_seam = []
@@ -50,6 +50,6 @@ def _share(leaf: Leaf, seen: Seen, axis: int, end: int) -> float | None:
         if min(np.count_nonzero(part) for part in line_and_sides) < FEWEST:
             continue
         middle, *others = (float(np.median(light[part])) for part in line_and_sides)
-        depth, *beside = (float(np.median(seen.heights[part])) for part in line_and_sides)
+        depth, *beside = (float(np.median(leaf_view.heights[part])) for part in line_and_sides)
         has_seam.append(middle < min(others) - DARKER or depth < min(beside) - DEEPER)
     return float(np.mean(has_seam)) if len(has_seam) >= SEEN * pieces and len(has_seam) >= 2 else None

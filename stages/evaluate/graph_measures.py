@@ -163,10 +163,10 @@ def iou_with(box: Box, true: TrueObject) -> float:
     return box_iou(turned_to(box, box_yaw(true.box)) if true.round else box, true.box)
 
 
-def _is_hidden(box: Box, hidden: list[TrueObject], seen: list[TrueObject], match_iou: float) -> bool:
+def _is_hidden(box: Box, hidden: list[TrueObject], visible: list[TrueObject], match_iou: float) -> bool:
     best_hidden = max((iou_with(box, true_object) for true_object in hidden), default=0.0)
     return best_hidden > match_iou and best_hidden > max(
-        (iou_with(box, true_object) for true_object in seen), default=0.0
+        (iou_with(box, true_object) for true_object in visible), default=0.0
     )
 
 

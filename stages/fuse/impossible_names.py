@@ -59,10 +59,12 @@ def _possible(class_id: int, extent: float, score: float, vocabulary: Vocabulary
     return is_plausible(vocabulary.by_id(class_id).name, extent / (UNUSUAL if believed else 1.0), cut_off=believed)
 
 
-def _next_name(said: Counter[int], extent: float, seen: int, vocabulary: Vocabulary, unnamed: int) -> int:
+def _next_name(
+    class_scores: Counter[int], extent: float, sighting_count: int, vocabulary: Vocabulary, unnamed: int
+) -> int:
     """Return the class with the largest score of those that a thing of this extent [m] can be of, if it has NAMED_SHARE
     of what its masks said of things; else `unnamed`."""
-    things = {c: s for c, s in said.items() if c != unnamed and vocabulary.by_id(c).kind == "thing"}
-    possible = [c for c, score in things.items() if _possible(c, extent, score / seen, vocabulary)]
+    things = {c: s for c, s in class_scores.items() if c != unnamed and vocabulary.by_id(c).kind == "thing"}
+    possible = [c for c, score in things.items() if _possible(c, extent, score / sighting_count, vocabulary)]
     best = min(possible, key=lambda c: (-things[c], c), default=unnamed)
     return best if things.get(best, 0.0) >= NAMED_SHARE * sum(things.values()) else unnamed

@@ -130,10 +130,10 @@ def _over_floor(surface: Surface, labelled: LabelledSurface, classes: Classes) -
     return surface.vertices - [0.0, 0.0, float(np.median(level))] if len(level) else None
 
 
-def _no_wall(vertices: np.ndarray, normals: np.ndarray, named: np.ndarray, voxel: float) -> np.ndarray:
-    """Return which of the surface (V,) that masks `named` a wall is none: what stands off every wall and has a level
-    top, a desk that a mask mistook."""
-    away = np.flatnonzero(named & (vertices[:, 2] > FLOOR) & ~of_walls(vertices, normals, named, voxel))
+def _no_wall(vertices: np.ndarray, normals: np.ndarray, wall_mask: np.ndarray, voxel: float) -> np.ndarray:
+    """Return which of the surface (V,) that masks called a wall (`wall_mask`) is none: what stands off every wall and
+    has a level top, a desk that a mask mistook."""
+    away = np.flatnonzero(wall_mask & (vertices[:, 2] > FLOOR) & ~of_walls(vertices, normals, wall_mask, voxel))
     result = np.zeros(len(vertices), bool)
     result[away[topped_parts(vertices[away], normals[away], voxel)]] = True
     return result

@@ -159,11 +159,13 @@ class _Footprint:
         return result
 
 
-def _tops(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float) -> list[tuple[int, np.ndarray]]:
+def _tops(
+    points: np.ndarray, normals: np.ndarray, components: np.ndarray, voxel: float
+) -> list[tuple[int, np.ndarray]]:
     """Return the level tops of all parts, the largest first: the part, and the numbers of the points."""
     tops = []
-    for part in np.unique(parts):
-        up = np.flatnonzero((parts == part) & (normals[:, 2] > LEVEL) & (points[:, 2] > LOWEST_TOP))
+    for part in np.unique(components):
+        up = np.flatnonzero((components == part) & (normals[:, 2] > LEVEL) & (points[:, 2] > LOWEST_TOP))
         if len(up) * voxel**2 < LEAST_TOP_AREA:
             continue
         patch = _components(points[up] * [1.0, 1.0, 2.0], voxel)  # a step of more than a voxel parts two levels
@@ -179,15 +181,15 @@ def topped_parts(points: np.ndarray, normals: np.ndarray, voxel: float) -> np.nd
 
 
 def _cut_at_tops(
-    points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float, kept_whole: Collection[int] = ()
+    points: np.ndarray, normals: np.ndarray, components: np.ndarray, voxel: float, kept_whole: Collection[int] = ()
 ) -> tuple[np.ndarray, set[int]]:
     """Cut what stands on the level tops of each part from it, and what rises beside them: a chair, a tall cabinet.
 
     Return the parts (N,), and which of them stand on a top. Nothing is cut from those that are `kept_whole`.
     """
-    result, standing = parts.copy(), set()
-    after = int(parts.max(initial=0)) + 1
-    for part, top in _tops(points, normals, parts, voxel):
+    result, standing = components.copy(), set()
+    after = int(components.max(initial=0)) + 1
+    for part, top in _tops(points, normals, components, voxel):
         level, footprint = float(np.median(points[top, 2])), _Footprint(points[top, :2], voxel)
         if part in kept_whole:
             standing |= _parts_standing_on(level, footprint, points, result) - {part}
@@ -243,7 +245,7 @@ def _cut_from_named(
     normals: np.ndarray,
     names: np.ndarray,
     part_of: np.ndarray,
-    told: np.ndarray,
+    name_scores: np.ndarray,
     name: int,
     voxel: float,
 ) -> tuple[set[int], set[int]]:
@@ -255,18 +257,18 @@ def _cut_from_named(
     loose = members[_of_named(vertices[members], part_of[members], vertices[names == name])]
     around = np.concatenate([np.flatnonzero(names == name), loose])
     cut, on_top = _cut_at_tops(vertices[around], normals[around], np.zeros(len(around), int), voxel)
-    mean = np.bincount(cut, weights=told[around]) / np.maximum(np.bincount(cut), 1)
+    mean = np.bincount(cut, weights=name_scores[around]) / np.maximum(np.bincount(cut), 1)
     cut[mean[cut] >= TOLD] = 0
     first, rising = 1 + int(part_of.max(initial=0)), around[cut > 0]
     part_of[rising], names[rising] = first + cut[cut > 0], 0
     return set(part_of[rising].tolist()), {first + part for part in on_top if part}
 
 
-def _parts_standing_on(level: float, footprint: _Footprint, points: np.ndarray, parts: np.ndarray) -> set[int]:
+def _parts_standing_on(level: float, footprint: _Footprint, points: np.ndarray, components: np.ndarray) -> set[int]:
     """Return the parts that begin on a level top and lie over it."""
     standing = set()
-    for part in np.unique(parts[(points[:, 2] > level) & footprint.holds(points)]):
-        part_points = points[parts == part]
+    for part in np.unique(components[(points[:, 2] > level) & footprint.holds(points)]):
+        part_points = points[components == part]
         if part_points[:, 2].min() > level - RISE and footprint.holds(part_points).mean() > 0.5:
             standing.add(int(part))
     return standing
@@ -283,31 +285,31 @@ def _common(first: np.ndarray, second: np.ndarray) -> float:
     return len(np.intersect1d(first, second, assume_unique=True)) / len(first)
 
 
-def _of_named(points: np.ndarray, parts: np.ndarray, thing: np.ndarray) -> np.ndarray:
+def _of_named(points: np.ndarray, components: np.ndarray, thing: np.ndarray) -> np.ndarray:
     """Return which points (N,) are of parts that lie over or under a named thing (M, 3) and begin below its top."""
     result = np.zeros(len(points), bool)
     beside = cKDTree(thing[:, :2]).query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE
     top = float(np.quantile(thing[:, 2], TOP))
-    for part in np.unique(parts[beside]):
-        of_part = parts == part
+    for part in np.unique(components[beside]):
+        of_part = components == part
         result |= of_part & bool(points[of_part, 2].min() < top - SAME_LEVEL and beside[of_part].mean() >= WITHIN)
     return result
 
 
-def _points_touching(points: np.ndarray, parts: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
+def _points_touching(points: np.ndarray, components: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
     """Return which points (N,) are of parts that touch a thing (M, 3) and are smaller than it."""
-    of_part = np.flatnonzero(parts != NO_PART)
+    of_part = np.flatnonzero(components != NO_PART)
     touching = of_part[cKDTree(thing).query(points[of_part], distance_upper_bound=2.0 * voxel)[0] < 2.0 * voxel]
-    names, sizes = np.unique(parts[of_part], return_counts=True)
-    return np.isin(parts, np.intersect1d(parts[touching], names[sizes < len(thing)]))
+    names, sizes = np.unique(components[of_part], return_counts=True)
+    return np.isin(components, np.intersect1d(components[touching], names[sizes < len(thing)]))
 
 
 def _join_parts(
     points: np.ndarray,
     normals: np.ndarray,
-    parts: np.ndarray,
+    components: np.ndarray,
     standing: set[int],
-    whole: set[int],
+    proposed_parts: set[int],
     voxel: float,
     minimum_area: float,
 ) -> np.ndarray:
@@ -316,10 +318,10 @@ def _join_parts(
 
     What stands on a level top (`standing`) stays apart from what has it.
     """
-    result = parts.copy()
-    names, sizes = np.unique(parts, return_counts=True)
+    result = components.copy()
+    names, sizes = np.unique(components, return_counts=True)
     names = np.array([name for name in names[sizes >= FEWEST] if name not in standing], int)
-    points_of = {name: np.flatnonzero(parts == name) for name in names}
+    points_of = {name: np.flatnonzero(components == name) for name in names}
     cells = {name: _cells(points[points_of[name]], voxel) for name in names}
     trees = {name: cKDTree(points[points_of[name]]) for name in names}
     low = {name: points[points_of[name], 2].min() for name in names}
@@ -335,7 +337,7 @@ def _join_parts(
             gap = float(trees[large].query(points[points_of[small]], distance_upper_bound=STACKED_GAP)[0].min())
             stacked = _common(cells[small], cells[large]) >= STACKED_SHARE and gap < STACKED_GAP
             scrap = len(points_of[small]) < min(SCRAP_SHARE * len(points_of[large]), minimum_area / voxel**2)
-            if stacked or (scrap and gap < SCRAP_DISTANCE and small not in whole):
+            if stacked or (scrap and gap < SCRAP_DISTANCE and small not in proposed_parts):
                 neighbours.append((gap, large))
         if neighbours:
             lower, gone = sorted((result[points_of[small][0]], result[points_of[min(neighbours)[1]][0]]))

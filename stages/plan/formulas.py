@@ -86,8 +86,8 @@ class _Reader:
             return (frozenset((each, True) for each in atoms),)
         return tuple(frozenset({(each, False)}) for each in sorted(atoms))
 
-    def _count(self, listed: list[Expression], wanted: int, message: str) -> None:
-        if len(listed) != wanted:
+    def _count(self, listed: list[Expression], length: int, message: str) -> None:
+        if len(listed) != length:
             raise self.refuse(message)
 
     def _bindings(self, variables: Expression, binding: dict[str, str]) -> Iterator[dict[str, str]]:
@@ -108,31 +108,31 @@ class _Reader:
                 raise self.refuse(f"more than {MOST_INSTANCES} cases to look at; quantify over fewer things")
             yield {**binding, **dict(zip((name for name, _ in pairs), values, strict=True))}
 
-    def _combine(self, parts: Iterator[tuple[Alternative, ...]], together: bool) -> tuple[Alternative, ...]:
+    def _combine(self, branches: Iterator[tuple[Alternative, ...]], together: bool) -> tuple[Alternative, ...]:
         if not together:
-            all_found = tuple(dict.fromkeys(alternative for part in parts for alternative in part))
+            all_found = tuple(dict.fromkeys(alternative for part in branches for alternative in part))
             return self._check_count(_least(all_found))
         result = TRUE
-        for part in parts:
+        for part in branches:
             merged = (first | two for first in result for two in part)
             result = self._check_count(_least(tuple(dict.fromkeys(each for each in merged if _sound(each)))))
         return result
 
-    def _check_count(self, found: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
-        if len(found) > MOST_ALTERNATIVES:
+    def _check_count(self, options: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+        if len(options) > MOST_ALTERNATIVES:
             raise self.refuse(f"more than {MOST_ALTERNATIVES} ways to reach it; name some of the things")
-        return found
+        return options
 
 
 def _sound(alternative: Alternative) -> bool:
     return not any((atom, not holds) in alternative for atom, holds in alternative)
 
 
-def _least(found: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+def _least(options: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
     """Leave out alternatives that ask for more than another one (few are compared: the rest stays)."""
-    if len(found) > 200:
-        return found
-    return tuple(each for each in found if not any(alternative < each for alternative in found))
+    if len(options) > 200:
+        return options
+    return tuple(each for each in options if not any(alternative < each for alternative in options))
 
 
 def alternatives(text: str, names: Names) -> tuple[Alternative, ...]:

@@ -141,15 +141,15 @@ def fit_place(seen: Surface, surface: Surface, start: np.ndarray) -> np.ndarray:
     return motion
 
 
-def _level_step(own: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond: float) -> np.ndarray:
+def _level_step(points: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond: float) -> np.ndarray:
     """Return the turn about the vertical and level shift (4, 4) by one step of Gauss and Newton that brings points
     (N, 3) with normals (N, 3) to planes through their goals (N, 3), or to the goals where those are farther along the
     surface than `beyond` [m]."""
-    offset = goals - own
+    offset = goals - points
     along = offset - np.einsum("ij,ij->i", offset, normals)[:, None] * normals
     over_edge = np.linalg.norm(along, axis=1) > beyond
-    middle = own[:, :2].mean(axis=0)
-    x, y = (own[:, :2] - middle).T
+    middle = points[:, :2].mean(axis=0)
+    x, y = (points[:, :2] - middle).T
     rows = [np.column_stack([normals[:, 0], normals[:, 1], x * normals[:, 1] - y * normals[:, 0]])]
     sides = [np.einsum("ij,ij->i", offset, normals)]
     one, none = np.ones(int(over_edge.sum())), np.zeros(int(over_edge.sum()))
@@ -158,9 +158,9 @@ def _level_step(own: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond:
     matrix, side = np.concatenate(rows), np.concatenate(sides)
     reach = max(float(np.sqrt((x**2 + y**2).mean())), 1e-3)  # at which a turn is a shift
     matrix = matrix / (1.0, 1.0, reach)
-    eigenvalues, eigenvectors = np.linalg.eigh(matrix.T @ matrix / len(own))
+    eigenvalues, eigenvectors = np.linalg.eigh(matrix.T @ matrix / len(points))
     certain_axes = eigenvectors[:, eigenvalues > LEAST_TOLD]
-    moved = certain_axes @ ((certain_axes.T @ matrix.T @ side) / (eigenvalues[eigenvalues > LEAST_TOLD] * len(own)))
+    moved = certain_axes @ ((certain_axes.T @ matrix.T @ side) / (eigenvalues[eigenvalues > LEAST_TOLD] * len(points)))
     shift_x, shift_y, turn = moved / (1.0, 1.0, reach)
     step: np.ndarray = transform_from_yaw(float(turn), np.zeros(3))
     step[:2, 3] = middle + np.array([shift_x, shift_y]) - step[:2, :2] @ middle
@@ -211,10 +211,10 @@ def _reach(tree: cKDTree, points: np.ndarray) -> float:
     return GAP * float(np.median(tree.query(points, k=2)[0][:, 1]))
 
 
-def _sides(seen: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
+def _sides(surface_points: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
     """Return about `most` of the points (N, 3) that cameras at `eyes` (K, 3) saw, and the normals (N, 3) there, towards
     the nearest camera: of the plane through the points around."""
-    points, cloud = _thin_out(seen, most), _thin_out(seen, AROUND_OF)
+    points, cloud = _thin_out(surface_points, most), _thin_out(surface_points, AROUND_OF)
     around = cloud[cKDTree(cloud).query(points, k=min(AROUND, len(cloud)))[1]]
     offset = around - around.mean(axis=1, keepdims=True)
     normals: np.ndarray = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))[1][:, :, 0]

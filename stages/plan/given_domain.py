@@ -169,9 +169,9 @@ def _ways(operator: str) -> tuple[str, ...]:
     return tuple(name for name in FAMILIES.get(base, (base,)) if name in schema_names)
 
 
-def _compared_count(way: str) -> int:
+def _compared_count(schema_name: str) -> int:
     """Return how many of the first arguments have to be those of the operator: what is put needs a place too."""
-    return 2 if action_named(way).hand == "puts" else 1
+    return 2 if action_named(schema_name).hand == "puts" else 1
 
 
 def _bodies(action: GroundAction) -> tuple[str, ...]:
@@ -179,12 +179,12 @@ def _bodies(action: GroundAction) -> tuple[str, ...]:
     return tuple(name.split(PART_SEPARATOR)[0] for name in action.arguments[: _compared_count(action.name)])
 
 
-def _is(domain: Domain, name: str, own: str, class_name: str, kind: str) -> bool:
+def _is(domain: Domain, name: str, object_type: str, class_name: str, kind: str) -> bool:
     """Whether an object is of a type: its class, a type of the chain, or one above one of these in the domain."""
-    if kind == class_name or (kind in DOMAIN.types and DOMAIN.is_a(own, kind)):
+    if kind == class_name or (kind in DOMAIN.types and DOMAIN.is_a(object_type, kind)):
         return True
     below = [each for each, parent in domain.types.items() if parent == kind and each != kind]
-    return any(_is(domain, name, own, class_name, each) for each in below)
+    return any(_is(domain, name, object_type, class_name, each) for each in below)
 
 
 def _both(action: GroundAction, operator: GroundAction) -> GroundAction:

@@ -117,16 +117,16 @@ class Reading:
         graph: ContactGraphFile,
         objects: dict[str, str],
         initial: frozenset[Atom],
-        found: tuple[Alternative, ...],
+        alternatives_found: tuple[Alternative, ...],
     ) -> list[tuple[str, ...]]:
         """Return alternatives as literals in the order in which one search after the other reaches them."""
-        unranked = {tuple(sorted(map(literal_text, each))): each for each in found}
+        unranked = {tuple(sorted(map(literal_text, each))): each for each in alternatives_found}
         ranked: list[tuple[str, ...]] = []
         if any(not each for each in unranked):
             return [()]
         if self.given is not None:
             initial |= self.given.perceived(model, graph)
-        unwanted = frozenset(atom for each in found for atom, holds in each if not holds)
+        unwanted = frozenset(atom for each in alternatives_found for atom, holds in each if not holds)
         start = replace(task_problem(objects, initial, frozenset()), negative_goal=unwanted)
         problem, actions = self.task(model, start)
         problem = replace(problem, goal=frozenset({(REACHED,)}))

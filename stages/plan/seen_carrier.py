@@ -95,15 +95,15 @@ def _dense(points: np.ndarray) -> np.ndarray:
     return points[counts[number.reshape(-1)] >= least]
 
 
-def _heights(own: np.ndarray, size: np.ndarray) -> np.ndarray:
+def _heights(points: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Return the height [m] of each cell (X, Y) of a rectangle (2,) about the origin, nan where too little was seen."""
     shape = np.maximum(1, np.rint(size / CELL)).astype(int)
-    cells = np.clip(np.floor((own[:, :2] + size / 2) / size * shape), 0, shape - 1).astype(int)
+    cells = np.clip(np.floor((points[:, :2] + size / 2) / size * shape), 0, shape - 1).astype(int)
     flat = cells[:, 0] * shape[1] + cells[:, 1]
     heights = np.full(int(np.prod(shape)), np.nan)
     order = np.argsort(flat, kind="stable")
     numbers, starts = np.unique(flat[order], return_index=True)
-    for number, group in zip(numbers, np.split(own[order, 2], starts[1:]), strict=True):
+    for number, group in zip(numbers, np.split(points[order, 2], starts[1:]), strict=True):
         if len(group) >= LEAST_POINTS:
             heights[number] = np.percentile(group, TOP)
     return heights.reshape(shape)

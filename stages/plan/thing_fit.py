@@ -77,7 +77,7 @@ def fit_thing(
 
 
 def _hopeful(
-    seen: np.ndarray,
+    seen_points: np.ndarray,
     eyes: np.ndarray,
     shape: tuple[np.ndarray, np.ndarray],
     attitudes: list[np.ndarray],
@@ -85,8 +85,10 @@ def _hopeful(
     upright: bool,
 ) -> list[np.ndarray]:
     """Return the poses (4, 4) that a fit from each of the attitudes (3, 3) ends in, those that fit best first."""
-    poses = [_fit_pose(seen, shape[0], _over(seen, shape[0], turn), upright=upright) for turn in attitudes]
-    return sorted(poses, key=lambda pose: _misfit(seen, eyes, shape, pose))
+    poses = [
+        _fit_pose(seen_points, shape[0], _over(seen_points, shape[0], turn), upright=upright) for turn in attitudes
+    ]
+    return sorted(poses, key=lambda pose: _misfit(seen_points, eyes, shape, pose))
 
 
 def _thin_out(points: np.ndarray, most: int) -> np.ndarray:
@@ -121,10 +123,10 @@ def _attitudes() -> list[np.ndarray]:
     return rotations
 
 
-def _over(seen: np.ndarray, shape: np.ndarray, turn: np.ndarray) -> np.ndarray:
+def _over(seen_points: np.ndarray, shape: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Return the pose (4, 4) in an attitude in which the boxes' middles are one over the other, tops level."""
     turned_shape = shape @ turn.T
-    low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
+    low, high = np.percentile(seen_points, 2, axis=0), np.percentile(seen_points, 98, axis=0)
     pose = np.eye(4)
     pose[:3, :3] = turn
     pose[:2, 3] = (low + high - turned_shape.min(axis=0) - turned_shape.max(axis=0))[:2] / 2
@@ -132,20 +134,20 @@ def _over(seen: np.ndarray, shape: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return pose
 
 
-def _fit_pose(seen: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: bool) -> np.ndarray:
+def _fit_pose(seen_points: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: bool) -> np.ndarray:
     """Return the pose (4, 4) near a first one at which the seen points lie nearest to the shape, trimmed; `upright`: it
     is turned about the vertical only."""
     tree = cKDTree(shape)
     for _ in range(ROUNDS):
-        away, nearest = tree.query(apply(inverse(pose), seen))
-        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
-        source, target = apply(pose, shape[nearest[nearest_rows]]), seen[nearest_rows]
+        away, nearest = tree.query(apply(inverse(pose), seen_points))
+        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen_points)))]
+        source, target = apply(pose, shape[nearest[nearest_rows]]), seen_points[nearest_rows]
         pose = (align_upright if upright else align_rigidly)(source, target) @ pose
     return pose
 
 
 def _best_scale(
-    seen: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray, *, upright: bool
+    seen_points: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray, *, upright: bool
 ) -> FittedThing:
     """Return the fit in the size that fits best, tops level with the top that it begins with."""
 
@@ -153,24 +155,24 @@ def _best_scale(
         scaled_shape = (scale * shape[0], shape[1])
         start = pose.copy()
         start[2, 3] += (1 - scale) * float((shape[0] @ pose[2, :3]).max())
-        fitted_pose = _fit_pose(seen, scaled_shape[0], start, upright=upright)
-        return FittedThing(fitted_pose, scale, _misfit(seen, eyes, scaled_shape, fitted_pose))
+        fitted_pose = _fit_pose(seen_points, scaled_shape[0], start, upright=upright)
+        return FittedThing(fitted_pose, scale, _misfit(seen_points, eyes, scaled_shape, fitted_pose))
 
     best = min(map(fitted, SCALES.tolist()), key=lambda fit: fit.misfit)
     return min([best, *(fitted(best.scale + step) for step in FINER)], key=lambda fit: fit.misfit)
 
 
-def _misfit(seen: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray) -> float:
+def _misfit(seen_points: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray) -> float:
     points, normals = apply(pose, shape[0]), shape[1] @ pose[:3, :3].T
-    away, nearest = cKDTree(points).query(seen)
-    beside = np.abs(np.einsum("ij,ij->i", seen - points[nearest], normals[nearest]))
+    away, nearest = cKDTree(points).query(seen_points)
+    beside = np.abs(np.einsum("ij,ij->i", seen_points - points[nearest], normals[nearest]))
     outward = float(np.minimum(np.where(away < BESIDE, beside, away), FAR).mean())
     visible = np.zeros(len(points), dtype=bool)
     for eye in eyes:
         visible |= in_sight(points, normals, eye)
     if not visible.any():
         return 2 * FAR
-    away = np.sort(np.minimum(cKDTree(seen).query(points[visible])[0], FAR))
+    away = np.sort(np.minimum(cKDTree(seen_points).query(points[visible])[0], FAR))
     return outward + float(away[: max(1, int(KEPT * len(away)))].mean())
 
 

@@ -126,7 +126,7 @@ def _record(
     renderers: Sequence[SceneRenderer],
     walk: Walk,
     camera: Camera,
-    seen: SeenSurface,
+    seen_surface: SeenSurface,
     parameters: SynthesizeParameters,
     context: Context,
 ) -> Recording:
@@ -163,7 +163,7 @@ def _record(
                 reflectance = view.albedo.mean(axis=2)
                 depth = disturb_depth(depth, view.incidence, reflectance, gloss[view.instance], camera, noise)
             if second_half or len(renderers) == 1:
-                seen.add(view.depth, view.instance, pose, camera)
+                seen_surface.add(view.depth, view.instance, pose, camera)
             visible += np.bincount(view.instance.reshape(-1), minlength=len(visible))
             valid += int(np.count_nonzero(depth))
             color, right = disturbed_picture(view.color, parameters.picture_noise, pictures), None
@@ -194,7 +194,7 @@ def _write_truth(
     states: TwoStates,
     recording: Recording,
     camera: Camera,
-    seen: SeenSurface,
+    seen_surface: SeenSurface,
     parameters: SynthesizeParameters,
     context: Context,
 ) -> None:
@@ -214,7 +214,7 @@ def _write_truth(
         depth_noise=parameters.depth_noise,
         objects=tuple(true_objects(arrangement, boxes, recording.visible_pixels, states.before)),
     ).write(out / "ground_truth.json")
-    points, instance = seen.result()
+    points, instance = seen_surface.result()
     np.savez(out / "visible.npz", points=points, instance=instance)
     true_mesh(arrangement).export(out / "mesh.ply")
     (out / "room").mkdir()

@@ -62,14 +62,14 @@ def sample_stand(
     return target.world_from_model @ local, index, height < top - INSIDE_DEPTH
 
 
-def _is_allowed(plane: SurfacePlane, base: float, top: float, place: Place) -> bool:
+def _is_allowed(plane: SurfacePlane, base: float, top: float, rule: Place) -> bool:
     if not plane.horizontal or plane.hidden or len(plane.corners) != 4:
         return False
     level = -plane.offset / plane.normal[2]
     inside = level < top - INSIDE_DEPTH
-    if (place.surface == "inside" and not inside) or (place.surface == "top" and inside):
+    if (rule.surface == "inside" and not inside) or (rule.surface == "top" and inside):
         return False
-    return place.height is None or place.height[0] <= base + level <= place.height[1]
+    return rule.height is None or rule.height[0] <= base + level <= rule.height[1]
 
 
 def _is_reachable(target: Furnishing, item: Furnishing, target_from_item: np.ndarray) -> bool:

@@ -39,10 +39,10 @@ class View:
     """(3,) [m]."""
 
 
-def _nearest_floor_point(space: FreeSpace, wanted: np.ndarray, radius: float) -> np.ndarray | None:
+def _nearest_floor_point(space: FreeSpace, target: np.ndarray, radius: float) -> np.ndarray | None:
     """Return the walkable floor point nearest to a wanted one (2,), or None when it is further than `radius`."""
     cells = space.cells()
-    distance = np.linalg.norm(cells - wanted, axis=1)
+    distance = np.linalg.norm(cells - target, axis=1)
     best = int(np.argmin(distance))
     return cells[best] if distance[best] <= radius else None
 

@@ -98,9 +98,9 @@ class MasksBackend:
         listed = {k: segments[number] for k, number in enumerate(numbers, start=1) if number in segments}
         return name_segments(ids, listed, self._vocabulary, minimum_pixels=least)
 
-    def _named_segments(self, given: GivenFrame) -> list[tuple[int, NamedSegment]]:
+    def _named_segments(self, frame_masks: GivenFrame) -> list[tuple[int, NamedSegment]]:
         segments = []
-        for number, mask in given.masks.items():
+        for number, mask in frame_masks.masks.items():
             if mask.category is None:
                 segments.append((number, NamedSegment(UNCLASSED, mask.score)))
                 continue
@@ -113,10 +113,10 @@ class MasksBackend:
                 segments.append((number, NamedSegment(self._labels[mask.category], mask.score)))
         return segments
 
-    def _count(self, given: GivenFrame) -> None:
-        self._tally.overlapping += given.overlapping
-        self._tally.frames += given.overlapping > 0
-        self._tally.faint += given.faint
+    def _count(self, frame_masks: GivenFrame) -> None:
+        self._tally.overlapping += frame_masks.overlapping
+        self._tally.frames += frame_masks.overlapping > 0
+        self._tally.faint += frame_masks.faint
 
     def _report(self) -> None:
         if self._tally.overlapping:
@@ -147,12 +147,12 @@ def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
     raise BadInput(f"{listing.root}: holds no masks that are read here", hint=f"formats: {format_list}")
 
 
-def _labels(source: MaskSource, given: LabelSet | None, where: str) -> dict[int, Label]:
+def _labels(source: MaskSource, label_set: LabelSet | None, where: str) -> dict[int, Label]:
     """Return number -> label. Where the folder names nothing, the ids of the given labels are its numbers."""
     if not source.categories:
-        return {label.id: label for label in given.labels if label.id is not None} if given else {}
+        return {label.id: label for label in label_set.labels if label.id is not None} if label_set else {}
     matched = match_labels(
-        {number: category.name for number, category in source.categories.items()}, given, where=where
+        {number: category.name for number, category in source.categories.items()}, label_set, where=where
     )
     if matched.unknown:
         logger.warning(

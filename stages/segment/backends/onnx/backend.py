@@ -105,13 +105,13 @@ class OnnxBackend:
         return name_instances(masks, shape, self._vocabulary, minimum_pixels=least)
 
 
-def _label_map(network: Network, given: LabelSet | None) -> LabelMap:
+def _label_map(network: Network, label_set: LabelSet | None) -> LabelMap:
     """Return what the network's numbers stand for: by its metadata, its sidecar, or the number of its classes."""
     sidecar, name = network.sidecar, network.path.name
     if isinstance(sidecar.labels, tuple):
-        return _warn_of_unknown(match_labels(dict(enumerate(sidecar.labels)), given, where=name), name)
+        return _warn_of_unknown(match_labels(dict(enumerate(sidecar.labels)), label_set, where=name), name)
     if not sidecar.labels and (names := network.names()):
-        return _warn_of_unknown(match_labels(names, given, where=name), name)
+        return _warn_of_unknown(match_labels(names, label_set, where=name), name)
     count = class_count(network)
     set_name = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
     if not set_name:
@@ -125,7 +125,7 @@ def _label_map(network: Network, given: LabelSet | None) -> LabelMap:
         if count is not None and count != len(labels.labels):
             raise BadInput(f"{name}: has {count} classes, {set_name} has {len(labels.labels)}", hint=HINT)
         names = {number: label.name for number, label in enumerate(labels.labels)}
-    return _warn_of_unknown(match_labels(names, given or labels, where=name), name)
+    return _warn_of_unknown(match_labels(names, label_set or labels, where=name), name)
 
 
 def class_count(network: Network) -> int | None:

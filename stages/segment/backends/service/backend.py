@@ -126,9 +126,9 @@ def _is_vocabulary(categories: dict[int, Category], vocabulary: Vocabulary) -> b
     return {number: category.name for number, category in categories.items()} == ours
 
 
-def _labels(info: ServiceInfo, given: LabelSet | None, address: str) -> dict[int, Label]:
+def _labels(info: ServiceInfo, label_set: LabelSet | None, address: str) -> dict[int, Label]:
     names = {category.id: category.name for category in info.categories}
-    matched = match_labels(names, given, where=address)
+    matched = match_labels(names, label_set, where=address)
     if matched.unknown:
         logger.warning(
             "%s: %d of its categories are in no table and stay void: %s",
