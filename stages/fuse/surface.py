@@ -154,8 +154,8 @@ def _vertices(
                     sum_y += ((corner >> 1) & 1) + (along if axis == 1 else 0.0)
                     sum_z += (corner >> 2) + (along if axis == 2 else 0.0)
                     if write:
-                        near_corner, far = (corner | bit, corner) if along > 0.5 else (corner, corner | bit)
-                        nearest = voxels[near_corner] if voxels[near_corner] >= 0 else voxels[far]
+                        near_corner, far_corner = (corner | bit, corner) if along > 0.5 else (corner, corner | bit)
+                        nearest = voxels[near_corner] if voxels[near_corner] >= 0 else voxels[far_corner]
                         red += color[nearest, 0]
                         green += color[nearest, 1]
                         blue += color[nearest, 2]
