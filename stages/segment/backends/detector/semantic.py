@@ -71,7 +71,7 @@ class SemanticSegmenter:
         pictures = len(shape) == 4 and shape[0] == 1 and shape[3] == 3 and input_tensor["dtype"] == np.uint8
         if not pictures or len(classes) != 3 or classes[0] != 1 or result["dtype"] not in (np.int64, np.int32):
             raise BadInput(f"{weights.name} does not take pictures (uint8) and give out classes", hint=HINT)
-        self._given, self._result = input_tensor["index"], result["index"]
+        self._input_index, self._output_index = input_tensor["index"], result["index"]
         self._size = (int(shape[2]), int(shape[1]))
 
     def classify(self, color: np.ndarray) -> np.ndarray:
@@ -83,9 +83,9 @@ class SemanticSegmenter:
         small = cv2.resize(
             color, self._size, interpolation=cv2.INTER_AREA if width > self._size[0] else cv2.INTER_LINEAR
         )
-        self._interpreter.set_tensor(self._given, small[None])
+        self._interpreter.set_tensor(self._input_index, small[None])
         self._interpreter.invoke()
-        classes = np.asarray(self._interpreter.get_tensor(self._result))[0]
+        classes = np.asarray(self._interpreter.get_tensor(self._output_index))[0]
         if classes.min() < 0 or classes.max() >= len(VOC_NAMES):
             raise BadInput("the semantic network gives out classes beyond PASCAL VOC's 21", hint=HINT)
         return cv2.resize(classes.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
