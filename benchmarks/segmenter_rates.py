@@ -139,9 +139,7 @@ def frames_of(
             points = apply(frame.world_from_camera, back_project(frame.depth, camera)[::STRIDE, ::STRIDE][valid])
             _, owner = instances_of(told, points, np.zeros(len(points), np.int64), None, 0.0)
             ids = masks.ids[::STRIDE, ::STRIDE][valid]
-            present = {
-                int(k): classes[masks.masks[int(k)].category_id] for k in np.unique(ids) if int(k) in masks.masks
-            }
+            present = {int(k): classes[masks.masks[int(k)].class_id] for k in np.unique(ids) if int(k) in masks.masks}
             present = {k: name for k, name in present.items() if name not in layout}
             shared = np.array(
                 [[np.sum((owner == t) & (ids == k)) for k in present] for t in range(len(told.nodes) + 1)]

@@ -115,7 +115,7 @@ class Model(BaseModel):
         data = file_content(path, largest, hint=hint)
         check_integers(data, str(path), hint=hint)
         try:
-            model = cls.model_validate_json(data)
+            model = cls.model_validate_json(data, by_alias=True, by_name=False)
             model.check_read()
             return model
         except ValidationError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from pydantic import ConfigDict, Field
 from scenewright.schemas.artifact import Artifact, Document
 from scenewright.schemas.base import Model
 
@@ -11,10 +12,13 @@ from scenewright.schemas.base import Model
 class FrameSegment(Model):
     """One fused segment (P_k, c_k, o_k) of a frame: geometrically connected pixels with one panoptic label."""
 
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True, serialize_by_alias=True)
+
     id: int
     """Value in the frame's panoptic PNG (COCO: R + 256 G + 65536 B); 0 is void."""
-    category_id: int
-    """Class id of data/vocabulary.toml; 0 = background (geometric segment without a label)."""
+    class_id: int = Field(validation_alias="category_id", serialization_alias="category_id")
+    """Class id of data/vocabulary.toml; 0 = background (geometric segment without a label). `category_id` is COCO's
+    name, which the file has."""
     instance: int
     """Instance o_k within the frame (the same number on all segments of one instance); 0 = background."""
     is_thing: bool

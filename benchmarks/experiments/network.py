@@ -114,10 +114,10 @@ def fused_masks(frame: Frame, camera: Camera, masks: PanopticFrame) -> tuple[np.
     names: dict[int, str] = {}
     joined: dict[tuple[int, int], int] = {}
     for segment in fused.segments:
-        if segment.category_id:
-            key = (segment.category_id, segment.instance or -segment.id)
+        if segment.class_id:
+            key = (segment.class_id, segment.instance or -segment.id)
             lookup[segment.id] = joined.setdefault(key, len(joined) + 1)
-            names[joined[key]] = NAMES[segment.category_id]
+            names[joined[key]] = NAMES[segment.class_id]
     return lookup[fused.ids], names
 
 
@@ -192,7 +192,7 @@ def judge_room(predictor: Predictor, bench: Bench, trials: Mapping[str, Trial]) 
 
 def names_of(masks: PanopticFrame) -> dict[int, str]:
     """Return the class name of every mask."""
-    return {number: NAMES[mask.category_id] for number, mask in masks.masks.items()}
+    return {number: NAMES[mask.class_id] for number, mask in masks.masks.items()}
 
 
 def objects_of(ids: np.ndarray, names: dict[int, str]) -> np.ndarray:
@@ -249,7 +249,7 @@ def judge_log(predictor: Predictor, bench: Bench, trials: Mapping[str, Trial]) -
                     gravity=method != "none",
                     floor=method in ("given", "floor_plane"),
                 )
-                counts[arm].update(NAMES[mask.category_id] for mask in masks.masks.values())
+                counts[arm].update(NAMES[mask.class_id] for mask in masks.masks.values())
                 if k % max(1, total // PICTURES_PER_LOG) == 0 and arm != "network_no_gravity":
                     draw(bench.folder(trial) / f"{k:03d}.png", frame, masks)
     return {
@@ -264,12 +264,12 @@ def draw(file: Path, frame: Frame, masks: PanopticFrame) -> None:
     picture = frame.color if frame.color is not None else np.zeros((*shape, 3), dtype=np.uint8)
     painted = np.full((*shape, 3), 40, dtype=np.uint8)
     for identity, mask in masks.masks.items():
-        name = NAMES[mask.category_id]
+        name = NAMES[mask.class_id]
         painted[masks.ids == identity] = np.round(255 * np.array(entity_color(identity, name)))
     for identity, mask in masks.masks.items():
         rows, columns = np.nonzero(masks.ids == identity)
         if len(rows) > 150:
-            text = f"{NAMES[mask.category_id]} {mask.score:.2f}"
+            text = f"{NAMES[mask.class_id]} {mask.score:.2f}"
             at = (int(columns.mean()) - 25, int(rows.mean()))
             cv2.putText(painted, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (255, 255, 255), 1, cv2.LINE_AA)
     file.parent.mkdir(parents=True, exist_ok=True)

@@ -155,7 +155,7 @@ def save_frames(frames: list[CorridorFrame], folder: Path) -> None:
     described = [
         {
             "listing": [segment.model_dump() for segment in frame.listing],
-            "masks": {str(k): [mask.category_id, mask.is_thing] for k, mask in frame.masks.masks.items()},
+            "masks": {str(k): [mask.class_id, mask.is_thing] for k, mask in frame.masks.masks.items()},
         }
         for frame in frames
     ]

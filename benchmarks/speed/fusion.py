@@ -132,7 +132,7 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
             [
                 FrameSegment(
                     id=number,
-                    category_id=classes[number - 1].id,
+                    class_id=classes[number - 1].id,
                     instance=number,
                     score=1.0,
                     area=1,

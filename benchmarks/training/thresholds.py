@@ -66,7 +66,7 @@ def main() -> None:
                 found = group(
                     logits, heat[0], offsets, predictor.classes, GroupingSettings(**choice), predictor.unnamed
                 )
-                named = {number: names[mask.category_id] for number, mask in found.masks.items()}
+                named = {number: names[mask.class_id] for number, mask in found.masks.items()}
                 ids = found.ids.ravel().astype(np.int64)
                 quality = panoptic_quality(truth, ids, dict(enumerate(frame.classes, start=1)), named, STUFF)
                 for name, entry in quality.items():

@@ -47,7 +47,7 @@ def quality_of(
             frame.labels.ravel().astype(np.int64),
             found.ids.ravel().astype(np.int64),
             dict(enumerate(frame.classes, start=1)),
-            {number: names[mask.category_id] for number, mask in found.masks.items()},
+            {number: names[mask.class_id] for number, mask in found.masks.items()},
             STUFF,
         )
         for name, entry in frame_sums.items():

@@ -47,7 +47,7 @@ def segment_images(frame: FrameSegments, ids: np.ndarray) -> dict[str, np.ndarra
     """Return id images (H, W) of class, instance and fused segment from the ids (H, W) of a panoptic PNG."""
     values, inverse = np.unique(ids, return_inverse=True)
     records = {segment.id: segment for segment in frame.segments}
-    category = np.array([records[int(v)].category_id if int(v) in records else 0 for v in values])
+    category = np.array([records[int(v)].class_id if int(v) in records else 0 for v in values])
     instance = np.array([records[int(v)].instance if int(v) in records else 0 for v in values])
     inverse = inverse.reshape(ids.shape)
     return {"class": category[inverse], "instance": instance[inverse], "segment": ids}

@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 PLANE = 0.015
 """Points so near to a plane are of it [m]."""
 LEAST_SHARE, MOST_PLANES = 0.06, 6
+"""Least share of a state's points in a face, and most faces of a state; by eye."""
 LEAST_AREA = 0.015
 """A face smaller than this is no leaf [m^2]."""
 GRID = 0.02
@@ -33,7 +34,7 @@ NEAR = 0.04
 PARALLEL, SQUARE = np.radians(10.0), np.radians(12.0)
 """Planes that slide into each other are parallel up to the first; those that turn differ by the second or more."""
 LEAST_SLIDE = 0.04
-"""[m]"""
+"""Least way of a drawer [m]."""
 HINGE = 0.25
 """The hinge is at most so far from the leaf's edge, in that state in which more of it was seen [m]."""
 MOST_STAYS = 0.4
@@ -41,7 +42,7 @@ MOST_STAYS = 0.4
 FARTHEST = 1.5
 """The middle of a leaf moves at most so far [m]."""
 LEAST_ARM = 0.02
-"""[m]"""
+"""Least distance of a leaf's middle from its axis [m]."""
 EXPLAINED = 0.3
 """A region of which a joint explains this share changed by it."""
 PIECE = 0.1
@@ -161,7 +162,7 @@ def find_joints(
 
 def first_of(number: int, numbers: tuple[int, ...]) -> tuple[int, ...]:
     """Return the numbers with one of them, or another, at their head."""
-    return (number, *(other for other in numbers if other != number))
+    return (number, *(candidate for candidate in numbers if candidate != number))
 
 
 def best_joint(
@@ -181,10 +182,10 @@ def best_joint(
             if motion is None:
                 continue
             moved_back = apply(inverse(motion.after_from_before), face.points)
-            there = float(np.mean(room.came_full(apply(motion.after_from_before, leaf.points))))
+            forward = float(np.mean(room.came_full(apply(motion.after_from_before, leaf.points))))
             back = float(np.mean(room.was_full(moved_back, row, column)))
             stays = float(np.mean(room.stays_full(moved_back, row, column)))
-            overlap = 0.0 if stays > MOST_STAYS else min(there, back)
+            overlap = 0.0 if stays > MOST_STAYS else min(forward, back)
             if best is None or overlap > best[2]:
                 best = (motion, (row, leaf, column, face), overlap)
     return best
@@ -195,7 +196,7 @@ def faces(cloud: Cloud, random: np.random.Generator) -> list[Face]:
     points, normals = thin_to_grid(cloud.points, cloud.normals, GRID)
     if len(points) < 20:
         return []
-    found = []
+    pieces = []
     for plane in ransac_planes(
         points, normals, distance_threshold=PLANE, random=random, minimum_share=LEAST_SHARE, maximum_planes=MOST_PLANES
     ):
@@ -208,8 +209,8 @@ def faces(cloud: Cloud, random: np.random.Generator) -> list[Face]:
         dense = dense[cKDTree(piece).query(dense)[0] < GRID]
         normal = robust_normal(dense, plane.normal)
         normal = normal if normal @ facing > 0 else -normal
-        found.append(Face(normal, piece, plane_rectangle(piece, normal)[0]))
-    return found
+        pieces.append(Face(normal, piece, plane_rectangle(piece, normal)[0]))
+    return pieces
 
 
 def robust_normal(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -217,10 +218,10 @@ def robust_normal(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
     offset = -float(np.median(points @ normal))
     for _ in range(3):
         distance = np.abs(points @ normal + offset)
-        kept = points[distance <= max(0.005, 2.5 * 1.4826 * float(np.median(distance)))]
-        if len(kept) < 10:
+        inliers = points[distance <= max(0.005, 2.5 * 1.4826 * float(np.median(distance)))]
+        if len(inliers) < 10:
             break
-        normal, offset = fit_plane(kept)
+        normal, offset = fit_plane(inliers)
     return normal
 
 
@@ -266,15 +267,15 @@ def explained(motion: Motion, leaf: Face, face: Face, points: np.ndarray, *, lat
     brought along, its box, is explained too."""
     if not len(points):
         return np.zeros(0, dtype=bool)
-    near = 2 * NEAR
+    reach = 2 * NEAR
     if not later:
         moved = apply(motion.after_from_before, points)
-        found: np.ndarray = (cKDTree(leaf.points).query(points)[0] < near) | (
-            cKDTree(face.points).query(moved)[0] < near
+        is_explained: np.ndarray = (cKDTree(leaf.points).query(points)[0] < reach) | (
+            cKDTree(face.points).query(moved)[0] < reach
         )
     else:
-        found = cKDTree(face.points).query(points)[0] < near
-    return found | between_fronts(motion, leaf, points)
+        is_explained = cKDTree(face.points).query(points)[0] < reach
+    return is_explained | between_fronts(motion, leaf, points)
 
 
 def between_fronts(motion: Motion, leaf: Face, points: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from scenewright.stages.kit.stage import Context, Progress
 from scipy import ndimage
 
 MOST_VOXELS = 20_000_000
-"""Above this the voxels are made larger."""
+"""Most voxels of the grid; above this they are made larger."""
 OUTLIERS = 0.5
 """Percentile of the seen points, at either end, that the grid leaves out."""
 SMALLEST_REGION = 20
@@ -33,6 +33,7 @@ SMALLEST_REGION = 20
 AGREED = 90
 """Percentile of the last frames that show what a region was: some voxels are noisy."""
 NEVER = 1_000_000_000
+"""Stands for the number of a frame after all others."""
 FITTING = 1
 """Random stream."""
 
@@ -118,12 +119,12 @@ def watch(used: Used, grid: Watched, parameters: ArticulateParameters, progress:
 
 def grid_of(used: Used, parameters: ArticulateParameters) -> Watched:
     """Return an empty grid around what the frames saw; of no frame at all, one voxel."""
-    seen = [np.zeros((0, 3))]
+    clouds = [np.zeros((0, 3))]
     for frame in used:
-        near = np.where(frame.depth < parameters.maximum_depth, frame.depth, 0.0)
-        points = back_project(near, frame.camera)[::16, ::16].reshape(-1, 3)
-        seen.append(apply(frame.world_from_camera, points[points[:, 2] > NEAREST]))
-    points = np.concatenate(seen)
+        near_depth = np.where(frame.depth < parameters.maximum_depth, frame.depth, 0.0)
+        points = back_project(near_depth, frame.camera)[::16, ::16].reshape(-1, 3)
+        clouds.append(apply(frame.world_from_camera, points[points[:, 2] > NEAREST]))
+    points = np.concatenate(clouds)
     if not len(points):
         return Watched(np.zeros(3), parameters.voxel_size, (1, 1, 1))
     low, high = np.percentile(points, [OUTLIERS, 100 - OUTLIERS], axis=0)
@@ -184,8 +185,8 @@ class SeenRoom:
         """See Room."""
         last, first = self._times(left, came)
         cells = tuple(self.grid.cells(points).T)
-        seen = (self.grid.first_full[cells] >= 0) & (self.grid.first_full[cells] <= last)
-        return np.asarray(seen & (self.grid.last_full[cells] >= first) & (self.grid.flips[cells] == 0))
+        full_by_then = (self.grid.first_full[cells] >= 0) & (self.grid.first_full[cells] <= last)
+        return np.asarray(full_by_then & (self.grid.last_full[cells] >= first) & (self.grid.flips[cells] == 0))
 
     def _times(self, left: int, came: int) -> tuple[float, float]:
         times = np.stack([self.regions[0].times[left], self.regions[1].times[came]])
@@ -197,27 +198,27 @@ def gather(used: Used, grid: Watched, regions: list[Regions], parameters: Articu
     one voxel around the changed ones is included."""
     around = np.ones((3, 3, 3), dtype=bool)
     number = [np.asarray(ndimage.grey_dilation(region.number, footprint=around)) for region in regions]
-    left, came = regions
-    until = ndimage.grey_dilation(np.where(left.number > 0, left.changes[..., 0], -1), footprint=around)
+    went, came = regions
+    until = ndimage.grey_dilation(np.where(went.number > 0, went.changes[..., 0], -1), footprint=around)
     since = ndimage.grey_erosion(np.where(came.number > 0, came.changes[..., 1], NEVER), footprint=around)
-    parts: list[list[list[np.ndarray]]] = [[[] for _ in range(region.count)] for region in regions]
+    rows_of_region: list[list[list[np.ndarray]]] = [[[] for _ in range(region.count)] for region in regions]
     for frame in used:
-        near = np.where(frame.depth < parameters.maximum_depth, frame.depth, 0.0).astype(np.float32)
-        points, normals = surface_samples(near, frame.camera, frame.world_from_camera)
+        near_depth = np.where(frame.depth < parameters.maximum_depth, frame.depth, 0.0).astype(np.float32)
+        points, normals = surface_samples(near_depth, frame.camera, frame.world_from_camera)
         cells = np.floor((points - grid.origin) / grid.edge).astype(int)
         inside = np.all((cells >= 0) & (cells < grid.shape), axis=1)
         rows = np.column_stack([points, normals])[inside]
         x, y, z = cells[inside].T
         shows = (frame.index <= until[x, y, z], frame.index >= since[x, y, z])
         for which, mask in enumerate(shows):
-            place = np.where(mask, number[which][x, y, z], 0)
-            for k in np.unique(place[place > 0]):
-                parts[which][int(k) - 1].append(rows[place == k])
-    return [[_cloud(rows) for rows in state] for state in parts]
+            region_of_point = np.where(mask, number[which][x, y, z], 0)
+            for k in np.unique(region_of_point[region_of_point > 0]):
+                rows_of_region[which][int(k) - 1].append(rows[region_of_point == k])
+    return [[_cloud(rows) for rows in state] for state in rows_of_region]
 
 
-def _cloud(parts: list[np.ndarray]) -> Cloud:
-    rows = np.concatenate([np.zeros((0, 6)), *parts])
+def _cloud(chunks: list[np.ndarray]) -> Cloud:
+    rows = np.concatenate([np.zeros((0, 6)), *chunks])
     return Cloud(rows[:, :3], rows[:, 3:])
 
 
@@ -244,10 +245,10 @@ def write_changes(folder: Path, grid: Watched, regions: list[Regions], explained
     until = np.full(grid.shape, -1, dtype=np.int32)
     for mask, region in zip(explained, regions, strict=True):
         for number in np.flatnonzero(mask):
-            place = region.number == number
-            last, first = region.changes[place].T
+            in_region = region.number == number
+            last, first = region.changes[in_region].T
             agreed = np.percentile(last, AGREED)
-            until[place] = np.maximum(until[place], np.minimum(int(agreed), first - 1))
+            until[in_region] = np.maximum(until[in_region], np.minimum(int(agreed), first - 1))
     cells = np.argwhere(until >= 0)
     points = (grid.origin + (cells + 0.5) * grid.edge).astype(np.float32)
     np.savez(folder / "changes.npz", points=points, until=until[tuple(cells.T)])

@@ -86,20 +86,20 @@ class Watched:
 
     def cells(self, points: np.ndarray) -> np.ndarray:
         """Return the cells (N, 3) of points (N, 3) [m], those outside moved to the nearest inside."""
-        found = np.floor((points - self.origin) / self.edge).astype(int)
-        return np.asarray(np.clip(found, 0, np.array(self.shape) - 1))
+        indices = np.floor((points - self.origin) / self.edge).astype(int)
+        return np.asarray(np.clip(indices, 0, np.array(self.shape) - 1))
 
     @property
     def moved_away(self) -> np.ndarray:
         """(X, Y, Z) bool: full first, empty later."""
-        found: np.ndarray = (self.left[..., 0] >= 0) & (self.flips <= MOST_FLIPS)
-        return found
+        is_moved: np.ndarray = (self.left[..., 0] >= 0) & (self.flips <= MOST_FLIPS)
+        return is_moved
 
     @property
     def moved_in(self) -> np.ndarray:
         """(X, Y, Z) bool: empty first, full later."""
-        found: np.ndarray = (self.came[..., 0] >= 0) & (self.flips <= MOST_FLIPS)
-        return found
+        is_moved: np.ndarray = (self.came[..., 0] >= 0) & (self.flips <= MOST_FLIPS)
+        return is_moved
 
 
 @numba.njit(cache=True, parallel=True, nogil=True)

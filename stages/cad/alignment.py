@@ -12,7 +12,7 @@ from numba import njit
 from scenewright.stages.cad.matching import CUBE_ROTATIONS, Match
 
 STEP = 1e-6
-"""Of the forward difference (the released code's)."""
+"""Step of the forward difference (the released code's)."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def convex_overlap_area(subject: np.ndarray, clip: np.ndarray) -> float:
     count = len(subject)
     points = np.empty((count + len(clip) + 4, 2))
     points[:count] = subject
-    kept = np.empty_like(points)
+    clipped = np.empty_like(points)
     for m in range(len(clip)):
         sx, sy = clip[m, 0], clip[m, 1]
         ex, ey = clip[(m + 1) % len(clip), 0] - sx, clip[(m + 1) % len(clip), 1] - sy
@@ -71,13 +71,13 @@ def convex_overlap_area(subject: np.ndarray, clip: np.ndarray) -> float:
             before = ex * (points[b, 1] - sy) - ey * (points[b, 0] - sx)
             if (side >= 0.0) != (before >= 0.0):
                 share = before / (before - side)
-                kept[total] = points[b] + share * (points[k] - points[b])
+                clipped[total] = points[b] + share * (points[k] - points[b])
                 total += 1
             if side >= 0.0:
-                kept[total] = points[k]
+                clipped[total] = points[k]
                 total += 1
         count = total
-        points[:count] = kept[:count]
+        points[:count] = clipped[:count]
         if count == 0:
             return 0.0
     area = 0.0
@@ -173,11 +173,11 @@ def _residuals(parameters: np.ndarray, fixed: _Fixed) -> np.ndarray:
 @njit(cache=True)
 def _residual_rows(rows: np.ndarray, fixed: _Fixed) -> np.ndarray:
     first = _residuals(rows[0], fixed)
-    found = np.empty((len(rows), len(first)))
-    found[0] = first
+    residuals = np.empty((len(rows), len(first)))
+    residuals[0] = first
     for k in range(1, len(rows)):
-        found[k] = _residuals(rows[k], fixed)
-    return found
+        residuals[k] = _residuals(rows[k], fixed)
+    return residuals
 
 
 def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.ndarray], np.ndarray]:

@@ -25,7 +25,7 @@ from scenewright.stages.kit.geometry.convex_solids import Solid
 SHRINKING = (0.97, 0.94, 0.9)
 """Scales that are tried, as shares of the fitted one, for what is nowhere free."""
 FAR = 2.5
-"""What is free nowhere near is looked for so many times farther away."""
+"""How many times farther away a free place is looked for where there is none near."""
 CLOSING = (0.8, 0.5, 0.0)
 """Joint values that are tried, as shares of the fitted ones."""
 
@@ -47,7 +47,7 @@ class Apart:
         best: tuple[float, Placed] | None = None
         for reach in (self.maximum_shift, FAR * self.maximum_shift):
             for option in options:
-                depth, placed = self._placed(option, seat, others, reach)
+                depth, placed = self._try_placing(option, seat, others, reach)
                 if best is None or depth < best[0]:
                     best = (depth, placed)
                 if depth == 0.0:
@@ -55,7 +55,9 @@ class Apart:
         assert best is not None  # the placement itself is an option
         return best[1]
 
-    def _placed(self, option: Placement, seat: Seat, others: Sequence[Solid], reach: float) -> tuple[float, Placed]:
+    def _try_placing(
+        self, option: Placement, seat: Seat, others: Sequence[Solid], reach: float
+    ) -> tuple[float, Placed]:
         """Return how deep [m] an option still lies in something, moved by at most `reach` [m], and where."""
         surface = self.surfaces[option.shape.model.id]
         moved, box, stand = seat.standing(option, surface)
@@ -109,7 +111,7 @@ class Apart:
             for share in CLOSING:
                 joints = {name: share * value for name, value in placement.shape.joints.items()}
                 yield replace(placement, shape=shape_at(surface, placement.shape, joints))
-        yield from (other for other in alternatives if other is not placement)
+        yield from (candidate for candidate in alternatives if candidate is not placement)
 
 
 def about_its_foot(placement: Placement, surface: ModelSurface, share: float) -> Placement:

@@ -193,5 +193,5 @@ def _in_order(graph: ContactGraphFile, chosen: Mapping[str, Placement]) -> list[
         box = graph.node(name).box
         return math.inf if box is None else float(np.prod(box.size))
 
-    place = {name: k for k, name in enumerate(order)}
-    return sorted(order, key=lambda name: (level[name], name in chosen, -volume(name), place[name]))
+    rank = {name: k for k, name in enumerate(order)}
+    return sorted(order, key=lambda name: (level[name], name in chosen, -volume(name), rank[name]))

@@ -12,10 +12,12 @@ from scenewright.stages.kit.geometry.boxes import footprint
 REACH = 0.005
 """Surface this near below a point bears it [m]."""
 SPREAD = 0.6
-"""Where a thing is asked whether it is borne: its middle, and its corners drawn in to this share."""
+"""Share to which the corners of a thing's footprint are drawn in; there and in its middle it is asked whether it is
+borne."""
 STEP = 0.01
+"""Distance between two shifts that are tried [m]; by eye."""
 FARTHEST = 0.3
-"""[m]"""
+"""Longest shift towards the middle of the plane [m]."""
 
 
 def borne_share(parent: Placement, surface: ModelSurface, box: Box, height: float) -> float:
@@ -34,12 +36,12 @@ def shift_to_bearing(
     """Return the least shift (2,) [m] towards `middle` (2,), the middle of the plane, at which all five points are
     borne; no shift when they are, or when none of at most `FARTHEST` does better."""
     best_share, best = borne_share(parent, surface, box, height), np.zeros(2)
-    way = np.asarray(middle, dtype=float) - np.asarray(box.center[:2])
-    length = float(np.linalg.norm(way))
+    to_middle = np.asarray(middle, dtype=float) - np.asarray(box.center[:2])
+    length = float(np.linalg.norm(to_middle))
     for distance in np.arange(STEP, min(length, FARTHEST) + STEP / 2, STEP):
         if best_share >= 1.0:
             break
-        shift = way / length * distance
+        shift = to_middle / length * distance
         center = (box.center[0] + shift[0], box.center[1] + shift[1], box.center[2])
         share = borne_share(parent, surface, box.model_copy(update={"center": center}), height)
         if share > best_share:

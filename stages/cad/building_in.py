@@ -38,21 +38,21 @@ def built_in_instead(
     Its model is written into the folder `models`.
     """
     folder = models / f"{target.node.id}_built_in"
-    found = built_in(target.around, mesh, moved, folder)
-    if isinstance(found, str):
-        return replace(entry, reason=f"{entry.reason}; not built in: {found}")
-    placement = found.placement
-    target.surfaces[placement.shape.model.id] = found.surface
+    fitted = built_in(target.around, mesh, moved, folder)
+    if isinstance(fitted, str):
+        return replace(entry, reason=f"{entry.reason}; not built in: {fitted}")
+    placement = fitted.placement
+    target.surfaces[placement.shape.model.id] = fitted.surface
     missing = unsupported_children(placement, target.around, parameters)
     why = "it stands in a wall" if stands_in_wall(placement, target, parameters) else ""
     why = why or (f"nothing of it would support {', '.join(missing)}" if missing else "")
-    why = why or ("it would end above what it stands on" if hovers(placement, found.surface, target.around) else "")
+    why = why or ("it would end above what it stands on" if hovers(placement, fitted.surface, target.around) else "")
     if why:
         shutil.rmtree(folder)
         return replace(entry, reason=f"{entry.reason}; not built in: {why}")
-    fits = f"{found.fit.explained:.0%} explained, {1000 * found.fit.distance:.0f} mm off"
+    fits = f"{fitted.fit.explained:.0%} explained, {1000 * fitted.fit.distance:.0f} mm off"
     reason = (
-        f"built in: {found.boxes} boxes, {found.leaves} leaves, {fits} (its box {1000 * found.box_fit.distance:.0f})"
+        f"built in: {fitted.boxes} boxes, {fitted.leaves} leaves, {fits} (its box {1000 * fitted.box_fit.distance:.0f})"
     )
     return replace(entry, placements=(placement,), reason=reason)
 

@@ -13,9 +13,9 @@ from scenewright.stages.cad.carcasses import Cells
 STRAIGHT = 0.95
 """Cosine from which on a leaf that was seen lies in a side of the carcass."""
 REACH = 0.05
-"""... so near [m]."""
+"""Largest distance between a leaf and the side of the carcass that it closes [m]."""
 THICKNESS, RIM, BOARD = 0.02, 0.015, 0.012
-"""Of a leaf; what of the opening it covers all around; of a drawer's boards [m]."""
+"""Thickness of a leaf, what it covers of the carcass around its opening, and thickness of a drawer's boards [m]."""
 DEEPEST, BEHIND = 0.55, 0.02
 """An opening is so deep at most, and leaves so much of the carcass [m]."""
 LEAST_DEPTH = 0.1
@@ -58,24 +58,24 @@ def leaves_of(
     leaves = []
     for entry in articulations:
         first, second = (np.array(corners) @ world_from_cells for corners in (entry.leaf, entry.leaf_after))
-        found = [(shut, corners) for corners in (first, second) if (shut := _side(cells, corners)) is not None]
-        if not found:
+        shut_sides = [(shut, corners) for corners in (first, second) if (shut := _side(cells, corners)) is not None]
+        if not shut_sides:
             continue
-        if len(found) == 2 and entry.type == "prismatic":  # a drawer's front looks the same way drawn out
-            side = found[0][0]
+        if len(shut_sides) == 2 and entry.type == "prismatic":  # a drawer's front looks the same way drawn out
+            side = shut_sides[0][0]
             out = 1.0 if side.up else -1.0
             opening = out * (second - first).mean(axis=0)[side.axis] > 0
-            side, corners = found[0 if opening else 1]
+            side, corners = shut_sides[0 if opening else 1]
         else:
-            side, corners = found[0]
+            side, corners = shut_sides[0]
             opening = corners is first
         axis = np.asarray(entry.axis) @ world_from_cells
         if opening and _square(second):
             cells = cells.without(second.min(axis=0) - 2 * THICKNESS, second.max(axis=0) + 2 * THICKNESS)
-        made = _cut(cells, side, corners, drawer=entry.type == "prismatic")
-        if made is None:
+        opened = _cut_opening(cells, side, corners, drawer=entry.type == "prismatic")
+        if opened is None:
             continue
-        cells, boxes = made
+        cells, boxes = opened
         leaf = BuiltInLeaf(
             boxes,
             entry.type,
@@ -111,16 +111,18 @@ def _side(cells: Cells, corners: np.ndarray) -> _Shut | None:
     if axis == 2 or normal[axis] < STRAIGHT:
         return None
     others = [a for a in range(3) if a != axis]
-    near = []
+    sides_near = []
     for up in (False, True):
         for low, high in cells.sides(axis, up):
             far = abs(low[axis] - middle[axis])
             if far <= REACH and np.all(middle[others] > low[others]) and np.all(middle[others] < high[others]):
-                near.append((far, up, float(low[axis])))
-    return None if not near else _Shut(axis, min(near)[1], min(near)[2])
+                sides_near.append((far, up, float(low[axis])))
+    return None if not sides_near else _Shut(axis, min(sides_near)[1], min(sides_near)[2])
 
 
-def _cut(cells: Cells, side: _Shut, corners: np.ndarray, *, drawer: bool) -> tuple[Cells, tuple[Span, ...]] | None:
+def _cut_opening(
+    cells: Cells, side: _Shut, corners: np.ndarray, *, drawer: bool
+) -> tuple[Cells, tuple[Span, ...]] | None:
     """Return the carcass with an opening, and the boxes of the leaf before it; None where nothing is behind it."""
     axis, inwards = side.axis, -1.0 if side.up else 1.0
     others = [a for a in range(3) if a != axis]

@@ -39,9 +39,9 @@ BUILT_IN = frozenset(
 )
 """Classes that are built of boards and fronts and stay where they are, and what has no name."""
 LEAST_EDGE = 0.5
-"""Of the longest edge [m]: smaller things are not built in (and nameless ones may be movable)."""
+"""Least length of the longest edge [m]: smaller things are not built in (and nameless ones may be movable)."""
 NEAR = 0.03
-"""What lies so near to a surface that faces its way is explained [m]."""
+"""Largest distance from a surface that faces its way at which surface is explained [m]."""
 EXPLAINED = 0.75
 """Share of what was seen that a built-in explains."""
 LEVEL_KEPT, SAME_LEVEL = 0.9, 0.02
@@ -52,6 +52,7 @@ boards, which hardly a camera sees, are guessed."""
 LEAST_LEVEL = 0.05
 """Less surface that looks up is no place to put things on [m²]."""
 MOST_BOXES = 60
+"""A carcass of more boxes is no piece of furniture; by eye."""
 TRUNCATION = 0.1
 """Distances are cut off here when a built-in is compared with the box [m]."""
 STRAYS = 0.005
@@ -59,8 +60,9 @@ STRAYS = 0.005
 FEWEST = 20
 """Patches of surface without which nothing can be said."""
 SPACING = 0.05
-"""Of points at which a built-in's surface is held against seen space [m]."""
+"""Distance between the points at which a built-in's surface is held against seen space [m]."""
 BODY, GREY = "body", (150, 150, 150)
+"""Name of the part that does not move, and its colour (sRGB) where none was seen."""
 
 
 @dataclass(frozen=True)
@@ -131,15 +133,15 @@ def built_in(
 
     cells = cells_of(patches, low, high, lambda points: empty_depth(points) > NEAR)
     x, y, z = (np.array([low[a], high[a]]) for a in range(3))
-    whole = Cells((x, y, z), np.ones((1, 1, 1), dtype=bool))
-    fit, plain = fit_of(cells, patches, empty_depth), fit_of(whole, patches, empty_depth)
+    bounding_box = Cells((x, y, z), np.ones((1, 1, 1), dtype=bool))
+    fit, plain = fit_of(cells, patches, empty_depth), fit_of(bounding_box, patches, empty_depth)
     if plain.error <= fit.error:
-        cells, fit = whole, plain
+        cells, fit = bounding_box, plain
     reason = _why_not(fit, len(cells.boxes()))
     if reason:
         return reason
     cells, leaves = leaves_of(cells, rotation, articulations)
-    placement, surface = _made(node, cells, leaves, rotation, folder)
+    placement, surface = _write_built_in(node, cells, leaves, rotation, folder)
     return BuiltIn(placement, surface, len(cells.boxes()), len(leaves), fit, plain)
 
 
@@ -158,22 +160,22 @@ def fit_of(cells: Cells, patches: Patches, empty_depth: Callable[[np.ndarray], n
     """Return how well what is full fits a surface, both in the frame of the cells. `empty_depth`: points (N, 3) ->
     how deep they lie in space seen to be empty (N,) [m]."""
     sides = {(axis, up): cells.sides(axis, up) for axis in range(3) for up in (False, True)}
-    everything = [rectangle for own in sides.values() for rectangle in own]
+    everything = [rectangle for rectangles in sides.values() for rectangle in rectangles]
     if not everything:
         return Fit(0.0, 0.0, TRUNCATION, 1.0, TRUNCATION)
     distance = np.full(len(patches.areas), TRUNCATION)
     facing = facing_side(patches.normals)
-    for (axis, up), own in sides.items():
+    for (axis, up), rectangles in sides.items():
         rows = np.flatnonzero(facing == 2 * axis + up)
-        for low, high in own:
+        for low, high in rectangles:
             outside = np.maximum(np.maximum(low - patches.points[rows], patches.points[rows] - high), 0.0)
             distance[rows] = np.minimum(distance[rows], np.linalg.norm(outside, axis=1))
-    near, looks_up = distance < NEAR, facing == 5
+    explained, looks_up = distance < NEAR, facing == 5
     level = patches.areas[looks_up]
     points, areas = spread(everything)
     depth = empty_depth(points)
     return Fit(
-        explained=_share(near, patches.areas),
+        explained=_share(explained, patches.areas),
         level_kept=_share(distance[looks_up] < SAME_LEVEL, level) if level.sum() >= LEAST_LEVEL else 1.0,
         distance=float(np.average(distance, weights=patches.areas)),
         filled=_share(depth > DEEP, areas),
@@ -225,7 +227,7 @@ def _from_the_front(patches: Patches) -> tuple[Patches, np.ndarray]:
     return patches.turned(rotation), rotation
 
 
-def _made(
+def _write_built_in(
     node: GraphNode, cells: Cells, leaves: Sequence[BuiltInLeaf], rotation: np.ndarray, folder: Path
 ) -> tuple[Placement, ModelSurface]:
     """Write the model of a built-in and return where it stands, and its surface."""
@@ -241,11 +243,11 @@ def _made(
         for up in (False, True)
         for a, b in cells.sides(axis, up)
     ]
-    parts = [_part(BODY, body, density, [_quad(*side) for side in sides])]
+    geometries = [_part(BODY, body, density, [_quad(*side) for side in sides])]
     joints = []
     for k, leaf in enumerate(leaves, 1):
         name = f"leaf_{k}"
-        parts.append(_part(name, [solid_box(a - leaf.origin, b - leaf.origin) for a, b in leaf.boxes], density))
+        geometries.append(_part(name, [solid_box(a - leaf.origin, b - leaf.origin) for a, b in leaf.boxes], density))
         joints.append(
             Joint(
                 name=name,
@@ -268,15 +270,15 @@ def _made(
         id=f"{node.id}_built_in",
         class_name=node.class_name,
         articulated=bool(joints),
-        mass=sum(part.properties.mass for part in parts),
+        mass=sum(part.properties.mass for part in geometries),
         states=(state,),
         joints=tuple(joints),
         movable=False,
         contains=bool(joints),
-        parts=tuple(part.name for part in parts),
+        parts=tuple(part.name for part in geometries),
         recipe={"built_in": node.id},
     )
-    write_model_folder(folder, model, parts)
+    write_model_folder(folder, model, geometries)
     values = {joint.name: leaf.value for joint, leaf in zip(joints, leaves, strict=True)}
     shape = shape_of_state(model, state.model_copy(update={"joints": values}))
     return Placement(shape, 1.0, rotation, rotation @ origin, 0.0, 0.0, 0.0), load_surface(folder, model)

@@ -15,6 +15,7 @@ from scenewright.stages.kit.geometry.boxes import points_in_box
 from scenewright.stages.kit.geometry.point_clouds import thin_to_grid
 
 GRID = 0.01
+"""Distance to which vertices are thinned out [m]; by eye."""
 BOX_MARGIN = 0.01
 """Vertices outside the observed box by more than this were stray to the graph and are so here [m]."""
 SAME_PLACE = (0.01, 0.03)
@@ -90,19 +91,19 @@ def shortlist(target: Target, method: CadMethod) -> Shortlist:
 
 def without_repeats(placements: list[Placement]) -> list[Placement]:
     """Drop placements that a better one (earlier in the list) repeats: same model, place, turn and joints."""
-    kept: list[Placement] = []
+    distinct: list[Placement] = []
     for placement in placements:
-        for other in kept:
-            if other.shape.model.id != placement.shape.model.id:
+        for better in distinct:
+            if better.shape.model.id != placement.shape.model.id:
                 continue
-            near = np.linalg.norm(other.translation - placement.translation) < SAME_PLACE[0]
-            turn = np.arccos(np.clip((np.trace(other.rotation.T @ placement.rotation) - 1) / 2, -1, 1))
-            joints = _joint_distance(other.shape, placement.shape)
-            if near and turn < SAME_PLACE[1] and joints < SAME_PLACE[1]:
+            same_position = np.linalg.norm(better.translation - placement.translation) < SAME_PLACE[0]
+            turn = np.arccos(np.clip((np.trace(better.rotation.T @ placement.rotation) - 1) / 2, -1, 1))
+            joints = _joint_distance(better.shape, placement.shape)
+            if same_position and turn < SAME_PLACE[1] and joints < SAME_PLACE[1]:
                 break
         else:
-            kept.append(placement)
-    return kept
+            distinct.append(placement)
+    return distinct
 
 
 def _joint_distance(a: Shape, b: Shape) -> float:

@@ -25,7 +25,8 @@ EDGE = 0.025
 ACROSS = 0.8
 """Surface lies across an axis from this cosine of its normal on."""
 BIN, CLOSEST, THIN = 0.01, 0.03, 0.012
-"""Of the histogram in which flat places are sought; how close two cuts may be, and the two sides of a board [m]."""
+"""Bin of the histogram in which flat places are sought, least distance of two cuts, and of the two sides of a board
+[m]."""
 LEAST_FLAT, FLAT_SHARE = 0.02, 0.04
 """A flat place has so much surface [m²], and this share of what faces the same way."""
 EDGE_BIN, EDGE_SHARE, LEAST_GAP = 0.03, 0.3, 0.12
@@ -35,15 +36,16 @@ YAW_BINS, YAW_REACH, YAW_ROUNDS = 45, math.radians(60.0), 5
 """Turns are counted in steps of two degrees; fronts within a quarter of this of the most frequent one say which it is,
 in so many rounds."""
 WALL = 0.02
-"""Of a cabinet that was seen from inside, where it was not from outside [m]."""
+"""Thickness of a cabinet's wall that was seen from inside and not from outside [m]."""
 BOARD = 0.04
-"""Below a level top a cut for its underside is offered: boards are about so thick, and rarely seen from below [m]."""
+"""Distance below a level top at which a cut for its underside is offered: boards are about so thick, and rarely seen
+from below [m]."""
 SAMPLE = 0.06
 """Distance of the points at which cells are asked whether they were seen to be empty [m]."""
 SEEN_EMPTY = 0.1
-"""So many metres of depth that were seen to be empty are worth one surface."""
+"""Depth that was seen to be empty [m] and is worth as much as surface."""
 SMOOTHNESS = 0.3
-"""What a boundary without surface costs beside what a patch against its side costs, the same area."""
+"""Cost of a boundary without surface beside that of a patch against its side, the same area."""
 CAPACITY = 1e5
 """Units of flow in a square metre."""
 
@@ -109,19 +111,19 @@ class Cells:
             for first, last in merge_cells(np.column_stack([flat, np.zeros(len(flat), int)])):
                 low, high = np.zeros(3), np.zeros(3)
                 low[axis] = high[axis] = self.cuts[axis][k + up]
-                for place, a in enumerate(others):
-                    low[a], high[a] = self.cuts[a][first[place]], self.cuts[a][last[place] + 1]
+                for side, a in enumerate(others):
+                    low[a], high[a] = self.cuts[a][first[side]], self.cuts[a][last[side] + 1]
                 rectangles.append((low, high))
         return rectangles
 
     def cut_at(self, axis: int, value: float) -> Cells:
         """Return the same with one cut more, where there is none yet within a millimetre."""
         cuts = list(self.cuts)
-        place = int(np.searchsorted(cuts[axis], value))
-        if np.abs(cuts[axis] - value).min() < 1e-3 or place in (0, len(cuts[axis])):
+        index = int(np.searchsorted(cuts[axis], value))
+        if np.abs(cuts[axis] - value).min() < 1e-3 or index in (0, len(cuts[axis])):
             return self
-        cuts[axis] = np.insert(cuts[axis], place, value)
-        full = np.insert(self.full, place, np.take(self.full, place - 1, axis=axis), axis=axis)
+        cuts[axis] = np.insert(cuts[axis], index, value)
+        full = np.insert(self.full, index, np.take(self.full, index - 1, axis=axis), axis=axis)
         return Cells((cuts[0], cuts[1], cuts[2]), full)
 
     def without(self, low: np.ndarray, high: np.ndarray) -> Cells:
@@ -142,8 +144,8 @@ def patches_of(mesh: EntityMesh) -> Patches:
     corners = vertices[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double = np.linalg.norm(cross, axis=1)
-    kept = double > 1e-12
-    return Patches(corners[kept].mean(axis=1), cross[kept] / double[kept, None], 0.5 * double[kept])
+    not_flat = double > 1e-12
+    return Patches(corners[not_flat].mean(axis=1), cross[not_flat] / double[not_flat, None], 0.5 * double[not_flat])
 
 
 def own_yaw(patches: Patches) -> float:
@@ -161,8 +163,8 @@ def own_yaw(patches: Patches) -> float:
     turn = (int(np.argmax(counted)) + 0.5) * 2 * np.pi / YAW_BINS - np.pi
     for _ in range(YAW_ROUNDS):
         away = np.angle(around * np.exp(-1j * turn))
-        near = np.abs(away) < YAW_REACH
-        turn += float(np.average(away[near], weights=weights[near])) if near.any() else 0.0
+        in_reach = np.abs(away) < YAW_REACH
+        turn += float(np.average(away[in_reach], weights=weights[in_reach])) if in_reach.any() else 0.0
     return turn / 4
 
 
@@ -174,27 +176,27 @@ def flat_places(coordinates: np.ndarray, areas: np.ndarray) -> list[tuple[float,
     histogram = np.bincount(((coordinates - start) / BIN).astype(int), weights=areas)
     smooth = np.convolve(np.pad(histogram, 1), [1.0, 1.0, 1.0], mode="same")
     least = max(LEAST_FLAT, FLAT_SHARE * float(areas.sum()))
-    found = []
+    places = []
     while smooth.max(initial=0.0) >= least:
         k = int(np.argmax(smooth))
         middle = start + (k - 0.5) * BIN
-        near = np.abs(coordinates - middle) <= 1.5 * BIN
-        place = float(np.average(coordinates[near], weights=areas[near])) if near.any() else middle
-        found.append((place, float(smooth[k])))
+        in_bin = np.abs(coordinates - middle) <= 1.5 * BIN
+        position = float(np.average(coordinates[in_bin], weights=areas[in_bin])) if in_bin.any() else middle
+        places.append((position, float(smooth[k])))
         reach = int(round(CLOSEST / BIN))
         smooth[max(0, k - reach) : k + reach + 1] = 0.0
-    return found
+    return places
 
 
 def _edges(coordinates: np.ndarray, areas: np.ndarray) -> list[float]:
     """Return where the pieces of a flat place begin and end along an axis: coordinates, areas (N,) of its patches."""
     start = coordinates.min()
     histogram = np.bincount(((coordinates - start) / EDGE_BIN).astype(int), weights=areas)
-    taken = np.flatnonzero(histogram > EDGE_SHARE * float(np.median(histogram[histogram > 0])))
-    if len(taken) == 0:
+    full_bins = np.flatnonzero(histogram > EDGE_SHARE * float(np.median(histogram[histogram > 0])))
+    if len(full_bins) == 0:
         return []
-    ends = np.flatnonzero(np.diff(taken) > LEAST_GAP / EDGE_BIN)
-    firsts, lasts = taken[np.r_[0, ends + 1]], taken[np.r_[ends, len(taken) - 1]]
+    ends = np.flatnonzero(np.diff(full_bins) > LEAST_GAP / EDGE_BIN)
+    firsts, lasts = full_bins[np.r_[0, ends + 1]], full_bins[np.r_[ends, len(full_bins) - 1]]
     return [start + EDGE_BIN * k for k in firsts] + [start + EDGE_BIN * (k + 1) for k in lasts]
 
 
@@ -215,14 +217,14 @@ def grid_of(patches: Patches, low: np.ndarray, high: np.ndarray) -> Grid:
     boards: list[float] = []
     for axis in range(3):
         for along, sign in enumerate((-1.0, 1.0)):
-            own = np.flatnonzero(sign * patches.normals[:, axis] > ACROSS)
-            places = flat_places(patches.points[own, axis], patches.areas[own])
-            flat[axis] += [(area, place, along) for place, area in places]
-            boards += [place - BOARD for place, _ in places] if axis == 2 and along else []
-            for place, _ in places:
-                near = own[np.abs(patches.points[own, axis] - place) < CLOSEST]
-                for other in {0, 1, 2} - {axis}:
-                    ends[other] += _edges(patches.points[near, other], patches.areas[near])
+            facing = np.flatnonzero(sign * patches.normals[:, axis] > ACROSS)
+            places = flat_places(patches.points[facing, axis], patches.areas[facing])
+            flat[axis] += [(area, position, along) for position, area in places]
+            boards += [position - BOARD for position, _ in places] if axis == 2 and along else []
+            for position, _ in places:
+                on_place = facing[np.abs(patches.points[facing, axis] - position) < CLOSEST]
+                for across in {0, 1, 2} - {axis}:
+                    ends[across] += _edges(patches.points[on_place, across], patches.areas[on_place])
     axes = [_axis(low[k], high[k], flat[k], [*(boards if k == 2 else []), *ends[k]]) for k in range(3)]
     return Grid((axes[0][0], axes[1][0], axes[2][0]), (axes[0][1], axes[1][1], axes[2][1]))
 
@@ -232,25 +234,25 @@ def _axis(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the cuts of an axis and (C, 2) which way they are faced. Flat places that look opposite ways may be as
     close as the two sides of a board; what is too close to a bound is at the bound."""
-    kept: list[tuple[float, set[int]]] = [(float(low), set()), (float(high), set())]
-    for _, place, along in sorted(flat, reverse=True):
-        bound = min(kept[:2], key=lambda entry: abs(entry[0] - place))
-        nearest = min(kept, key=lambda entry: abs(entry[0] - place))
-        if abs(bound[0] - place) < CLOSEST:
+    cuts: list[tuple[float, set[int]]] = [(float(low), set()), (float(high), set())]
+    for _, position, along in sorted(flat, reverse=True):
+        bound = min(cuts[:2], key=lambda entry: abs(entry[0] - position))
+        nearest = min(cuts, key=lambda entry: abs(entry[0] - position))
+        if abs(bound[0] - position) < CLOSEST:
             bound[1].add(along)
-        elif abs(nearest[0] - place) < THIN:
+        elif abs(nearest[0] - position) < THIN:
             nearest[1].add(along)
-        elif low < place < high and (nearest[1] == {1 - along} or abs(nearest[0] - place) >= CLOSEST):
-            kept.append((place, {along}))
+        elif low < position < high and (nearest[1] == {1 - along} or abs(nearest[0] - position) >= CLOSEST):
+            cuts.append((position, {along}))
     for cut in others:
-        if low < cut < high and min(abs(cut - other) for other, _ in kept) >= CLOSEST:
-            kept.append((cut, set()))
-    if 1 in kept[0][1]:  # an inside was seen; its wall lies beyond
-        kept.append((low - WALL, set()))
-    if 0 in kept[1][1]:
-        kept.append((high + WALL, set()))
-    kept.sort(key=lambda entry: entry[0])
-    return np.array([cut for cut, _ in kept]), np.array([[0 in ways, 1 in ways] for _, ways in kept])
+        if low < cut < high and min(abs(cut - cut_position) for cut_position, _ in cuts) >= CLOSEST:
+            cuts.append((cut, set()))
+    if 1 in cuts[0][1]:  # an inside was seen; its wall lies beyond
+        cuts.append((low - WALL, set()))
+    if 0 in cuts[1][1]:
+        cuts.append((high + WALL, set()))
+    cuts.sort(key=lambda entry: entry[0])
+    return np.array([cut for cut, _ in cuts]), np.array([[0 in facings, 1 in facings] for _, facings in cuts])
 
 
 def cells_of(
@@ -282,7 +284,7 @@ def _labels(patches: Patches, grid: Grid, seen_empty: Callable[[np.ndarray], np.
     for axis in range(3):
         first, second = [a for a in range(3) if a != axis]
         area = np.multiply.outer(edges[first], edges[second])
-        against, along = (_on_cuts(patches, grid, axis, way) for way in (0, 1))
+        against, along = (_on_cuts(patches, grid, axis, facing) for facing in (0, 1))
         bare = SMOOTHNESS * np.maximum(area[None] - against - along, 0.0)
         inner = np.moveaxis(number, axis, 0)
         full_here, empty_here = np.moveaxis(full, axis, 0), np.moveaxis(empty, axis, 0)
@@ -295,40 +297,41 @@ def _labels(patches: Patches, grid: Grid, seen_empty: Callable[[np.ndarray], np.
         columns.append(inner[1:].ravel())
         costs.append(bare[1:-1].ravel())
     source, sink, cells = number.size, number.size + 1, number.ravel()
-    one, other, cost = np.concatenate(rows), np.concatenate(columns), np.concatenate(costs)
+    first_cell, second_cell, cost = np.concatenate(rows), np.concatenate(columns), np.concatenate(costs)
     capacity = np.concatenate([cost, cost, full.ravel(), empty.ravel()])
-    starts = np.concatenate([one, other, np.full(number.size, source), cells])
-    ends = np.concatenate([other, one, cells, np.full(number.size, sink)])
+    starts = np.concatenate([first_cell, second_cell, np.full(number.size, source), cells])
+    ends = np.concatenate([second_cell, first_cell, cells, np.full(number.size, sink)])
     units = np.round(CAPACITY * capacity).astype(np.int32)
     graph = csr_matrix((units, (starts, ends)), shape=(sink + 1, sink + 1), dtype=np.int32)
-    left = graph - maximum_flow(graph, source, sink).flow
-    left.data[left.data < 0] = 0
-    left.eliminate_zeros()
+    residual = graph - maximum_flow(graph, source, sink).flow
+    residual.data[residual.data < 0] = 0
+    residual.eliminate_zeros()
     label = np.zeros(sink + 1, dtype=bool)
-    label[breadth_first_order(left, source, return_predecessors=False)] = True
+    label[breadth_first_order(residual, source, return_predecessors=False)] = True
     return label[: number.size].reshape(shape)
 
 
-def _on_cuts(patches: Patches, grid: Grid, axis: int, way: int) -> np.ndarray:
-    """Return the surface [m²] on the faces across an axis that looks along it (`way` 1) or against it (0): (cuts, first
-    other axis, second other axis). A patch lies at the nearest cut that is faced its way, `CLOSEST` away at most."""
+def _on_cuts(patches: Patches, grid: Grid, axis: int, facing: int) -> np.ndarray:
+    """Return the surface [m²] on the faces across an axis that looks along it (`facing` 1) or against it (0):
+    (cuts, first other axis, second other axis). A patch lies at the nearest cut that is faced its way, `CLOSEST`
+    away at most."""
     cuts = grid.cuts
     others = [a for a in range(3) if a != axis]
     shape = (len(cuts[axis]), len(cuts[others[0]]) - 1, len(cuts[others[1]]) - 1)
-    found = np.zeros(shape)
-    faced = np.flatnonzero(grid.faced[axis][:, way])
-    rows = np.flatnonzero((1.0 if way else -1.0) * patches.normals[:, axis] > ACROSS)
+    areas = np.zeros(shape)
+    faced = np.flatnonzero(grid.faced[axis][:, facing])
+    rows = np.flatnonzero((1.0 if facing else -1.0) * patches.normals[:, axis] > ACROSS)
     if len(faced) == 0 or len(rows) == 0:
-        return found
+        return areas
     points = patches.points[rows]
     far = np.abs(points[:, axis, None] - cuts[axis][faced][None])
     nearest = faced[far.argmin(axis=1)]
-    kept = far.min(axis=1) < CLOSEST
-    place = [np.searchsorted(cuts[a], points[:, a], side="right") - 1 for a in others]
+    on_cut = far.min(axis=1) < CLOSEST
+    cell_index = [np.searchsorted(cuts[a], points[:, a], side="right") - 1 for a in others]
     for k in range(2):
-        kept &= (place[k] >= 0) & (place[k] < shape[k + 1])
-    np.add.at(found, (nearest[kept], place[0][kept], place[1][kept]), patches.areas[rows][kept])
-    return found
+        on_cut &= (cell_index[k] >= 0) & (cell_index[k] < shape[k + 1])
+    np.add.at(areas, (nearest[on_cut], cell_index[0][on_cut], cell_index[1][on_cut]), patches.areas[rows][on_cut])
+    return areas
 
 
 def _empty_volume(cuts: Cuts, seen_empty: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -341,7 +344,7 @@ def _empty_volume(cuts: Cuts, seen_empty: Callable[[np.ndarray], np.ndarray]) ->
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     volume = float(np.prod([(c[-1] - c[0]) / len(axis) for c, axis in zip(cuts, axes, strict=True)]))
     index, inside = _cells(grid, cuts)
-    seen = seen_empty(grid) & inside
-    found = np.zeros(tuple(len(c) - 1 for c in cuts))
-    np.add.at(found, tuple(index[seen].T), volume)
-    return found
+    empty = seen_empty(grid) & inside
+    volumes = np.zeros(tuple(len(c) - 1 for c in cuts))
+    np.add.at(volumes, tuple(index[empty].T), volume)
+    return volumes

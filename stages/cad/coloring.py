@@ -31,13 +31,13 @@ def part_colors(
     """
     at, facing = to_model(placement, vertices), normals @ placement.rotation
     nearest = surface.closest(at, placement.shape.joints, facing)
-    near = placement.scale * nearest.distance <= NEAR
+    close = placement.scale * nearest.distance <= NEAR
     shifts: dict[str, np.ndarray] = {}
     for k, part in enumerate(surface.model.parts):
-        own = near & (nearest.part == k)
-        if np.count_nonzero(own) >= LEAST_VERTICES:
-            own_look = surface.looks[part].colors[nearest.triangle[own]]
-            shifts[part] = trim_mean(colors[own].astype(float) - own_look, STRAY, axis=0)
+        of_part = close & (nearest.part == k)
+        if np.count_nonzero(of_part) >= LEAST_VERTICES:
+            own_look = surface.looks[part].colors[nearest.triangle[of_part]]
+            shifts[part] = trim_mean(colors[of_part].astype(float) - own_look, STRAY, axis=0)
     if not shifts:
         return {}
     means = {part: surface.looks[part].mean for part in surface.model.parts}

@@ -15,8 +15,9 @@ from scenewright.stages.kit.formats.cad_models import part_transforms
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 
 ITERATIONS = 30
+"""Most steps of a refinement; by eye."""
 QUICK_ITERATIONS = 8
-"""Of candidates that may still turn out to be no good."""
+"""Most steps for candidates that may still turn out to be no good."""
 LEAST_STEP = 3e-4
 """The refinement stops at smaller steps [m, rad, share of the scale]."""
 ROBUST_DISTANCE = 0.03
@@ -27,16 +28,17 @@ say nothing of the scale leave it where the planes put it."""
 STATES_PER_JOINT = 4
 """Joint values that are tried in matching, between the limits."""
 MOST_COMBINED = 2
-"""With more joints than this, values are tried for one joint at a time."""
+"""Most joints whose values are tried in all combinations; with more, one joint is tried at a time."""
 SAMPLE = 500
 """Vertices that the refinement looks at."""
 GRID = 9
+"""Joint values that are tried before the best is refined, between the limits; by eye."""
 LEAST_GAIN = 0.02
 """A joint value other than the stored state's must lower the alignment error by this share."""
 AJAR = {"revolute": 0.1, "prismatic": 0.03}
-"""Joints that are less open than this are closed [rad, m] ..."""
+"""Joints that are less open than this are shut [rad, m], unless that costs `AJAR_GAIN`."""
 AJAR_GAIN = 0.2
-"""... unless that raises the alignment error by this share."""
+"""Share by which shutting a joint that is ajar must raise the alignment error for it to stay open."""
 SAME_PART = 0.003
 """A plane belongs to the part that its corners are this close to [m]."""
 
@@ -122,8 +124,8 @@ def solve_within_limits(
     step = np.zeros(len(right))
     free = np.ones(len(right), dtype=bool)
     while True:
-        held = ~free
-        reduced = right[free] - matrix[np.ix_(free, held)] @ step[held]
+        fixed = ~free
+        reduced = right[free] - matrix[np.ix_(free, fixed)] @ step[fixed]
         step[free] = np.linalg.solve(matrix[np.ix_(free, free)], reduced)
         limited = np.clip(step[first:], low, high)
         beyond = np.flatnonzero(free[first:] & (np.abs(limited - step[first:]) > 1e-12))

@@ -11,6 +11,7 @@ from scenewright.stages.kit.formats.numpy_files import read_arrays
 SIDE = 8
 """Voxels along the edge of a block."""
 REACH = 1 << 20
+"""Added to the coordinates of blocks, so that three of 21 bits make one number."""
 LEAST_WEIGHT = 0.5
 """Voxels that were hardly observed are not known to be empty."""
 
@@ -35,17 +36,18 @@ class FreeSpace:
             return np.zeros(len(points))
         voxel = np.floor(points / self.voxel_size).astype(np.int64)
         block, inner = voxel // SIDE, voxel % SIDE
-        wanted = _packed(block)
-        row = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
-        held = self.keys[row] == wanted
+        block_key = _packed_keys(block)
+        row = np.minimum(np.searchsorted(self.keys, block_key), len(self.keys) - 1)
+        has_block = self.keys[row] == block_key
         column = inner[:, 0] + SIDE * inner[:, 1] + SIDE * SIDE * inner[:, 2]
-        return np.where(held, self.distance[row, column].astype(float), 0.0)
+        return np.where(has_block, self.distance[row, column].astype(float), 0.0)
 
 
 NOTHING_KNOWN = FreeSpace(np.zeros(0, dtype=np.int64), np.zeros((0, SIDE**3), dtype=np.float16), 1.0)
+"""The free space of a map that was made without a volume."""
 
 
-def _packed(blocks: np.ndarray) -> np.ndarray:
+def _packed_keys(blocks: np.ndarray) -> np.ndarray:
     shifted = np.asarray(blocks, dtype=np.int64) + REACH
     return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]
 
@@ -65,7 +67,7 @@ def load_free_space(panoptic_map: PanopticMap) -> FreeSpace:
         shapes=("B 3", f"B {SIDE**3}", f"B {SIDE**3}"),
         hint="make the panoptic map again",
     )
-    keys = _packed(blocks)
+    keys = _packed_keys(blocks)
     order = np.argsort(keys, kind="stable")
     tsdf, weight = tsdf[order], weight[order]
     distance = np.where(weight >= LEAST_WEIGHT, np.maximum(tsdf, 0), 0).astype(np.float16)

@@ -14,7 +14,7 @@ DIRECTIONS = 16
 STEPS = (0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.13, 0.16, 0.2)
 """Distances that are tried [m], up to the largest that is allowed."""
 CLEARANCE = 0.0005
-"""What is pushed out of a contact ends up this far from it [m]."""
+"""Distance at which what is pushed out of a contact ends up [m]."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ def free_spot(
     Directions: the compass, and those in which the contacts push; distances grow, so that the first free one is
     about the least (section 2.4.4 asks that nothing penetrates; min-conflicts can only exchange models for that).
     """
-    near = _within_reach(solid, others, maximum_shift)
-    contacts = [contact for other in near if (contact := penetration(solid, other)).depth > tolerance]
+    in_reach = _within_reach(solid, others, maximum_shift)
+    contacts = [contact for other in in_reach if (contact := penetration(solid, other)).depth > tolerance]
     if not contacts:
         return Spot(np.zeros(3), 0.0)
     best = Spot(np.zeros(3), float(sum(contact.depth for contact in contacts)))
@@ -70,7 +70,7 @@ def free_spot(
         if not allowed(distance * direction):
             continue
         offset = np.array([*(distance * direction), 0.0])
-        depth = remaining_depth(solid.shifted(offset), near, tolerance)
+        depth = remaining_depth(solid.shifted(offset), in_reach, tolerance)
         if depth == 0.0:
             return Spot(offset, 0.0)
         if depth < best.depth:

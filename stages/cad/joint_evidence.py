@@ -31,7 +31,7 @@ does not fit opens its doors where that brings them nearer to anything."""
 LEAST_OPEN = 0.25
 """Share of an open part's surface at which the map shows something (the inside of a drawer is hardly seen)."""
 REACH = 0.03
-"""... so near [m]."""
+"""Largest distance from the map at which a point of an open part counts as seen [m]."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def joint_evidence(
     nearest = surface.closest(local / placement.scale, placement.shape.joints)
     fits = float(np.mean(placement.scale * nearest.distance < NEAR)) >= EXPLAINED
     motions = seen_motions(surface, placement, articulations)
-    found: dict[str, JointEvidence] = {}
+    evidence: dict[str, JointEvidence] = {}
     for joint in surface.model.joints:
         grounds: list[Ground] = ["user"] if vouched else []
         grounds += ["moved"] if joint.name in motions else []
@@ -70,15 +70,15 @@ def joint_evidence(
             grounds += ["open"] if _seen_open(surface, placement, joint.part, local) else []
         elif fits:
             leaf = leaf_of(surface, joint, placement.scale)
-            seen = None if leaf is None else seen_on(leaf, local, facing, looked.colors)
-            if leaf is not None and seen is not None:
-                handle, seam = handle_height(leaf, seen), seam_contrast(leaf, seen)
+            leaf_view = None if leaf is None else seen_on(leaf, local, facing, looked.colors)
+            if leaf is not None and leaf_view is not None:
+                handle, seam = handle_height(leaf, leaf_view), seam_contrast(leaf, leaf_view)
                 grounds += ["handle"] if handle is not None else []
                 grounds += ["seam"] if seam is not None else []
-        found[joint.name] = JointEvidence(
+        evidence[joint.name] = JointEvidence(
             grounds=tuple(grounds), handle_height=handle, seam_contrast=seam, motion=motions.get(joint.name)
         )
-    return with_the_rest(found)
+    return with_the_rest(evidence)
 
 
 def _seen_open(surface: ModelSurface, placement: Placement, part: str, local: np.ndarray) -> bool:

@@ -19,7 +19,7 @@ NARROW = 0.09
 LEAST_FLAT, MOST_NOISE = 0.75, 0.008
 """A leaf is flat: this share of it lies on one plane, with no more noise than this [m]."""
 LEAST_SEEN, CELL = 0.35, 0.03
-"""So much of it was seen, counted in cells of this edge [m]."""
+"""Least share of a leaf that was seen, counted in cells of this edge [m]."""
 
 
 def handle_height(leaf: Leaf, seen: Seen) -> float | None:
@@ -34,25 +34,25 @@ def handle_height(leaf: Leaf, seen: Seen) -> float | None:
     graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
     part = connected_components(graph, directed=False)[1]
     heights = [
-        float(own[:, 2].max())
-        for own in (points[part == number] for number in np.unique(part))
-        if len(own) >= FEWEST
-        and np.ptp(own[:, :2], axis=0).min() < NARROW
-        and _graspable(leaf, own[:, :2].mean(axis=0))
+        float(cluster[:, 2].max())
+        for cluster in (points[part == number] for number in np.unique(part))
+        if len(cluster) >= FEWEST
+        and np.ptp(cluster[:, :2], axis=0).min() < NARROW
+        and _graspable(leaf, cluster[:, :2].mean(axis=0))
     ]
     return round(max(heights), 4) if heights else None
 
 
-def _seen_share(leaf: Leaf, seen: Seen) -> float:
-    cells = np.unique(np.floor(seen.places[seen.front] / CELL).astype(int), axis=0)
+def _seen_share(leaf: Leaf, leaf_view: Seen) -> float:
+    cells = np.unique(np.floor(leaf_view.places[leaf_view.front] / CELL).astype(int), axis=0)
     return float(len(cells) / np.prod(np.ceil(leaf.size / CELL)))
 
 
-def _graspable(leaf: Leaf, place: np.ndarray) -> bool:
+def _graspable(leaf: Leaf, position: np.ndarray) -> bool:
     """Whether a place (2,) of a leaf is on the half away from its hinge; anywhere, where it slides."""
     if leaf.joint.type == "prismatic":
         return True
     hinge = leaf.scale * np.asarray(leaf.joint.origin)[leaf.others] - leaf.low
     along = np.asarray(leaf.joint.axis)[leaf.others]
     across = int(np.argmin(np.abs(along)))
-    return bool(abs(place[across] - hinge[across]) > 0.5 * leaf.size[across])
+    return bool(abs(position[across] - hinge[across]) > 0.5 * leaf.size[across])

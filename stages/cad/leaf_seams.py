@@ -16,7 +16,7 @@ FEWEST = 3
 DARKER, DEEPER = 10.0, 0.004
 """A seam is darker than both sides by as much (sRGB, 0 to 255), or deeper [m]."""
 SEEN, ALONG = 0.5, 0.7
-"""Such a share of the edge's pieces was seen, and of those such a share shows the seam."""
+"""Least share of an edge's pieces that was seen, and of those the least share that shows the seam."""
 
 
 def seam_contrast(leaf: Leaf, seen: Seen) -> float | None:
@@ -27,29 +27,29 @@ def seam_contrast(leaf: Leaf, seen: Seen) -> float | None:
     return round(best, 4) if best >= ALONG else None
 
 
-def _share(leaf: Leaf, seen: Seen, axis: int, end: int) -> float | None:
+def _share(leaf: Leaf, leaf_view: Seen, axis: int, end: int) -> float | None:
     """Return which share of the pieces of one edge show a seam: the edge across `axis` at its least (0) or greatest
     end.
 
     None for a silhouette, and where too little of the edge was seen.
     """
-    place = end * leaf.size[axis]
-    inside = leaf.low[axis] + place - leaf.body_low[axis]
+    edge = end * leaf.size[axis]
+    inside = leaf.low[axis] + edge - leaf.body_low[axis]
     if min(inside, leaf.body_size[axis] - inside) < INNER:
         return None
-    across, along = seen.places[:, axis] - place, seen.places[:, 1 - axis]
+    across, along = leaf_view.places[:, axis] - edge, leaf_view.places[:, 1 - axis]
     pieces = max(1, int(leaf.size[1 - axis] / PIECE))
     number = np.floor(along / leaf.size[1 - axis] * pieces).astype(int)
-    light = seen.colors.mean(axis=1)
+    light = leaf_view.colors.mean(axis=1)
     line = np.abs(across) < BAND
     sides = [(sign * across > SIDES[0]) & (sign * across < SIDES[1]) for sign in (-1, 1)]
-    found = []
+    has_seam = []
     for piece in range(pieces):
-        own = number == piece
-        parts = [own & line, *(own & side for side in sides)]
-        if min(np.count_nonzero(part) for part in parts) < FEWEST:
+        of_piece = number == piece
+        line_and_sides = [of_piece & line, *(of_piece & side for side in sides)]
+        if min(np.count_nonzero(part) for part in line_and_sides) < FEWEST:
             continue
-        middle, *others = (float(np.median(light[part])) for part in parts)
-        depth, *beside = (float(np.median(seen.heights[part])) for part in parts)
-        found.append(middle < min(others) - DARKER or depth < min(beside) - DEEPER)
-    return float(np.mean(found)) if len(found) >= SEEN * pieces and len(found) >= 2 else None
+        middle, *others = (float(np.median(light[part])) for part in line_and_sides)
+        depth, *beside = (float(np.median(leaf_view.heights[part])) for part in line_and_sides)
+        has_seam.append(middle < min(others) - DARKER or depth < min(beside) - DEEPER)
+    return float(np.mean(has_seam)) if len(has_seam) >= SEEN * pieces and len(has_seam) >= 2 else None

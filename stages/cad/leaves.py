@@ -20,9 +20,9 @@ LEVEL_BIN = 0.01
 LEAST_FACE = 0.3
 """A face of a part has this share of its largest face's area; the outermost of them is the leaf."""
 BEFORE, BEHIND = 0.12, 0.08
-"""What the map shows so far before and behind a leaf is looked at [m]."""
+"""How far before and behind a leaf the map is looked at [m]."""
 RIM, BESIDE = 0.01, 0.07
-"""What lies so far beside it is of it; what lies so far is its neighbourhood, where seams are looked for [m]."""
+"""How far beside a leaf surface is still of it, and how far its neighbourhood goes, where seams are looked for [m]."""
 FLATNESS = 0.012
 """Farther from the plane of the front is not of it [m]."""
 FEWEST = 30
@@ -80,8 +80,8 @@ def leaf_of(surface: ModelSurface, joint: Joint, scale: float) -> Leaf | None:
     """Return the leaf of a joint of a model under uniform scaling, None where its part lies behind something."""
     poses = part_transforms(surface.model, {})
     corners = {part: scale * apply(poses[part], surface.corners[part]) for part in surface.model.parts}
-    whole = np.concatenate(list(corners.values()))
-    low, high = whole.min(axis=0), whole.max(axis=0)
+    all_corners = np.concatenate(list(corners.values()))
+    low, high = all_corners.min(axis=0), all_corners.max(axis=0)
     own_low, own_high = corners[joint.part].min(axis=0), corners[joint.part].max(axis=0)
     axis, sign = _opening_side(joint, scale, own_low, own_high)
     triangles = surface.surfaces[joint.part]
@@ -135,10 +135,12 @@ def seen_on(leaf: Leaf, points: np.ndarray, normals: np.ndarray, colors: np.ndar
     """
     places = points[:, leaf.others] - leaf.low
     heights = leaf.sign * points[:, leaf.axis] - leaf.level
-    near = np.all((places > -BESIDE) & (places < leaf.size + BESIDE), axis=1) & (heights > -BEHIND) & (heights < BEFORE)
-    places, heights = places[near], heights[near]
+    at_leaf = (
+        np.all((places > -BESIDE) & (places < leaf.size + BESIDE), axis=1) & (heights > -BEHIND) & (heights < BEFORE)
+    )
+    places, heights = places[at_leaf], heights[at_leaf]
     within = np.all((places > -RIM) & (places < leaf.size + RIM), axis=1)
-    outward = within & (leaf.sign * normals[near][:, leaf.axis] > FACES)
+    outward = within & (leaf.sign * normals[at_leaf][:, leaf.axis] > FACES)
     if np.count_nonzero(outward) < FEWEST:
         return None
     levels, counts = np.unique(np.round(heights[outward] / LEVEL_BIN).astype(int), return_counts=True)
@@ -157,5 +159,5 @@ def seen_on(leaf: Leaf, points: np.ndarray, normals: np.ndarray, colors: np.ndar
         front=front,
         flat=float(np.count_nonzero(front) / np.count_nonzero(outward)),
         noise=float(1.4826 * np.median(np.abs(over[front]))),
-        colors=colors[near].astype(float),
+        colors=colors[at_leaf].astype(float),
     )

@@ -53,6 +53,7 @@ def cube_rotations() -> np.ndarray:
 
 
 CUBE_ROTATIONS = cube_rotations()
+"""The 24 turns of a cube onto itself (24, 3, 3); the first four are upright."""
 
 
 def size_error(size_x: np.ndarray, size_y: np.ndarray) -> float:

@@ -95,14 +95,14 @@ class ModelSurface:
             outside = np.maximum(
                 np.maximum(self.corners[part].min(axis=0) - local, 0.0), local - self.corners[part].max(axis=0)
             )
-            asked = np.flatnonzero(np.linalg.norm(outside, axis=1) < distance)
-            groups: list[tuple[int | None, np.ndarray]] = [(None, asked)]
+            in_reach = np.flatnonzero(np.linalg.norm(outside, axis=1) < distance)
+            groups: list[tuple[int | None, np.ndarray]] = [(None, in_reach)]
             if normals is not None:
-                side = facing_side(normals[asked] @ model_from_part[:3, :3])
-                groups = [(int(value), asked[side == value]) for value in np.unique(side)]
+                side = facing_side(normals[in_reach] @ model_from_part[:3, :3])
+                groups = [(int(value), in_reach[side == value]) for value in np.unique(side)]
             for value, rows in groups:
-                whole = self.surfaces[part]
-                asked_of = whole if value is None else self.sides[part].get(value, whole)
+                all_sides = self.surfaces[part]
+                asked_of = all_sides if value is None else self.sides[part].get(value, all_sides)
                 answer = asked_of.scene.compute_closest_points(
                     o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows]))
                 )
@@ -115,7 +115,7 @@ class ModelSurface:
                 facing = answer["primitive_normals"].numpy()[closer].astype(float)
                 normal[chosen] = facing @ model_from_part[:3, :3].T
                 hit = answer["primitive_ids"].numpy()[closer].astype(int)
-                triangle[chosen] = hit if asked_of is whole or value is None else self.numbers[part][value][hit]
+                triangle[chosen] = hit if asked_of is all_sides or value is None else self.numbers[part][value][hit]
         return Nearest(distance, nearest, normal, part_index, triangle)
 
     def part_distance(self, points: np.ndarray, normal: np.ndarray, part: str) -> float:

@@ -80,10 +80,10 @@ class Ours:
         closed = [shape_of_state(model, model.states[0]) for model in target.models]
         shapes = [shape for state in closed for shape in shapes_of_model(target.surfaces[state.model.id], state)]
         matches, counts = self._matches(target, shapes)
-        kept = self._screened(target, matches)
-        rejected = Counter({**counts, "screening rank": len(matches) - len(kept)})
-        aligned = self._refined(target, self._aligned(target, kept, rejected))
-        return Proposals([self._measured(target, match, placement) for match, placement in aligned], rejected)
+        screened = self._screen(target, matches)
+        rejected = Counter({**counts, "screening rank": len(matches) - len(screened)})
+        aligned = self._refine(target, self._align(target, screened, rejected))
+        return Proposals([self._measure(target, match, placement) for match, placement in aligned], rejected)
 
     @property
     def recognises(self) -> bool:
@@ -143,8 +143,8 @@ class Ours:
                 keep=sys.maxsize,
                 upright_only=upright,
             )
-            kept = varied(matches, parameters.matched, _model)
-            return kept, {**counts, "matching rank": len(matches) - len(kept)}
+            best_matches = varied(matches, parameters.matched, _model)
+            return best_matches, {**counts, "matching rank": len(matches) - len(best_matches)}
 
         frames = target.frames(all_frames=True)
         if not target.movable:
@@ -155,7 +155,7 @@ class Ours:
         lying = [match for match in lying if match.tilt > 0][: parameters.matched // 3]
         return [*standing, *lying], dict(Counter(counts) + Counter(others))
 
-    def _screened(self, target: Target, matches: list[Match]) -> list[Match]:
+    def _screen(self, target: Target, matches: list[Match]) -> list[Match]:
         """Return the matches that come closest to the vertices where the matching puts them, best first.
 
         Planes rank badly where they are few or misleading, the failure that the thesis names (section 2.6.6): a cup's
@@ -180,7 +180,7 @@ class Ours:
             )
         return scores
 
-    def _aligned(self, target: Target, matches: list[Match], rejected: Counter[str]) -> list[Aligned]:
+    def _align(self, target: Target, matches: list[Match], rejected: Counter[str]) -> list[Aligned]:
         """Return the matches aligned by planes, the best by their error on vertices: planes alone rank badly where few
         were seen; vertices are the better judge of what deserves refinement, and of whether planes did any good: a
         model with one plane to the observed two is shrunk until it has them."""
@@ -206,7 +206,7 @@ class Ours:
         rejected["alignment rank"] = max(0, len(aligned) - parameters.candidates)
         return varied(aligned, parameters.candidates, lambda entry: _model(entry[0]))
 
-    def _refined(self, target: Target, aligned: list[Aligned]) -> list[Aligned]:
+    def _refine(self, target: Target, aligned: list[Aligned]) -> list[Aligned]:
         """Refine all candidates quickly on the vertices, then the best `FULL_FITS` thoroughly, with joints."""
         points, normals, hangs = target.points, target.normals, target.around.hangs
         some = slice(None, None, max(1, len(points) // QUICK_POINTS))
@@ -240,7 +240,7 @@ class Ours:
         surface = target.surfaces[placement.shape.model.id]
         return score_of(match, placement, error, surface, target.around, self.parameters)
 
-    def _measured(self, target: Target, match: Match, placement: Placement) -> Placement:
+    def _measure(self, target: Target, match: Match, placement: Placement) -> Placement:
         """Return the placement with the alignment error over all vertices and the score that the choice minimises.
 
         A bowl stands in for a plate where the library has no plate like it: what fits hardly worse, and has the name,
@@ -249,7 +249,7 @@ class Ours:
         surface = target.surfaces[placement.shape.model.id]
         error = alignment_error(surface, placement, target.points)
         oriented = robust_error(surface, placement, target.points, target.normals, TRUNCATION)
-        name, named = target.node.class_name, placement.shape.model.class_name
-        stands_in = name != named and any(model.class_name == name for model in target.models)
+        name, model_class = target.node.class_name, placement.shape.model.class_name
+        stands_in = name != model_class and any(model.class_name == name for model in target.models)
         score = self._score(target, match, placement, oriented) + self.parameters.choice_margin * stands_in
         return replace(placement, alignment_error=error, score=score)

@@ -38,15 +38,15 @@ def recognised(own: Shortlist, target: Target, models: Iterable[CadModel], metho
 
     own: what models of the masks' class come to; target: the thing, with the surfaces of all `models`.
     """
-    found = by_class(target, models, method)
-    if not found:
+    shortlists = by_class(target, models, method)
+    if not shortlists:
         return own
-    best, *others = found if not own.placements else [*found, own]
+    best, *others = shortlists if not own.placements else [*shortlists, own]
     score, next_score = best.placements[0].score, min((entry.placements[0].score for entry in others), default=np.inf)
     if score > method.parameters.recognition_error or next_score < score + method.parameters.recognition_margin:
         return own
-    rest = f"all else {1000 * next_score:.0f} mm or more" if others else "nothing else fits"
-    reason = f"by its shape a {best.node.class_name}: {1000 * score:.0f} mm off, {rest}"
+    runner_up = f"all else {1000 * next_score:.0f} mm or more" if others else "nothing else fits"
+    reason = f"by its shape a {best.node.class_name}: {1000 * score:.0f} mm off, {runner_up}"
     return replace(best, reason="; ".join(filter(None, (reason, best.reason))))
 
 
@@ -70,13 +70,13 @@ def by_class(target: Target, models: Iterable[CadModel], method: CadMethod) -> l
     for model in models:
         if model.class_name not in (UNNAMED, target.node.class_name):
             classes.setdefault(model.class_name, []).append(model)
-    targets = [of_class(target, name, own) for name, own in sorted(classes.items())]
-    misfits = [(method.misfit(each), place) for place, each in enumerate(targets)]
-    promising = [targets[place] for misfit, place in sorted(misfits) if misfit < LARGEST_MISFIT]
-    found = [shortlist(each, method) for each in promising[:TRIED]]
-    if not all(is_doubtful(entry, method) for entry in found):
-        found += [shortlist(each, method) for each in promising[TRIED : TRIED + 1]]
-    return sorted((entry for entry in found if entry.placements), key=lambda entry: entry.placements[0].score)
+    targets = [of_class(target, name, own_class) for name, own_class in sorted(classes.items())]
+    misfits = [(method.misfit(each), index) for index, each in enumerate(targets)]
+    promising = [targets[index] for misfit, index in sorted(misfits) if misfit < LARGEST_MISFIT]
+    shortlists = [shortlist(each, method) for each in promising[:TRIED]]
+    if not all(is_doubtful(entry, method) for entry in shortlists):
+        shortlists += [shortlist(each, method) for each in promising[TRIED : TRIED + 1]]
+    return sorted((entry for entry in shortlists if entry.placements), key=lambda entry: entry.placements[0].score)
 
 
 def of_class(target: Target, class_name: str, models: list[CadModel]) -> Target:

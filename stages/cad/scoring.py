@@ -20,7 +20,7 @@ MOST_MOVE = 0.2
 CONTACT = 0.003
 """Points of a model that are this near to its lowest one bear it [m]."""
 LEAST_MARGIN = 0.002
-"""What tips over at a smaller push than this does not stay as it lies [m]."""
+"""Least push at which a thing tips over that stays as it lies [m]."""
 
 
 def score_of(

@@ -27,13 +27,13 @@ def seen_motions(
 ) -> dict[str, SeenMotion]:
     """Return joint -> how it was seen to move, for the joints of a placed model that were. Of several articulations
     that could be a joint's the one whose face lies nearest the middle of its part is taken."""
-    found: dict[str, tuple[float, SeenMotion]] = {}
+    best: dict[str, tuple[float, SeenMotion]] = {}
     for entry in articulations:
         for joint in surface.model.joints:
             match = _same_joint(surface, placement, joint, entry)
-            if match is not None and (joint.name not in found or match[0] < found[joint.name][0]):
-                found[joint.name] = match
-    return {name: motion for name, (_, motion) in found.items()}
+            if match is not None and (joint.name not in best or match[0] < best[joint.name][0]):
+                best[joint.name] = match
+    return {name: motion for name, (_, motion) in best.items()}
 
 
 def _same_joint(

@@ -13,7 +13,7 @@ from scenewright.stages.cad.placing import supporting_surface, surface_outline, 
 from scenewright.stages.kit.geometry.boxes import bottom, footprint
 
 WELL_CARRIED = 0.85
-"""What stands on a surface with a smaller share of its footprint is moved onto it."""
+"""Least share of its footprint with which a thing stays where it stands; with less it is moved onto the surface."""
 UNEXPLAINED_GAP = 0.05
 """A refined box that ends farther than this from its plane was not put on it by the graph [m]."""
 

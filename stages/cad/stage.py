@@ -109,8 +109,8 @@ def choose_and_write(
             for placement in arranged.placements.values():
                 placed = placed_pieces(placement, surfaces[placement.shape.model.id])
                 pieces += [*placed, footing(placed)]
-            left = [graph.node(name).instance for name in built if not arranged.placements[name].shape.model.joints]
-            nameless = surroundings_of(panoptic_map, pieces, left, method.parameters)
+            unmoving = [graph.node(name).instance for name in built if not arranged.placements[name].shape.model.joints]
+            nameless = surroundings_of(panoptic_map, pieces, unmoving, method.parameters)
     with context.progress.step("writing"):
         if nameless is not None:
             write_surface(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
@@ -131,9 +131,13 @@ def choose_and_write(
         "conflicts_before": scene.conflicts_before,
         "conflicts_after": scene.conflicts_after,
         "surroundings_m2": 0.0 if nameless is None else round(area_of(nameless), 2),
-        "joints": sum(len(found) for found in evidence.values()),
-        "joints_moved": sum("moved" in entry.grounds for found in evidence.values() for entry in found.values()),
-        "joints_held": sum(not entry.grounds for found in evidence.values() for entry in found.values()),
+        "joints": sum(len(joint_grounds) for joint_grounds in evidence.values()),
+        "joints_moved": sum(
+            "moved" in entry.grounds for joint_grounds in evidence.values() for entry in joint_grounds.values()
+        ),
+        "joints_held": sum(
+            not entry.grounds for joint_grounds in evidence.values() for entry in joint_grounds.values()
+        ),
         "alignment_error_median": round(float(np.median(errors)), 4) if errors else None,
     }
     return CadScene(context.output, outcome="ok" if decisions else "empty", summary=summary)
@@ -152,7 +156,7 @@ def find_candidates(
     built-ins are written into the output. `moved`: what the log shows in two states."""
     models = library.info.models
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
-    free_space, told = method.free_space(panoptic_map), named_by_people(panoptic_map)
+    free_space, named_by_hand = method.free_space(panoptic_map), named_by_people(panoptic_map)
     shortlists: dict[str, Shortlist] = {}
     for node in context.progress.track(objects, description="objects"):
         if node.mesh is None:
@@ -174,17 +178,17 @@ def find_candidates(
             context.random(VERTICES, node.instance),
         )
         target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
-        found = shortlist(target, method)
-        doubtful = is_doubtful(found, method)
+        entry = shortlist(target, method)
+        doubtful = is_doubtful(entry, method)
         if method.stretches:
-            found = with_stretched(found, target, method, library)
-        if method.recognises and node.id not in told and doubtful:
+            entry = with_stretched(entry, target, method, library)
+        if method.recognises and node.id not in named_by_hand and doubtful:
             alike = [model for model in models if might_be(model, target)]
             load_surfaces(library, alike, surfaces)
-            found = recognised(found, target, alike, method)
-        if not found.placements and method.builds_in and may_be_built_in(node):
-            found = built_in_instead(found, target, mesh, moved, method.parameters, context.output / "models")
-        shortlists[node.id] = found
+            entry = recognised(entry, target, alike, method)
+        if not entry.placements and method.builds_in and may_be_built_in(node):
+            entry = built_in_instead(entry, target, mesh, moved, method.parameters, context.output / "models")
+        shortlists[node.id] = entry
     return shortlists
 
 
@@ -261,8 +265,8 @@ def grounds_of_joints(
     not ask. What the map shows is compared with the model where it fits the map, not where the arrangement moved it.
     Raises UsageError for a vouched name that is neither a node nor a class."""
     vouched = set(method.parameters.vouched)
-    known = {node.id for node in graph.nodes} | {entry.name for entry in load_vocabulary().classes}
-    if unknown := sorted(vouched - known):
+    names = {node.id for node in graph.nodes} | {entry.name for entry in load_vocabulary().classes}
+    if unknown := sorted(vouched - names):
         raise UsageError(f"--vouched {unknown[0]}: no thing of the contact graph, and no class", hint="see graph.json")
     evidence = {}
     for name, placement in arranged.placements.items():

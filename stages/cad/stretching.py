@@ -50,17 +50,17 @@ def with_stretched(entry: Shortlist, target: Target, method: CadMethod, library:
     box = target.node.box
     if box is None or (entry.placements and not _is_off(entry, np.asarray(box.size))):
         return entry
-    own = [model for model in target.models if model.class_name == target.node.class_name]
-    made = {}
-    for model in own or target.models:
+    same_class = [model for model in target.models if model.class_name == target.node.class_name]
+    stretched_surfaces = {}
+    for model in same_class or target.models:
         factors = factors_for(model, np.asarray(box.size), method.parameters)
         if factors is not None:
             longer = stretched(model, factors, f"{model.id}_for_{target.node.id}")
-            made[longer.id] = stretched_surface(longer, model_folder(library, model.id))
-    if not made:
+            stretched_surfaces[longer.id] = stretched_surface(longer, model_folder(library, model.id))
+    if not stretched_surfaces:
         return entry
-    surfaces = target.surfaces | made
-    tried = replace(target, models=[surface.model for surface in made.values()], surfaces=surfaces)
+    surfaces = target.surfaces | stretched_surfaces
+    tried = replace(target, models=[surface.model for surface in stretched_surfaces.values()], surfaces=surfaces)
     placed = [
         replace(p, score=p.score + method.parameters.scale_weight * anisotropy(p.shape.model))
         for p in shortlist(tried, method).placements
@@ -69,7 +69,7 @@ def with_stretched(entry: Shortlist, target: Target, method: CadMethod, library:
     best = min(placed, key=lambda placement: placement.score, default=None)
     if best is None or (entry.placements and entry.placements[0].score <= best.score + method.parameters.choice_margin):
         return entry
-    target.surfaces[best.shape.model.id] = made[best.shape.model.id]
+    target.surfaces[best.shape.model.id] = stretched_surfaces[best.shape.model.id]
     by = " x ".join(f"{factor:.2f}" for factor in factors_of(best.shape.model))
     reason = f"{best.shape.model.recipe[SOURCE]} stretched by {by}"
     return replace(entry, placements=(best, *entry.placements), reason=reason)
@@ -83,10 +83,10 @@ def factors_for(model: CadModel, size: np.ndarray, parameters: CadParameters) ->
     """Return the factors (3,) that make a shut, upright model as large as a box of `size` (3,) [m], its front along x
     or y of the box, whichever stretches it less; None where that is more than a scale may be, or bends a joint."""
     state = model.states[0]
-    own = np.subtract(state.box_maximum, state.box_minimum)
-    if np.any(own <= 0) or np.any(size <= 0) or not all(_lies_along_axes(joint) for joint in model.joints):
+    model_size = np.subtract(state.box_maximum, state.box_minimum)
+    if np.any(model_size <= 0) or np.any(size <= 0) or not all(_lies_along_axes(joint) for joint in model.joints):
         return None
-    factors = min((size / own, size[[1, 0, 2]] / own), key=lambda each: float(np.ptp(np.log(each))))
+    factors = min((size / model_size, size[[1, 0, 2]] / model_size), key=lambda each: float(np.ptp(np.log(each))))
     fits = np.all((factors >= parameters.minimum_scale) & (factors <= parameters.maximum_scale))
     return factors if fits else None
 
@@ -181,12 +181,14 @@ def write_stretched(model: CadModel, source: Path, folder: Path) -> None:
         for part, pieces in collision.items()
     }
     density = model.mass / sum(volume(solid) for pieces in solids.values() for solid in pieces)
-    parts = []
+    geometries = []
     for part in model.parts:
-        shown, colors = by_color(visual[part])
+        colored_meshes, colors = by_color(visual[part])
         properties = mass_properties(solids[part], [density] * len(solids[part]))
-        parts.append(PartGeometry(part, solids[part], [colors[0]] * len(solids[part]), properties, shown, colors))
-    write_model_folder(folder, model, parts)
+        geometries.append(
+            PartGeometry(part, solids[part], [colors[0]] * len(solids[part]), properties, colored_meshes, colors)
+        )
+    write_model_folder(folder, model, geometries)
 
 
 def by_color(mesh: trimesh.Trimesh) -> tuple[list[trimesh.Trimesh], list[tuple[int, int, int]]]:

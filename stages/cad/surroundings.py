@@ -55,14 +55,14 @@ def near_any(points: np.ndarray, pieces: Iterable[Convex], distance: float) -> n
 
     Beside edges and corners that is a little more than the Euclidean distance allows.
     """
-    near = np.zeros(len(points), dtype=bool)
+    is_near = np.zeros(len(points), dtype=bool)
     for piece in pieces:
-        asked = ~near & np.all((points > piece.low - distance) & (points < piece.high + distance), axis=1)
-        rows = np.flatnonzero(asked)
+        undecided = ~is_near & np.all((points > piece.low - distance) & (points < piece.high + distance), axis=1)
+        rows = np.flatnonzero(undecided)
         for start in range(0, len(rows), POINTS_AT_ONCE):
             some = rows[start : start + POINTS_AT_ONCE]
-            near[some] = np.all(points[some] @ piece.normals.T - piece.offsets < distance, axis=1)
-    return near
+            is_near[some] = np.all(points[some] @ piece.normals.T - piece.offsets < distance, axis=1)
+    return is_near
 
 
 def nameless_surface(
@@ -109,12 +109,12 @@ def _large_patches(vertices: np.ndarray, faces: np.ndarray, smallest_area: float
     """Return the faces (F, 3) of connected patches that are large enough."""
     if len(faces) == 0:
         return faces
-    parts = trimesh.graph.connected_component_labels(
+    component = trimesh.graph.connected_component_labels(
         np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]]), node_count=len(vertices)
     )[faces[:, 0]]
     corners = vertices[faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return faces[np.bincount(parts, weights=areas)[parts] >= smallest_area]
+    return faces[np.bincount(component, weights=areas)[component] >= smallest_area]
 
 
 def _in_boxes_that_collide(surface: EntityMesh, scene: Solid, tolerance: float) -> np.ndarray:

@@ -19,13 +19,13 @@ def varied(ranked: Sequence[Ranked], keep: int, model_of: Callable[[Ranked], Has
     if len(ranked) <= keep:
         return list(ranked)
     chosen = list(range((keep + 1) // 2))
-    taken: dict[Hashable, int] = defaultdict(int)
-    for place in chosen:
-        taken[model_of(ranked[place])] += 1
+    model_uses: dict[Hashable, int] = defaultdict(int)
+    for rank in chosen:
+        model_uses[model_of(ranked[rank])] += 1
     turns = []
-    for place in range(len(chosen), len(ranked)):
-        model = model_of(ranked[place])
-        turns.append((taken[model], place))
-        taken[model] += 1
-    chosen += [place for _, place in sorted(turns)[: keep - len(chosen)]]
-    return [ranked[place] for place in sorted(chosen)]
+    for rank in range(len(chosen), len(ranked)):
+        model = model_of(ranked[rank])
+        turns.append((model_uses[model], rank))
+        model_uses[model] += 1
+    chosen += [rank for _, rank in sorted(turns)[: keep - len(chosen)]]
+    return [ranked[rank] for rank in sorted(chosen)]

@@ -57,6 +57,6 @@ def same_surface(disparity: np.ndarray) -> np.ndarray:
     padded = cv2.copyMakeBorder(disparity.astype(np.float32), *(reach,) * 4, cv2.BORDER_REPLICATE)
     count = np.zeros(disparity.shape, np.float32)
     for dx, dy in AROUND:
-        other = padded[reach + dy : reach + dy + height, reach + dx : reach + dx + width]
-        count += np.abs(other - disparity) <= SAME_SURFACE
+        shifted = padded[reach + dy : reach + dy + height, reach + dx : reach + dx + width]
+        count += np.abs(shifted - disparity) <= SAME_SURFACE
     return count / len(AROUND)

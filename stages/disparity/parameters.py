@@ -57,14 +57,14 @@ class DisparityParameters(Parameters):
 
 def check_inputs(parameters: DisparityParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options and inputs that do not go together."""
-    given = inputs.get("weights") is not None
+    has_weights = inputs.get("weights") is not None
     network = parameters.method in NETWORKS
-    if network and not given:
+    if network and not has_weights:
         raise UsageError(
             f"--method {parameters.method} needs --weights",
             hint="the authors' raftstereo-*.pth, or the .safetensors made of it",
         )
-    if given and not network:
+    if has_weights and not network:
         raise UsageError(f"--method {parameters.method} reads no --weights", hint=f"--method {' or '.join(NETWORKS)}")
     if (parameters.lowest_disparity is None) != (parameters.levels is None):
         raise UsageError("--lowest-disparity and --levels go together", hint="give both, or neither")

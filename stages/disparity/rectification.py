@@ -17,6 +17,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 
 FEATURES = 1500
+"""Most SIFT features of an image; by eye."""
 MATCH_RATIO = 0.8
 """The best match must be this much nearer than the second (Lowe, IJCV 2004, section 7.1)."""
 LARGEST_ROW_SHARE = 0.05
@@ -26,6 +27,7 @@ LEAST_MATCHES = 40
 INLIER_ROWS = 1.5
 """Rows [px] within which a match agrees with a fitted turn."""
 ITERATIONS = 20
+"""Steps of reweighted least squares; by eye."""
 
 
 @dataclass(frozen=True)
@@ -83,17 +85,17 @@ def check_rows(pairs: Sequence[tuple[np.ndarray, np.ndarray]], camera: Camera) -
     left = np.concatenate([np.zeros((0, 2)), *[first for first, _ in pairs]])
     right = np.concatenate([np.zeros((0, 2)), *[second for _, second in pairs]])
     rows = right[:, 1] - left[:, 1]
-    near = np.abs(rows) <= LARGEST_ROW_SHARE * camera.height
-    if len(rows) >= LEAST_MATCHES and near.mean() < 0.5:
+    in_reach = np.abs(rows) <= LARGEST_ROW_SHARE * camera.height
+    if len(rows) >= LEAST_MATCHES and in_reach.mean() < 0.5:
         error = float(np.median(np.abs(rows)))
         error_90 = float(np.percentile(np.abs(rows), 90))
         return RowCheck(len(rows), True, float(np.median(rows)), error, error_90, corrected_error=error)
-    left, right, rows = left[near], right[near], rows[near]
+    left, right, rows = left[in_reach], right[in_reach], rows[in_reach]
     if len(left) < LEAST_MATCHES:
         return RowCheck(len(left), False)
     pitch, roll = fitted_turn(right, rows, camera)
-    rest = rows - row_shift(right, pitch, roll, camera)
-    aligned = np.abs(rest) <= max(INLIER_ROWS, 3 * float(np.median(np.abs(rest))))
+    residual = rows - row_shift(right, pitch, roll, camera)
+    aligned = np.abs(residual) <= max(INLIER_ROWS, 3 * float(np.median(np.abs(residual))))
     disparity = (left - right)[aligned, 0]
     return RowCheck(
         matches=len(left),
@@ -103,7 +105,7 @@ def check_rows(pairs: Sequence[tuple[np.ndarray, np.ndarray]], camera: Camera) -
         error_90=float(np.percentile(np.abs(rows), 90)),
         pitch=pitch,
         roll=roll,
-        corrected_error=float(np.median(np.abs(rest))),
+        corrected_error=float(np.median(np.abs(residual))),
         negative_share=float((disparity < -0.5).mean()),
         median_disparity=float(np.median(disparity)),
     )
@@ -122,9 +124,9 @@ def fitted_turn(points: np.ndarray, rows: np.ndarray, camera: Camera) -> tuple[f
     system = camera.fy * np.stack([1 + y * y, -x], axis=1)
     solution = np.array([np.median(rows) / camera.fy, 0.0])
     for _ in range(ITERATIONS):
-        rest = rows - system @ solution
-        scale = max(0.2, 1.48 * float(np.median(np.abs(rest))))
-        weight = 1.0 / (1.0 + (rest / (2 * scale)) ** 2) ** 2
+        residual = rows - system @ solution
+        scale = max(0.2, 1.48 * float(np.median(np.abs(residual))))
+        weight = 1.0 / (1.0 + (residual / (2 * scale)) ** 2) ** 2
         solution = np.linalg.lstsq(system * np.sqrt(weight)[:, None], rows * np.sqrt(weight), rcond=None)[0]
     return float(solution[0]), float(solution[1])
 

@@ -64,8 +64,8 @@ def match(
     forward = directed(grays[0], grays[1], settings, low, levels)
     backward = directed(mirrored(grays[1]), mirrored(grays[0]), settings, low, levels)[:, ::-1]
     difference = left_right_difference(forward, backward)
-    kept = difference <= settings.agreement
-    disparity = without_speckles(np.where(kept, forward, np.nan).astype(np.float32), settings)
+    agrees = difference <= settings.agreement
+    disparity = without_speckles(np.where(agrees, forward, np.nan).astype(np.float32), settings)
     if settings.refine:
         disparity = smoothed(unlocked(disparity))
     disparity[~(disparity > 0)] = np.nan

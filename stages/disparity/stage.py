@@ -121,7 +121,7 @@ def _match_all(
                 written.left_out[BLANK_EYE] += 1
                 continue
             camera, baseline = cameras[frame.camera_name], baselines[frame.camera_name]
-            left, right = frame.color, _put_right(frame, rows[frame.camera_name], reader)
+            left, right = frame.color, _straightened_right(frame, rows[frame.camera_name], reader)
             limits = _limits(left, right, parameters)
             matched = matcher(left, right, limits)
             depth = depth_of(matched.disparity, camera, baseline)
@@ -143,7 +143,7 @@ def _world_up(reader: FrameReader) -> Literal["z", "unknown"]:
     return "z" if reader.world_up == "z" else "unknown"
 
 
-def _put_right(frame: Frame, report: RowReport, reader: FrameReader) -> np.ndarray:
+def _straightened_right(frame: Frame, report: RowReport, reader: FrameReader) -> np.ndarray:
     assert frame.right is not None
     if report.verdict != "corrected":
         return frame.right

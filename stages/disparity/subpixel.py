@@ -25,11 +25,11 @@ FAR_OFF = 50.0
 
 def unlocked(disparity: np.ndarray) -> np.ndarray:
     """Return disparities (H, W) float32 without their pull towards whole pixels; NaN stays NaN."""
-    whole = np.rint(disparity)
-    offset = disparity - whole
+    whole_pixels = np.rint(disparity)
+    offset = disparity - whole_pixels
     grid = np.arange(len(UNLOCKED)) / 16.0
     moved = np.interp(np.abs(np.nan_to_num(offset)), grid, UNLOCKED)
-    return (whole + np.sign(offset) * moved).astype(np.float32)
+    return (whole_pixels + np.sign(offset) * moved).astype(np.float32)
 
 
 def smoothed(disparity: np.ndarray) -> np.ndarray:

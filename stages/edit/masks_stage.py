@@ -119,12 +119,7 @@ def _segments(ids: np.ndarray, state: MapState) -> tuple[FrameSegment, ...]:
             entry = vocabulary.by_name(state.entities[number].class_name)
             found.append(
                 FrameSegment(
-                    id=number,
-                    category_id=entry.id,
-                    instance=number,
-                    is_thing=entry.kind == "thing",
-                    score=1.0,
-                    area=area,
+                    id=number, class_id=entry.id, instance=number, is_thing=entry.kind == "thing", score=1.0, area=area
                 )
             )
     return tuple(found)

@@ -59,8 +59,8 @@ def _row(model: Model, table: str, rows: dict[str, list[Row]], above: Row, key: 
     """
     row: Row = dict(above)
     lists: dict[str, Any] = {}
-    for name, field in type(model).model_fields.items():
-        value = getattr(model, name)
+    for attribute, field in type(model).model_fields.items():
+        value, name = getattr(model, attribute), _name_in_file(model, attribute)
         if isinstance(value, Model):
             inner = _row(value, _below(table, name), rows, {}, key)
             row |= {f"{name}.{column}": cell for column, cell in inner.items()}
@@ -81,6 +81,12 @@ def _row(model: Model, table: str, rows: dict[str, list[Row]], above: Row, key: 
         for word, record in pairs:
             found.append(_row(record, own, rows, told if word is None else {**told, "name": word}, key=own))
     return row
+
+
+def _name_in_file(model: Model, attribute: str) -> str:
+    """Return what the file calls a field: mostly as code does."""
+    alias = type(model).model_fields[attribute].serialization_alias
+    return alias if alias and model.model_config.get("serialize_by_alias") else attribute
 
 
 def _of_one_shape(rows: list[Row]) -> list[Row]:

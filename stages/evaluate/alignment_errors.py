@@ -10,9 +10,11 @@ from scenewright.stages.evaluate.model_shapes import PlacedShape
 from scenewright.stages.kit.measurement.shape_symmetry import Symmetry, symmetric_rotation_error
 
 SUCCESS_TRANSLATION = 0.20
-"""[m] (Avetisyan et al. 2019, Scan2CAD, section 7)."""
+"""Largest shift of a success [m] (Avetisyan et al. 2019, Scan2CAD, section 7)."""
 SUCCESS_ROTATION = math.radians(20.0)
+"""Largest turn of a success [rad] (Avetisyan et al. 2019, Scan2CAD, section 7)."""
 SUCCESS_SCALE = 0.20
+"""Largest difference in scale of a success, as a share (Avetisyan et al. 2019, Scan2CAD, section 7)."""
 
 
 @dataclass(frozen=True, eq=False)

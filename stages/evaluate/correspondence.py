@@ -22,15 +22,15 @@ def merge_stuff_nodes(graph: ContactGraphFile) -> tuple[ContactGraphFile, dict[s
     circle is left out.
     """
     stuff = stuff_classes()
-    kept: dict[str, str] = {}
+    merged_id: dict[str, str] = {}
     first: dict[str, str] = {}
     for node in sorted(graph.nodes, key=lambda n: (n.instance, n.id)):
         is_stuff = node.node_type != "scene" and node.class_name in stuff
-        kept[node.id] = first.setdefault(node.class_name, node.id) if is_stuff else node.id
+        merged_id[node.id] = first.setdefault(node.class_name, node.id) if is_stuff else node.id
     links: dict[tuple[str, str, str], Relation] = {}
     parents: dict[str, str] = {}
     for link in graph.links:
-        source, target = kept.get(link.source, link.source), kept.get(link.target, link.target)
+        source, target = merged_id.get(link.source, link.source), merged_id.get(link.target, link.target)
         if source == target:
             continue
         if link.relation in TREE_RELATIONS:
@@ -39,8 +39,8 @@ def merge_stuff_nodes(graph: ContactGraphFile) -> tuple[ContactGraphFile, dict[s
             parents[target] = source
         key = (min(source, target), max(source, target), link.relation)
         links.setdefault(key, link.model_copy(update={"source": source, "target": target}))
-    nodes = tuple(node for node in graph.nodes if kept[node.id] == node.id)
-    return graph.model_copy(update={"nodes": nodes, "links": tuple(links.values())}), kept
+    nodes = tuple(node for node in graph.nodes if merged_id[node.id] == node.id)
+    return graph.model_copy(update={"nodes": nodes, "links": tuple(links.values())}), merged_id
 
 
 def _is_above(name: str, below: str, parents: Mapping[str, str]) -> bool:

@@ -25,7 +25,7 @@ def count_frames(part: Part, info: SequenceFile) -> None:
 
 def count_segments(part: Part, info: SegmentsFile) -> None:
     """Frames with segments and the mean number of labelled segments."""
-    labelled = [sum(s.category_id > 0 for s in frame.segments) for frame in info.frames]
+    labelled = [sum(s.class_id > 0 for s in frame.segments) for frame in info.frames]
     part.set("frames_segmented", len(labelled))
     part.set("labelled_segments_per_frame", float(np.mean(labelled)) if labelled else None)
 

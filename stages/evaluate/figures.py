@@ -17,6 +17,7 @@ from scenewright.stages.kit.measurement.edge_agreement import edge_errors
 from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality
 
 MISSED, WRONG = "#b3261e", "#c2571a"
+"""Colours of nodes that are missing (or too many), and of those with a wrong support."""
 
 
 def draw_quality(path: Path, qualities: Mapping[str, ClassQuality], label: str) -> None:

@@ -17,9 +17,9 @@ from scenewright.stages.evaluate.model_shapes import ModelShape, PlacedShape, su
 from scipy.spatial import cKDTree
 
 SIZE_RATIO = 0.20
-"""An extent is similar within this share of the true one ..."""
+"""An extent is similar within this share of the true one."""
 SIZE_SLACK = 0.02
-"""... or within this many metres (cups are small)."""
+"""Difference of an extent [m] that is similar whatever its share (cups are small)."""
 SHAPE_DISTANCE = 0.05
 """Shapes are similar up to this mean distance of their surfaces, as a share of the true box's diagonal."""
 COLOR_DIFFERENCE = 20.0
@@ -112,9 +112,9 @@ def surface_distance(true: PlacedShape, placed: PlacedShape, rotation: np.ndarra
     first = true.scale * (true.shape.closed_points - 0.5 * (low + high))
     low, high = placed.shape.closed_bounds
     second = placed.scale * (placed.shape.closed_points - 0.5 * (low + high)) @ rotation.T
-    there = cKDTree(second).query(first)[0].mean()
+    forward = cKDTree(second).query(first)[0].mean()
     back = cKDTree(first).query(second)[0].mean()
-    return float(0.5 * (there + back) / np.linalg.norm(true.extents))
+    return float(0.5 * (forward + back) / np.linalg.norm(true.extents))
 
 
 def look_of(shape: ModelShape, colors: Mapping[str, tuple[int, int, int]] | None = None) -> np.ndarray | None:
@@ -123,12 +123,12 @@ def look_of(shape: ModelShape, colors: Mapping[str, tuple[int, int, int]] | None
     `colors` are those that a replacement took from the map; parts without one are left out. Without any the model's
     own colours count. None when there is nothing to look at.
     """
-    given: dict[str, tuple[float, float, float]] = {p: c for p, c in (colors or {}).items() if p in shape.parts}
-    seen = given or {name: part.color for name, part in shape.parts.items()}
-    areas = np.array([shape.parts[name].area for name in seen])
+    given_colors: dict[str, tuple[float, float, float]] = {p: c for p, c in (colors or {}).items() if p in shape.parts}
+    shown_colors = given_colors or {name: part.color for name, part in shape.parts.items()}
+    areas = np.array([shape.parts[name].area for name in shown_colors])
     if not areas.sum() > 0:
         return None
-    return mean_lab(np.array(list(seen.values()), dtype=float), areas)
+    return mean_lab(np.array(list(shown_colors.values()), dtype=float), areas)
 
 
 def same_relation(

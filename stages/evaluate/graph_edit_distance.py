@@ -17,7 +17,9 @@ from scenewright.schemas.scene_parts import TREE_RELATIONS
 from scipy.optimize import linear_sum_assignment
 
 WRONG_SUPPORT_COST = 2
+"""Edits of a wrong support: the edge goes, and another one comes."""
 EXPANSION_BUDGET = 200_000
+"""Most nodes of the search tree that are expanded; by eye."""
 
 
 @dataclass(frozen=True)
@@ -147,15 +149,15 @@ class _Problem:
         bound_below = np.concatenate([np.cumsum(cheapest[::-1])[::-1], [0]]).astype(int)
         closest = [max([0.0] + [float(self.affinity[i, j]) for j in self.candidates[i]]) for i in range(n)]
         closeness_below = np.concatenate([np.cumsum(closest[::-1])[::-1], [0.0]])
-        taken = [False] * m
+        used = [False] * m
         current = [-1] * n
-        left = budget
+        steps_left = budget
 
         def descend(i: int, cost: int, closeness: float) -> None:
-            nonlocal best, best_cost, left
-            if left <= 0:
+            nonlocal best, best_cost, steps_left
+            if steps_left <= 0:
                 return
-            left -= 1
+            steps_left -= 1
             # `cost` counts every free predicted node as extra; a pair takes one off, hence the -1 in `cheapest`.
             if (cost + bound_below[i], -closeness - closeness_below[i] + 1e-9) >= best_cost:
                 return
@@ -163,15 +165,15 @@ class _Problem:
                 best, best_cost = list(current), (cost, -closeness)
                 return
             for j in self.candidates[i]:
-                if not taken[j]:
-                    taken[j], current[i] = True, j
+                if not used[j]:
+                    used[j], current[i] = True, j
                     step = int(self.substitution[i, j]) + self.edge_cost(current, i, j) - 1
                     descend(i + 1, cost + step, closeness + float(self.affinity[i, j]))
-                    taken[j], current[i] = False, -1
+                    used[j], current[i] = False, -1
             descend(i + 1, cost + int(self.skip[i]), closeness)
 
         descend(0, m, 0.0)
-        return best, left > 0
+        return best, steps_left > 0
 
 
 def graph_edit_distance(

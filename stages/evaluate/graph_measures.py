@@ -21,6 +21,7 @@ from scenewright.stages.kit.measurement.edge_agreement import edge_agreement
 from scenewright.stages.kit.measurement.tables import Table
 
 ANY_CLASS = "any"
+"""Stands for the class where classes do not count."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,8 @@ def compare_graphs(
 
 def optional_nodes(truth: TrueRoom, graph: ContactGraphFile) -> frozenset[str]:
     """Nodes of the true graph that the camera hardly saw (or that are no object of the ground truth)."""
-    seen = {entry.instance for entry in truth.evaluated()}
-    return frozenset(n.id for n in graph.nodes if n.node_type != "scene" and n.instance not in seen)
+    evaluated = {entry.instance for entry in truth.evaluated()}
+    return frozenset(n.id for n in graph.nodes if n.node_type != "scene" and n.instance not in evaluated)
 
 
 def measure_graph(part: Part, truth: TrueRoom, comparison: GraphComparison) -> None:
@@ -162,9 +163,11 @@ def iou_with(box: Box, true: TrueObject) -> float:
     return box_iou(turned_to(box, box_yaw(true.box)) if true.round else box, true.box)
 
 
-def _is_hidden(box: Box, hidden: list[TrueObject], seen: list[TrueObject], match_iou: float) -> bool:
-    best_hidden = max((iou_with(box, other) for other in hidden), default=0.0)
-    return best_hidden > match_iou and best_hidden > max((iou_with(box, other) for other in seen), default=0.0)
+def _is_hidden(box: Box, hidden: list[TrueObject], visible: list[TrueObject], match_iou: float) -> bool:
+    best_hidden = max((iou_with(box, true_object) for true_object in hidden), default=0.0)
+    return best_hidden > match_iou and best_hidden > max(
+        (iou_with(box, true_object) for true_object in visible), default=0.0
+    )
 
 
 def box_of(node: GraphNode, field: str) -> Box | None:

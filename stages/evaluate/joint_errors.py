@@ -14,6 +14,7 @@ from scipy.optimize import linear_sum_assignment
 ANGLE_WEIGHT = 0.5
 """Metres that a radian between axes counts for when joints are paired."""
 NEVER = 1e6
+"""Cost of a pair that may not be matched."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from scenewright.stages.kit.measurement.panoptic_quality import (
 from scenewright.stages.kit.measurement.tables import Cell, Table
 
 ANY_CLASS = "any"
+"""Stands for the class where classes do not count."""
 NAMELESS = "object"
 """The class of class-agnostic entities."""
 
@@ -102,9 +103,9 @@ def measure_quality(
         frozenset(),
         parameters.match_iou,
     )
-    whole = agnostic.get(ANY_CLASS, ClassQuality())
-    part.set("pq_class_agnostic", whole.pq if whole.segments else None)
-    part.set("rq_class_agnostic", whole.rq if whole.segments else None)
+    agnostic_quality = agnostic.get(ANY_CLASS, ClassQuality())
+    part.set("pq_class_agnostic", agnostic_quality.pq if agnostic_quality.segments else None)
+    part.set("rq_class_agnostic", agnostic_quality.rq if agnostic_quality.segments else None)
     part.set("labelled_share", float(np.mean(labels[true_labels > 0] > 0)) if (true_labels > 0).any() else None)
     thesis = quality_thesis_code(truth, predicted, parameters)
     mean = average_quality_thesis_code([] if nameless else thesis.values())

@@ -54,7 +54,7 @@ def surface_agreement(
         return None
     precision = float(np.mean(to_truth <= threshold))
     recall = float(np.mean(to_reconstruction <= threshold))
-    both = precision + recall
+    total = precision + recall
     return SurfaceAgreement(
         accuracy_mean=float(to_truth.mean()),
         accuracy_median=float(np.median(to_truth)),
@@ -62,5 +62,5 @@ def surface_agreement(
         precision=precision,
         completeness_mean=float(np.minimum(to_reconstruction, cap).mean()),
         recall=recall,
-        fscore=2.0 * precision * recall / both if both else 0.0,
+        fscore=2.0 * precision * recall / total if total else 0.0,
     )

@@ -98,10 +98,10 @@ def pair_objects(
     Class and pose decide nothing. True nodes that the camera hardly saw take no part. `overlaps`, `minimum_iou` as in
     `node_affinity`.
     """
-    seen = {entry.instance for entry in truth.evaluated()}
+    evaluated = {entry.instance for entry in truth.evaluated()}
     true_graph, _ = merge_stuff_nodes(truth.graph)
     found_graph, _ = merge_stuff_nodes(graph)
-    true = [n for n in true_graph.nodes if n.node_type != "scene" and n.instance in seen]
+    true = [n for n in true_graph.nodes if n.node_type != "scene" and n.instance in evaluated]
     predicted = [n for n in found_graph.nodes if n.node_type != "scene"]
     pairs = assign(node_affinity(true, predicted, overlaps, minimum_iou))
     return {true[i].id: predicted[j].id for i, j in pairs}

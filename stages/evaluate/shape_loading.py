@@ -20,7 +20,9 @@ from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR, read_ur
 from trimesh.visual.color import ColorVisuals
 
 GREY = (128.0, 128.0, 128.0)
+"""Colour (sRGB) of faces without one."""
 BODY = "body"
+"""Name of the part that does not move."""
 
 
 def true_shapes(truth: GroundTruth, world_from_log: np.ndarray) -> dict[str, PlacedShape]:

@@ -63,6 +63,7 @@ HEADLINES = (
     "counts/entities",
     "counts/support_edges",
 )
+"""Figures that the summary of the artifact repeats, where there are any."""
 
 
 @dataclass
@@ -202,8 +203,8 @@ def _evaluate_map(inputs: Inputs, parameters: EvaluateParameters, context: Conte
     measure_instances(part, truth, predicted, labels, parameters)
     to_truth, to_map = measure_surface(part, truth, predicted, parameters.mesh_threshold)
     if truth.optional:
-        seen = f"{len(truth.optional)} of {len(truth.objects)}"
-        part.notes.append(f"The camera hardly saw {seen} true entities; they count neither way.")
+        fraction_text = f"{len(truth.optional)} of {len(truth.objects)}"
+        part.notes.append(f"The camera hardly saw {fraction_text} true entities; they count neither way.")
     if parameters.plots:
         plots = context.output / "plots"
         figures.draw_quality(plots / "panoptic_quality.png", qualities, inputs.label)
@@ -306,10 +307,10 @@ def _true_trajectory(inputs: Inputs) -> tuple[np.ndarray, np.ndarray] | None:
         return times, world_from_log(inputs.sequence) @ poses
     if inputs.trajectory is None:
         return None
-    given = _trajectory(inputs.sequence)
-    if given is not None:
+    log_trajectory = _trajectory(inputs.sequence)
+    if log_trajectory is not None:
         inputs.part("trajectory").notes.append("The camera path is compared with the poses that the log gave.")
-    return given
+    return log_trajectory
 
 
 def _check_same_walk(inputs: Inputs, part: Part, poses: int) -> None:

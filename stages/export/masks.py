@@ -72,12 +72,12 @@ def joined(ids: np.ndarray, segments: tuple[FrameSegment, ...], where: str) -> F
         if not 0 < segment.id < len(table):
             continue
         listed[segment.id] = True
-        if segment.category_id == VOID:
+        if segment.class_id == VOID:
             continue
-        group = groups.setdefault((segment.category_id, segment.instance), segment.id)
+        group = groups.setdefault((segment.class_id, segment.instance), segment.id)
         table[segment.id] = group
         best = max(segment.score, masks[group].score if group in masks else 0.0)
-        masks[group] = ExportMask(segment.category_id, segment.is_thing, best)
+        masks[group] = ExportMask(segment.class_id, segment.is_thing, best)
     unknown = found[~listed[found]]
     if len(unknown):
         raise BadInput(f"{where}: id {unknown[0]} is not in segments.json", hint="run `scenewright segment` again")

@@ -35,15 +35,15 @@ def with_agreed_names(
     """
     result, class_id = [], labelled.class_id.copy()
     for entity in entities:
-        own = labelled.instance == entity.instance
-        if entity.class_id == unnamed and own.any():
-            said = said_of(labelled.segment[own], scores, sightings)
-            things = {c: score for c, score in said.items() if vocabulary.by_id(c).kind == "thing"}
+        of_entity = labelled.instance == entity.instance
+        if entity.class_id == unnamed and of_entity.any():
+            class_scores = said_of(labelled.segment[of_entity], scores, sightings)
+            things = {c: score for c, score in class_scores.items() if vocabulary.by_id(c).kind == "thing"}
             name = max(things, key=lambda c: (things[c], -c), default=unnamed)
             agreed = things.get(name, 0.0) > max(minimum_share, MOST * sum(things.values()))
             extent = extent_of(np.asarray(entity.mesh.vertices))
             if agreed and is_plausible(vocabulary.by_id(name).name, extent, cut_off=False):
-                class_id[own] = name
+                class_id[of_entity] = name
                 entity = replace(entity, class_id=name)
         result.append(entity)
     return result, replace(labelled, class_id=class_id)
@@ -62,9 +62,9 @@ def said_of(
     segments: np.ndarray, scores: Mapping[int, Mapping[int, float]], sightings: Mapping[int, int]
 ) -> dict[int, float]:
     """Return by class the score, 0..1, that its masks gave surface of these segment labels (N,) a look."""
-    said: dict[int, float] = {}
+    class_scores: dict[int, float] = {}
     labels, counts = np.unique(segments, return_counts=True)
     for label, count in zip(labels.tolist(), counts.tolist(), strict=True):
         for c, score in scores.get(label, {}).items():
-            said[c] = said.get(c, 0.0) + count / len(segments) * score / max(1, sightings.get(label, 0))
-    return said
+            class_scores[c] = class_scores.get(c, 0.0) + count / len(segments) * score / max(1, sightings.get(label, 0))
+    return class_scores

@@ -22,9 +22,11 @@ from scenewright.stages.kit.formats.numpy_files import read_all_arrays, read_arr
 from scenewright.stages.kit.formats.scenenn_annotation import read_annotation
 
 LARGEST_JSON = 2**28
-"""Bytes."""
+"""Most bytes of a JSON file."""
 MOST_FACES = 30_000_000
+"""Most faces of a scan; a guard against what does not fit into memory, by eye."""
 MOST_POINTS = 20_000_000
+"""Most points of a scan without faces; a guard against what does not fit into memory, by eye."""
 HINT = "docs/MASKS.md lists the layouts of labelled meshes"
 NYU40 = (
     "wall",
@@ -93,8 +95,8 @@ def read_scan(root: Path) -> AnnotatedScan:
     Raises BadInput when it is of none, broken, or larger than MOST_FACES or MOST_POINTS.
     """
     files = [root] if root.is_file() else sorted(file for file in root.rglob("*") if file.is_file())
-    for read in LAYOUTS:
-        scan = read(files)
+    for read_layout in LAYOUTS:
+        scan = read_layout(files)
         if scan is not None:
             break
     else:
@@ -113,8 +115,8 @@ def instances_by_class(
 
     Each part of the surface (F, 3) that hangs together is an instance; labels in `whole` are one, wherever they are.
     """
-    parts = connected_parts(labels, faces)
-    key = np.where(np.isin(labels, sorted(whole)), -1, parts)
+    components = connected_parts(labels, faces)
+    key = np.where(np.isin(labels, sorted(whole)), -1, components)
     pairs, inverse = np.unique(np.stack([labels, key], axis=1), axis=0, return_inverse=True)
     numbers = np.where(pairs[:, 0] > 0, np.cumsum(pairs[:, 0] > 0), 0)
     return numbers[inverse.reshape(-1)], {int(n): int(label) for n, (label, _) in zip(numbers, pairs, strict=True) if n}
@@ -151,8 +153,8 @@ def _scannet(files: list[Path]) -> AnnotatedScan | None:
         raise BadInput(f"{segments[0]}: segments that are not in 0..2^28", hint=HINT)
     names = {}
     for number, row in enumerate(rows, start=1):
-        own = _integers(row, "segments", group)
-        label_of[own[(own >= 0) & (own <= top)]] = number
+        segment_ids = _integers(row, "segments", group)
+        label_of[segment_ids[(segment_ids >= 0) & (segment_ids <= top)]] = number
         if isinstance(row.get("label"), str) and row["label"].strip():
             names[number] = row["label"]
     return _scan("ScanNet", mesh, label_of[of_vertex], names, True)
@@ -199,9 +201,11 @@ def _scenenn(files: list[Path]) -> AnnotatedScan | None:
         mesh, columns, _ = _read(ply)
         if "label" not in columns:
             raise BadInput(f"{ply}: its vertices have no property `label`", hint=HINT)
-        told = read_annotation(xml)
+        annotation = read_annotation(xml)
         names = {
-            number: entry.nyu_class or entry.text for number, entry in told.items() if entry.nyu_class or entry.text
+            number: entry.nyu_class or entry.text
+            for number, entry in annotation.items()
+            if entry.nyu_class or entry.text
         }
         return _scan("SceneNN", mesh, _whole(columns["label"], ply), names, True)
     return None
@@ -299,10 +303,10 @@ def _scan(
 
 
 def _whole(labels: np.ndarray, path: Path) -> np.ndarray:
-    whole = np.asarray(labels).reshape(-1).astype(np.int64)
-    if (whole != np.asarray(labels).reshape(-1)).any() or (whole < 0).any():
+    integers = np.asarray(labels).reshape(-1).astype(np.int64)
+    if (integers != np.asarray(labels).reshape(-1)).any() or (integers < 0).any():
         raise BadInput(f"{path}: labels that are no integers from 0 on", hint=HINT)
-    return whole
+    return integers
 
 
 def _json(path: Path) -> dict[str, Any]:

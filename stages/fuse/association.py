@@ -42,11 +42,11 @@ def index_segments(ids: np.ndarray, sorted_ids: np.ndarray) -> tuple[np.ndarray,
             value = ids[row, column]
             if value != last_id:
                 last_id = value
-                place = np.searchsorted(sorted_ids, value)
+                sorted_index = np.searchsorted(sorted_ids, value)
                 if value == 0:
                     last_index = 0
-                elif place < sorted_ids.shape[0] and sorted_ids[place] == value:
-                    last_index = place + 1
+                elif sorted_index < sorted_ids.shape[0] and sorted_ids[sorted_index] == value:
+                    last_index = sorted_index + 1
                 else:
                     last_index = 0
                     unlisted = value
@@ -100,17 +100,17 @@ def _sample_voxels(
             if key == last_key and index == last_index:
                 continue
             last_key, last_index = key, index
-            place = mix(key, size - 1)
-            known = False
-            while seen_key[place] != -1:
-                if seen_key[place] == key and seen_row[place] == index:
-                    known = True
+            hash_slot = mix(key, size - 1)
+            is_repeated = False
+            while seen_key[hash_slot] != -1:
+                if seen_key[hash_slot] == key and seen_row[hash_slot] == index:
+                    is_repeated = True
                     break
-                place = (place + 1) & (size - 1)
-            if known:
+                hash_slot = (hash_slot + 1) & (size - 1)
+            if is_repeated:
                 continue
-            seen_key[place] = key
-            seen_row[place] = index
+            seen_key[hash_slot] = key
+            seen_row[hash_slot] = index
             block = pack(i // SIDE, j // SIDE, k // SIDE)
             if block != last_block:
                 last_block = block
@@ -176,13 +176,13 @@ def match_segments(overlap: Overlap, *, minimum_voxels: int, minimum_share: floa
     `minimum_voxels` take no part. Ties go to the earlier frame segment, then to the older label.
     """
     result = [0 if size >= minimum_voxels else -1 for size in overlap.sizes]
-    taken: set[int] = set()
+    used: set[int] = set()
     pairs = zip(overlap.counts.tolist(), overlap.rows.tolist(), overlap.labels.tolist(), strict=True)
     for count, row, label in sorted(pairs, key=lambda pair: (-pair[0], pair[1], pair[2])):
         enough = count >= minimum_voxels and count >= minimum_share * overlap.sizes[row]
-        if enough and result[row] == 0 and label not in taken:
+        if enough and result[row] == 0 and label not in used:
             result[row] = label
-            taken.add(label)
+            used.add(label)
     return result
 
 
@@ -213,11 +213,11 @@ def associate_instances(
         for instance, count in counts.instances(prediction.segment, prediction.class_id).items():
             sums[key, instance] = sums.get((key, instance), 0) + count
     result: dict[tuple[int, int], int] = {}
-    taken: set[int] = set()
+    used: set[int] = set()
     for key, instance in sorted(sums, key=lambda pair: (-sums[pair], pair)):
-        if key not in result and instance not in taken:
+        if key not in result and instance not in used:
             result[key] = instance
-            taken.add(instance)
+            used.add(instance)
     for key in keys:
         if key not in result:
             result[key] = next_instance

@@ -47,8 +47,8 @@ def told_apart(scan: AnnotatedScan, voxel: float, minimum_area: float, where: Pa
     )
     most = int(piece.max(initial=0))
     names = {number: "object" for number in range(1, most + 1)}
-    for number, (name, own) in enumerate((("floor", floor), ("ceiling", ceiling), ("wall", walls)), most + 1):
-        piece[own] = number
+    for number, (name, mask) in enumerate((("floor", floor), ("ceiling", ceiling), ("wall", walls)), most + 1):
+        piece[mask] = number
         names[number] = name
     return replace(scan, labels=piece[inverse].astype(np.int64), names=names, are_instances=True)
 

@@ -122,9 +122,9 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
             if strange:
                 entities, labelled = by_geometry(surface, entities, labelled, classes, **size, sure=sure)
             else:
-                told = share_told(labelled, scores, mapper.sightings)
+                name_scores = share_told(labelled, scores, mapper.sightings)
                 scores = without_claimed(scores, entities)
-                entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=told)
+                entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=name_scores)
             least = parameters.minimum_prediction_share
             entities, labelled = with_agreed_names(
                 entities, labelled, scores, mapper.sightings, vocabulary, unnamed, least

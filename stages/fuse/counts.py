@@ -60,7 +60,7 @@ class TripleCounts:
     def instances(self, segment: int, class_id: int) -> dict[int, int]:
         """Return {p: Phi(segment, class_id, p)} of the positive counts."""
         row = self.by_segment.get(segment, {})
-        return {instance: count for (other, instance), count in row.items() if other == class_id}
+        return {instance: count for (row_class, instance), count in row.items() if row_class == class_id}
 
     def merge_segments(self, removed: int, kept: int) -> None:
         """Move all counts of segment label `removed` to `kept`."""

@@ -115,11 +115,15 @@ def extract_entities(
     class_of, instance_of = label_of_segments(grouping, sightings, largest, settings.minimum_share)
     class_of_instance = class_of_instances(counts, class_of, instance_of)
     stuff = frozenset(p for p, c in class_of_instance.items() if c not in things)
-    named = spread_labels(
+    spread_instance = spread_labels(
         instance_of[segment], surface.vertices, surface.faces, steps=settings.spread_steps, minimum_cosine=SPREAD_COSINE
     )
     instance = absorb_specks(
-        named, surface.faces, whole=stuff, minimum_size=settings.minimum_voxels, minimum_share=settings.speck_share
+        spread_instance,
+        surface.faces,
+        whole=stuff,
+        minimum_size=settings.minimum_voxels,
+        minimum_share=settings.speck_share,
     )
     # Things without a name are not of one class: a cup is no piece of the table that nobody recognised either.
     countable = {p: c for p, c in class_of_instance.items() if c in things and c != unnamed}
@@ -129,7 +133,7 @@ def extract_entities(
     by_label = np.argsort(of_face, kind="stable")
     sorted_labels = of_face[by_label]
     entities = []
-    kept = np.zeros_like(instance)
+    instance_of_vertex = np.zeros_like(instance)
     for label in sorted(class_of_instance):
         class_id = class_of_instance[label]
         segments = tuple(int(s) for s in np.flatnonzero(instance_of == label))
@@ -148,8 +152,10 @@ def extract_entities(
             continue
         confidence = confidence_of(counts, segments, class_id, label)
         entities.append(ExtractedEntity(label, class_id, segments, mesh, confidence, observations))
-        kept[instance == label] = label
+        instance_of_vertex[instance == label] = label
     class_table = np.zeros(int(instance_of.max()) + 1, dtype=np.int32)
     for entity in entities:
         class_table[entity.instance] = entity.class_id
-    return entities, LabelledSurface(segment.astype(np.int32), class_table[kept], kept.astype(np.int32))
+    return entities, LabelledSurface(
+        segment.astype(np.int32), class_table[instance_of_vertex], instance_of_vertex.astype(np.int32)
+    )

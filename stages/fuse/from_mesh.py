@@ -23,6 +23,7 @@ from scenewright.stages.kit.stage import Context
 KEPT_FACES = 2_000_000
 """Finer meshes are thinned to one vertex in each cube of --voxel-size."""
 LEVEL = np.cos(np.radians(0.5))
+"""Least cosine between the floor's normal and z for a scan that is left as it is turned: half a degree; by eye."""
 VOID = frozenset(
     {"mirror", "otherstructure", "paper", "picture", "poster", "remove", "unannotated", "undefined", "unknown"}
 )
@@ -41,13 +42,13 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
     broken, or nothing says what its labels are.
     """
     with context.progress.step("read the scan"):
-        read = read_scan(scan)
-        bare = not (read.labels > 0).any()
+        labelled_scan = read_scan(scan)
+        bare = not (labelled_scan.labels > 0).any()
         if bare:
             context.logger.warning("%s: nothing of it is labelled: things are told apart by geometry, z is up", scan)
-            read = told_apart(read, parameters.voxel_size, parameters.unnamed_area, scan)
-        given = read_label_file(labels) if labels is not None else None
-        table = classes_of(read, given, scan)
+            labelled_scan = told_apart(labelled_scan, parameters.voxel_size, parameters.unnamed_area, scan)
+        label_set = read_label_file(labels) if labels is not None else None
+        table = classes_of(labelled_scan, label_set, scan)
     vocabulary = load_vocabulary()
     classes = {number: vocabulary.by_name(name).id for number, name in table.classes.items()}
     if table.unknown:
@@ -59,20 +60,20 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
             ", ".join(table.unknown[:10]),
         )
     with context.progress.step("entities"):
-        surface, instance, class_of = _entities(read, classes, vocabulary, parameters, context)
+        surface, instance, class_of = _entities(labelled_scan, classes, vocabulary, parameters, context)
         turned = upright(surface.vertices, instance, class_of, vocabulary, context)
-        if not read.are_instances:
+        if not labelled_scan.are_instances:
             instance = joined_parts(turned, instance, class_of, vocabulary)
         surface, order = canonical_order(replace(surface, vertices=turned))
         instance = instance[order]
-        entities, meshes, instance = _listed(surface, instance, class_of, vocabulary, parameters)
+        entities, meshes, instance = _list_entities(surface, instance, class_of, vocabulary, parameters)
     with context.progress.step("write the map"):
         (context.output / "entities").mkdir(parents=True, exist_ok=True)
         EntitiesFile(
             voxel_size=parameters.voxel_size,
             truncation_distance=parameters.truncation_voxels * parameters.voxel_size,
             frames_integrated=0,
-            segmentation=f"{'geometry alone' if bare else 'annotated by hand'}, {read.layout}",
+            segmentation=f"{'geometry alone' if bare else 'annotated by hand'}, {labelled_scan.layout}",
             entities=tuple(entities),
         ).write(context.output / "entities.json")
         write_ply(context.output / "mesh.ply", surface)
@@ -81,10 +82,13 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
         table_of = np.zeros(max(class_of, default=0) + 1, dtype=np.int32)
         for number in meshes:
             table_of[number] = class_of[number]
-        own = instance.astype(np.int32)
-        write_arrays(context.output / "mesh_labels.npz", {"instance": own, "segment": own, "class_id": table_of[own]})
+        instance_ids = instance.astype(np.int32)
+        write_arrays(
+            context.output / "mesh_labels.npz",
+            {"instance": instance_ids, "segment": instance_ids, "class_id": table_of[instance_ids]},
+        )
     summary = {
-        "layout": read.layout,
+        "layout": labelled_scan.layout,
         "frames": 0,
         "entities": len(entities),
         "unnamed": len(table.unknown),
@@ -109,25 +113,25 @@ def classes_of(scan: AnnotatedScan, given: LabelSet | None, where: Path) -> Name
 
     Raises BadInput when labels occur that nothing names.
     """
-    own, classes, unknown = load_label_set(OWN), {}, set()
+    vocabulary_labels, classes, unknown = load_label_set(OWN), {}, set()
     present = [int(label) for label in np.unique(scan.labels) if label > 0]
     nameless = []
     for label in present:
         name = scan.names.get(label)
-        found: Label | None
+        label_entry: Label | None
         if name is None:
-            found = given.by_id(label) if given else None
-            if found is None:
+            label_entry = given.by_id(label) if given else None
+            if label_entry is None:
                 nameless.append(label)
                 continue
         else:
-            found = (given.find(name) if given else None) or own.find(name)
-            if found is None and plain(name) in VOID:
+            label_entry = (given.find(name) if given else None) or vocabulary_labels.find(name)
+            if label_entry is None and plain(name) in VOID:
                 continue
-        if found is None:
+        if label_entry is None:
             unknown.add(str(name))
-        if found is None or found.class_name:
-            classes[label] = found.class_name if found else ANYTHING
+        if label_entry is None or label_entry.class_name:
+            classes[label] = label_entry.class_name if label_entry else ANYTHING
     if nameless and not classes:
         raise BadInput(
             f"{where}: nothing says what label {nameless[0]} is ({len(nameless)} such labels)",
@@ -155,8 +159,8 @@ def _entities(
         numbers, inverse = np.unique(np.append(0, labels), return_inverse=True)
         instance, class_of = inverse[1:], {k: classes[int(n)] for k, n in enumerate(numbers) if k}
     else:
-        whole = frozenset(label for label, c in classes.items() if c in stuff)
-        instance, label_of = instances_by_class(labels, scan.faces, whole)
+        stuff_labels = frozenset(label for label, c in classes.items() if c in stuff)
+        instance, label_of = instances_by_class(labels, scan.faces, stuff_labels)
         class_of = {k: classes[label] for k, label in label_of.items()}
     vertices, faces, colors = scan.vertices, scan.faces, scan.colors
     if not len(faces):
@@ -219,26 +223,26 @@ def joined_parts(
     things = [k for k, c in class_of.items() if vocabulary.by_id(c).kind == "thing" and c and size[k]]
     unnamed = vocabulary.by_name(ANYTHING).id
     into = np.arange(len(size))
-    kept: dict[int, list[int]] = {}
+    instances_of_class: dict[int, list[int]] = {}
     for k in sorted(things, key=lambda k: (-size[k], k)):
-        same = kept.setdefault(class_of[k], [])
-        found = next((j for j in same if class_of[k] != unnamed and _over_each_other(low, high, k, j)), None)
-        if found is None:
+        same = instances_of_class.setdefault(class_of[k], [])
+        host = next((j for j in same if class_of[k] != unnamed and _over_each_other(low, high, k, j)), None)
+        if host is None:
             same.append(k)
         else:
-            into[k] = found
-            low[found], high[found] = np.minimum(low[found], low[k]), np.maximum(high[found], high[k])
+            into[k] = host
+            low[host], high[host] = np.minimum(low[host], low[k]), np.maximum(high[host], high[k])
     return into[instance]
 
 
 def _over_each_other(low: np.ndarray, high: np.ndarray, small: int, large: int) -> bool:
     shared = np.clip(np.minimum(high[small], high[large]) - np.maximum(low[small], low[large]), 0, None)[:2].prod()
-    own = max(float((high[small] - low[small])[:2].prod()), 1e-6)
+    small_area = max(float((high[small] - low[small])[:2].prod()), 1e-6)
     gap = max(low[small, 2] - high[large, 2], low[large, 2] - high[small, 2])
-    return bool(shared >= 0.5 * own and gap <= GAP)
+    return bool(shared >= 0.5 * small_area and gap <= GAP)
 
 
-def _listed(
+def _list_entities(
     surface: ColoredMesh,
     instance: np.ndarray,
     class_of: Mapping[int, int],
@@ -250,10 +254,10 @@ def _listed(
     order = np.argsort(of_face, kind="stable")
     numbers, starts = np.unique(of_face[order], return_index=True)
     entities, meshes = [], {}
-    for number, own in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
+    for number, members in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
         if not number:
             continue
-        mesh = cut_mesh(surface, own)
+        mesh = cut_mesh(surface, members)
         if len(mesh.vertices) < parameters.minimum_entity_voxels:
             continue
         meshes[number] = mesh

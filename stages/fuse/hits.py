@@ -16,6 +16,7 @@ TILE = 4
 STEEP = 2.0
 """A tile is steep where its depth changes by more than this many times its width: seen at less than 27 degrees."""
 MOST_HITS = 255
+"""Largest count of a voxel: it has 8 bits."""
 
 
 @njit(cache=True, nogil=True)

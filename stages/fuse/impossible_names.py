@@ -39,13 +39,15 @@ def without_impossible_names(
     """
     result, class_id = [], labelled.class_id.copy()
     for entity in entities:
-        said: Counter[int] = Counter()
+        class_scores: Counter[int] = Counter()
         for label in entity.segments:
-            said.update(scores.get(label, {}))
-        seen = max(1, sum(sightings.get(label, 0) for label in entity.segments))
+            class_scores.update(scores.get(label, {}))
+        sighting_count = max(1, sum(sightings.get(label, 0) for label in entity.segments))
         extent = extent_of(np.asarray(entity.mesh.vertices))
-        if not _possible(entity.class_id, extent, said[entity.class_id] / seen, vocabulary):
-            class_id[labelled.instance == entity.instance] = new = _next_name(said, extent, seen, vocabulary, unnamed)
+        if not _possible(entity.class_id, extent, class_scores[entity.class_id] / sighting_count, vocabulary):
+            class_id[labelled.instance == entity.instance] = new = _next_name(
+                class_scores, extent, sighting_count, vocabulary, unnamed
+            )
             entity = replace(entity, class_id=new)
         result.append(entity)
     return result, replace(labelled, class_id=class_id)
@@ -57,10 +59,12 @@ def _possible(class_id: int, extent: float, score: float, vocabulary: Vocabulary
     return is_plausible(vocabulary.by_id(class_id).name, extent / (UNUSUAL if believed else 1.0), cut_off=believed)
 
 
-def _next_name(said: Counter[int], extent: float, seen: int, vocabulary: Vocabulary, unnamed: int) -> int:
+def _next_name(
+    class_scores: Counter[int], extent: float, sighting_count: int, vocabulary: Vocabulary, unnamed: int
+) -> int:
     """Return the class with the largest score of those that a thing of this extent [m] can be of, if it has NAMED_SHARE
     of what its masks said of things; else `unnamed`."""
-    things = {c: s for c, s in said.items() if c != unnamed and vocabulary.by_id(c).kind == "thing"}
-    possible = [c for c, score in things.items() if _possible(c, extent, score / seen, vocabulary)]
+    things = {c: s for c, s in class_scores.items() if c != unnamed and vocabulary.by_id(c).kind == "thing"}
+    possible = [c for c, score in things.items() if _possible(c, extent, score / sighting_count, vocabulary)]
     best = min(possible, key=lambda c: (-things[c], c), default=unnamed)
     return best if things.get(best, 0.0) >= NAMED_SHARE * sum(things.values()) else unnamed

@@ -25,15 +25,15 @@ def check_segments(segments: SegmentsFile, camera: Camera, frame_count: int, voc
         raise BadInput(
             f"segments are of another sequence: frame {beyond[0]} does not exist, there are {frame_count}", hint=remake
         )
-    known = {entry.id for entry in vocabulary.classes}
+    class_ids = {entry.id for entry in vocabulary.classes}
     for frame in segments.frames:
         ids = [segment.id for segment in frame.segments]
         if len(set(ids)) != len(ids) or any(value <= 0 for value in ids):
             raise BadInput(f"segments.json: ids of frame {frame.frame} are not positive and different", hint=remake)
         for segment in frame.segments:
-            if segment.category_id != 0 and segment.category_id not in known:
+            if segment.class_id != 0 and segment.class_id not in class_ids:
                 raise BadInput(
-                    f"segments.json: frame {frame.frame} has class id {segment.category_id}, which is not in the "
+                    f"segments.json: frame {frame.frame} has class id {segment.class_id}, which is not in the "
                     "vocabulary",
                     hint=remake,
                 )

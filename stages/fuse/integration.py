@@ -14,6 +14,7 @@ from scenewright.stages.fuse.hits import count_hits
 from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VoxelBlocks
 
 LARGEST_VOTE = 32000
+"""Largest lead of a voxel's label: it has 16 bits with a sign."""
 CHUNK = 64
 """Blocks that a thread takes at a time: blocks differ in how much of them is seen, threads in what else they do."""
 
@@ -91,40 +92,47 @@ def _integrate(
                 distance = measured - z
                 if distance <= -band:
                     continue
-                place = row_number * SIDE + i
+                voxel_index = row_number * SIDE + i
                 gain = min(one, one / (measured * measured))
                 if distance < -voxel:
                     gain *= (band + distance) * drop
-                held = weight[slot, place]
-                total = held + gain
+                old_weight = weight[slot, voxel_index]
+                total = old_weight + gain
                 value = min(one, distance * inverse_band)
-                tsdf[slot, place] = (tsdf[slot, place] * held + value * gain) / total
-                weight[slot, place] = min(total, heaviest)
+                tsdf[slot, voxel_index] = (tsdf[slot, voxel_index] * old_weight + value * gain) / total
+                weight[slot, voxel_index] = min(total, heaviest)
                 if distance > band:
                     continue
                 if has_color:
                     share = gain / total
-                    if color[slot, place, 0] == 0 and color[slot, place, 1] == 0 and color[slot, place, 2] == 0:
+                    if (
+                        color[slot, voxel_index, 0] == 0
+                        and color[slot, voxel_index, 1] == 0
+                        and color[slot, voxel_index, 2] == 0
+                    ):
                         share = one
                     for channel in range(3):
-                        before = np.float32(color[slot, place, channel])
+                        before = np.float32(color[slot, voxel_index, channel])
                         now = np.float32(image[row, column, channel]) * np.float32(FIXED_POINT)
-                        color[slot, place, channel] = np.uint16(before + share * (now - before) + np.float32(0.5))
+                        color[slot, voxel_index, channel] = np.uint16(before + share * (now - before) + np.float32(0.5))
                 if has_labels and abs(distance) <= reach:
                     label = label_of_index[index_image[row, column]]
                     if label > 0:
-                        if canonical[segment[slot, place]] == label:
-                            votes[slot, place] = min(votes[slot, place] + 1, LARGEST_VOTE)
+                        if canonical[segment[slot, voxel_index]] == label:
+                            votes[slot, voxel_index] = min(votes[slot, voxel_index] + 1, LARGEST_VOTE)
                         else:
-                            votes[slot, place] -= 1
-                            if votes[slot, place] < 0:
-                                segment[slot, place] = label
-                                votes[slot, place] = 1
+                            votes[slot, voxel_index] -= 1
+                            if votes[slot, voxel_index] < 0:
+                                segment[slot, voxel_index] = label
+                                votes[slot, voxel_index] = 1
 
 
 NO_IMAGE = np.zeros((0, 0, 3), dtype=np.uint8)
+"""Stands for the image of a frame without colour."""
 NO_INDEX = np.zeros((0, 0), dtype=np.uint16)
+"""Stands for the segments of a frame without any."""
 NO_LABELS = np.zeros(1, dtype=np.int32)
+"""Stands for the labels of a frame without segments."""
 
 
 def integrate(

@@ -12,7 +12,7 @@ class Listings:
 
     def __init__(self, segments: SegmentsFile) -> None:
         entries = [segment for frame in segments.frames for segment in frame.segments]
-        self._ids = np.array([(s.id, s.category_id, s.instance, s.area) for s in entries], dtype=np.int32)
+        self._ids = np.array([(s.id, s.class_id, s.instance, s.area) for s in entries], dtype=np.int32)
         self._ids = self._ids.reshape(-1, 4)
         self._is_thing = np.array([s.is_thing for s in entries], dtype=bool)
         self._score = np.array([s.score for s in entries], dtype=np.float64)
@@ -33,7 +33,7 @@ class Listings:
         return tuple(
             FrameSegment(
                 id=identifier,
-                category_id=category,
+                class_id=category,
                 instance=instance,
                 is_thing=bool(self._is_thing[row]),
                 score=float(self._score[row]),

@@ -50,10 +50,10 @@ class PanopticMapper:
 
         It shares the voxel blocks and is good until the next frame.
         """
-        other = copy(self)
-        other.labels, other.merging = deepcopy(self.labels), deepcopy(self.merging)
-        other.sightings, other.seen_in = dict(self.sightings), dict(self.seen_in)
-        return other
+        mapper = copy(self)
+        mapper.labels, mapper.merging = deepcopy(self.labels), deepcopy(self.merging)
+        mapper.sightings, mapper.seen_in = dict(self.sightings), dict(self.seen_in)
+        return mapper
 
     def add_frame(
         self,
@@ -157,16 +157,16 @@ class PanopticMapper:
         labels = [self.labels.new() if label == 0 else max(label, 0) for label in matched]
         inside = overlapping_labels(overlap, options.merge_overlap_share)
         self.merging.observe_segments(
-            [SharedSegment(segment.category_id, group) for group, segment in zip(inside, segments, strict=True)],
+            [SharedSegment(segment.class_id, group) for group, segment in zip(inside, segments, strict=True)],
             [label for label in labels if label > 0],
         )
         self._predict(
             [
-                Prediction(label, segment.category_id, segment.instance, segment.score)
+                Prediction(label, segment.class_id, segment.instance, segment.score)
                 for label, segment in zip(labels, segments, strict=True)
-                if label > 0 and segment.category_id > 0
+                if label > 0 and segment.class_id > 0
             ],
-            [label for label, segment in zip(labels, segments, strict=True) if label > 0 and segment.category_id == 0],
+            [label for label, segment in zip(labels, segments, strict=True) if label > 0 and segment.class_id == 0],
         )
         for label in labels:
             if label > 0:

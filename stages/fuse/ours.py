@@ -112,11 +112,11 @@ class Ours:
         """Count which segments and which instances of things the frame sees as one, and which as two: a frame instance
         stands for the leading instances of the global segments that it lies on."""
         of_things = [p for p in predictions if p.class_id in self.things]
-        parts: dict[int, set[int]] = {}
+        segments_of: dict[int, set[int]] = {}
         for prediction in of_things:
-            parts.setdefault(prediction.frame_instance, set()).add(prediction.segment)
+            segments_of.setdefault(prediction.frame_instance, set()).add(prediction.segment)
         self.segment_evidence.observe(
-            [list(combinations(sorted(labels), 2)) for labels in parts.values()], {p.segment for p in of_things}
+            [list(combinations(sorted(labels), 2)) for labels in segments_of.values()], {p.segment for p in of_things}
         )
         homes: dict[int, dict[int, set[int]]] = {}
         for prediction in of_things:

@@ -30,9 +30,9 @@ class Outdated:
         if not len(old):
             return depth
         local = (old - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
-        kept = depth.copy()
-        _blank(kept, local, np.array([camera.fx, camera.fy, camera.cx, camera.cy]), self.edge)
-        return kept
+        current = depth.copy()
+        _blank(current, local, np.array([camera.fx, camera.fy, camera.cx, camera.cy]), self.edge)
+        return current
 
 
 @numba.njit(cache=True)

@@ -137,8 +137,8 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
 
 def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
     if "from_mesh" in inputs:
-        held = inputs["from_mesh"].megabytes
-        return Estimate(1.5 * held, 0.05 * held, 250 + 20 * held)
+        scan_megabytes = inputs["from_mesh"].megabytes
+        return Estimate(1.5 * scan_megabytes, 0.05 * scan_megabytes, 250 + 20 * scan_megabytes)
     # A room of 30 m2: 1 cm voxels give 134 MB, 2 cm 30 MB, 4 cm 5.6 MB.
     blocks = 1 / parameters.voxel_size**2
     expected = 0.0127 * blocks

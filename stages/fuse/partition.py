@@ -18,12 +18,13 @@ from scenewright.stages.fuse.merging import Grouping
 from scenewright.stages.fuse.regularization import PairEvidence
 
 SURE_VOTES = 3
-"""From so many predictions on, the leading class of a segment is believed."""
+"""Least predictions with which the leading class of a segment is believed."""
 APART_WEIGHT = 1
-"""How much a frame that saw two things weighs beside one that saw one."""
+"""Weight of a frame that saw two things beside one that saw one."""
 NAMED_SHARE = 0.2
 """A thing is nameless only where the masks that did name it add up to less than this share of all scores."""
 NOTHING = (0, 0)
+"""Class and instance of what belongs to no thing."""
 LEAST_WEIGHT = 2
 """Groups merge from this summed weight on; a single frame decides nothing."""
 
@@ -31,12 +32,14 @@ LEAST_WEIGHT = 2
 def pair_weights(labels: Iterable[int], evidence: PairEvidence) -> dict[int, dict[int, int]]:
     """Return {a: {b: weight}}, symmetric: how often frames saw both segments in one instance of a thing, less
     APART_WEIGHT times how often in two."""
-    known = dict.fromkeys(sorted(labels))
+    label_order = dict.fromkeys(sorted(labels))
     weights = {
         label: {
-            other: -APART_WEIGHT * count for other, count in evidence.apart.get(label, {}).items() if other in known
+            neighbour: -APART_WEIGHT * count
+            for neighbour, count in evidence.apart.get(label, {}).items()
+            if neighbour in label_order
         }
-        for label in known
+        for label in label_order
     }
     for (first, second), count in evidence.together.items():
         if first in weights and second in weights:
@@ -64,14 +67,14 @@ def group_segments(weights: dict[int, dict[int, int]], believed: Mapping[int, in
             continue
         members[kept] += members.pop(removed)
         classes[kept] = classes[kept] or classes[removed]
-        for other, weight in weights.pop(removed).items():
-            del weights[other][removed]
-            if other == kept:
+        for neighbour, weight in weights.pop(removed).items():
+            del weights[neighbour][removed]
+            if neighbour == kept:
                 continue
-            total = weights[kept].get(other, 0) + weight
-            weights[kept][other] = weights[other][kept] = total
+            total = weights[kept].get(neighbour, 0) + weight
+            weights[kept][neighbour] = weights[neighbour][kept] = total
             if total >= LEAST_WEIGHT:
-                heappush(heap, (-total, min(kept, other), max(kept, other)))
+                heappush(heap, (-total, min(kept, neighbour), max(kept, neighbour)))
     return [sorted(members[label]) for label in sorted(members)]
 
 
@@ -85,7 +88,7 @@ def attach_unseen_pairs(groups: list[list[int]], evidence: PairEvidence, counts:
     votes = [_total(group, counts) for group in groups]
     leading: dict[tuple[int, int], list[int]] = {}
     for number, group in enumerate(groups):
-        best = _leading(group, counts)
+        best = _leading_instance(group, counts)
         if best is not None:
             leading.setdefault(best, []).append(number)
     target = list(range(len(groups)))
@@ -93,7 +96,7 @@ def attach_unseen_pairs(groups: list[list[int]], evidence: PairEvidence, counts:
         if len(numbers) < 2:
             continue
         main = max(numbers, key=lambda n: (votes[n], -n))
-        met = {home[other] for label in groups[main] for other in evidence.met(label) if other in home}
+        met = {home[partner] for label in groups[main] for partner in evidence.met(label) if partner in home}
         for number in numbers:
             if number != main and number not in met:
                 target[number] = main
@@ -109,10 +112,10 @@ def leading_class(scores: Mapping[int, float], unnamed: int | None) -> int:
     A mask of the class `unnamed` has found a thing and not recognised it, which says nothing against those that have:
     it leads only where the named ones hold less than NAMED_SHARE of the sum.
     """
-    named = {c: s for c, s in scores.items() if c != unnamed}
-    if unnamed in scores and sum(named.values()) < NAMED_SHARE * sum(scores.values()):
+    named_scores = {c: s for c, s in scores.items() if c != unnamed}
+    if unnamed in scores and sum(named_scores.values()) < NAMED_SHARE * sum(scores.values()):
         return int(unnamed) if unnamed is not None else 0
-    return min(named, key=lambda c: (-named[c], c)) if named else 0
+    return min(named_scores, key=lambda c: (-named_scores[c], c)) if named_scores else 0
 
 
 def name_groups(
@@ -129,19 +132,19 @@ def name_groups(
     A group was seen in the frames that called it what it is called now: names that came up once are mostly wrong.
     """
     best: dict[int, tuple[int, int]] = {}
-    seen = dict(seen_in)
+    new_seen_in = dict(seen_in)
     unused = max([0, *seen_in, *(p for row in counts.by_segment.values() for _, p in row)]) + 1
-    taken: set[int] = set()
+    used: set[int] = set()
     for group in sorted(groups, key=lambda g: (-_total(g, counts), g)):
         class_id = leading_class(_scores_of(group, scores, things), unnamed)
         predictions = _predictions_of(group, counts, things)
-        own = [p for c, p in sorted(predictions, key=lambda k: (-predictions[k], k)) if c == class_id]
-        label = next((p for p in own if p not in taken), unused)
+        instances_of_class = [p for c, p in sorted(predictions, key=lambda k: (-predictions[k], k)) if c == class_id]
+        label = next((p for p in instances_of_class if p not in used), unused)
         unused = max(unused, label + 1)
-        taken.add(label)
-        seen[label] = reduce(or_, (seen_in.get(p, 0) for p in own), 0)
+        used.add(label)
+        new_seen_in[label] = reduce(or_, (seen_in.get(p, 0) for p in instances_of_class), 0)
         best.update(dict.fromkeys(group, (class_id, label)))
-    return Grouping(_with_labels(counts, best), best, seen)
+    return Grouping(_with_labels(counts, best), best, new_seen_in)
 
 
 def _scores_of(
@@ -197,8 +200,8 @@ def group_things(
     for segment, row in counts.by_segment.items():
         best = counts.best(segment)
         if best is not None and best[0] in things:
-            named = leading_class({c: s for c, s in scores[segment].items() if c in things}, unnamed)
-            classes[segment] = named if sum(row.values()) >= SURE_VOTES and named != unnamed else 0
+            thing_class = leading_class({c: s for c, s in scores[segment].items() if c in things}, unnamed)
+            classes[segment] = thing_class if sum(row.values()) >= SURE_VOTES and thing_class != unnamed else 0
         elif best is not None and sum(counts.instances(segment, best[0]).values()) < minimum_votes:
             doubtful.append(segment)
     groups = attach_unseen_pairs(group_segments(pair_weights(classes, evidence), classes), evidence, counts)
@@ -210,7 +213,7 @@ def _total(group: Iterable[int], counts: TripleCounts) -> int:
     return sum(sum(counts.by_segment[segment].values()) for segment in group)
 
 
-def _leading(group: Iterable[int], counts: TripleCounts) -> tuple[int, int] | None:
+def _leading_instance(group: Iterable[int], counts: TripleCounts) -> tuple[int, int] | None:
     votes: dict[tuple[int, int], int] = {}
     for segment in group:
         for key, count in counts.by_segment[segment].items():

@@ -143,10 +143,10 @@ def drop_far_parts(
         frontier = sorted(reached)
         while frontier:
             current = frontier.pop()
-            for other in range(len(names)):
-                if other not in reached and _within(trees[current], trees[other], distance):
-                    reached.add(other)
-                    frontier.append(other)
+            for candidate in range(len(names)):
+                if candidate not in reached and _within(trees[current], trees[candidate], distance):
+                    reached.add(candidate)
+                    frontier.append(candidate)
         result[members[~np.isin(inverse, sorted(reached))]] = 0
     return result
 

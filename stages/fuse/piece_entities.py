@@ -60,8 +60,8 @@ def with_unnamed_pieces(
         tables={e.instance for e in entities if e.class_id in classes.tables},
         told=told,
     )
-    kept, labelled = _cut_anew(surface, entities, labelled, instance)
-    return _with_pieces(surface, kept, labelled, piece, classes.unnamed)
+    named_entities, labelled = _cut_anew(surface, entities, labelled, instance)
+    return _with_pieces(surface, named_entities, labelled, piece, classes.unnamed)
 
 
 def by_geometry(
@@ -85,15 +85,15 @@ def by_geometry(
         return list(entities), labelled
     normals = vertex_normals(vertices, surface.faces)
     class_id, instance = labelled.class_id.copy(), labelled.instance.copy()
-    known = (class_id == classes.floor) | ((class_id == classes.ceiling) & (vertices[:, 2] > CEILING))
-    walls = of_walls(vertices, normals, ~known & (vertices[:, 2] > FLOOR), voxel)
+    floor_or_ceiling = (class_id == classes.floor) | ((class_id == classes.ceiling) & (vertices[:, 2] > CEILING))
+    walls = of_walls(vertices, normals, ~floor_or_ceiling & (vertices[:, 2] > FLOOR), voxel)
     proposed = np.where(class_id == classes.unnamed, instance, 0)
     walls &= ~np.isin(proposed, sorted(sure))
     piece, _ = unnamed_pieces(
         vertices,
         normals,
         np.zeros_like(instance),
-        known | walls,
+        floor_or_ceiling | walls,
         voxel=voxel,
         minimum_area=minimum_area,
         proposed=proposed,
@@ -108,18 +108,20 @@ def by_geometry(
         room[wall] = ExtractedEntity(wall, classes.wall, (), cut_mesh(surface, np.zeros(0, int)), 0.0, 0)
     of_face = face_labels(instance, surface.faces)
     cut = [replace(e, mesh=cut_mesh(surface, np.flatnonzero(of_face == number))) for number, e in sorted(room.items())]
-    kept = [e for e in cut if len(e.mesh.faces)]
-    lost = ~np.isin(instance, [e.instance for e in kept])
+    room_entities = [e for e in cut if len(e.mesh.faces)]
+    lost = ~np.isin(instance, [e.instance for e in room_entities])
     class_id[lost], instance[lost] = 0, 0
-    found, result = _with_pieces(
-        surface, kept, LabelledSurface(labelled.segment, class_id, instance), piece, classes.unnamed
+    all_entities, result = _with_pieces(
+        surface, room_entities, LabelledSurface(labelled.segment, class_id, instance), piece, classes.unnamed
     )
     unused = {e.instance: e for e in entities if e.class_id == classes.unnamed}
-    for place in range(len(kept), len(found)):  # the largest piece first
-        most = int(np.bincount(proposed[result.instance == found[place].instance]).argmax())
+    for index in range(len(room_entities), len(all_entities)):  # the largest piece first
+        most = int(np.bincount(proposed[result.instance == all_entities[index].instance]).argmax())
         if most in unused:
-            found[place] = replace(unused.pop(most), instance=found[place].instance, mesh=found[place].mesh)
-    return found, result
+            all_entities[index] = replace(
+                unused.pop(most), instance=all_entities[index].instance, mesh=all_entities[index].mesh
+            )
+    return all_entities, result
 
 
 def _over_floor(surface: Surface, labelled: LabelledSurface, classes: Classes) -> np.ndarray | None:
@@ -128,10 +130,10 @@ def _over_floor(surface: Surface, labelled: LabelledSurface, classes: Classes) -
     return surface.vertices - [0.0, 0.0, float(np.median(level))] if len(level) else None
 
 
-def _no_wall(vertices: np.ndarray, normals: np.ndarray, named: np.ndarray, voxel: float) -> np.ndarray:
-    """Return which of the surface (V,) that masks `named` a wall is none: what stands off every wall and has a level
-    top, a desk that a mask mistook."""
-    away = np.flatnonzero(named & (vertices[:, 2] > FLOOR) & ~of_walls(vertices, normals, named, voxel))
+def _no_wall(vertices: np.ndarray, normals: np.ndarray, wall_mask: np.ndarray, voxel: float) -> np.ndarray:
+    """Return which of the surface (V,) that masks called a wall (`wall_mask`) is none: what stands off every wall and
+    has a level top, a desk that a mask mistook."""
+    away = np.flatnonzero(wall_mask & (vertices[:, 2] > FLOOR) & ~of_walls(vertices, normals, wall_mask, voxel))
     result = np.zeros(len(vertices), bool)
     result[away[topped_parts(vertices[away], normals[away], voxel)]] = True
     return result
@@ -145,16 +147,16 @@ def _cut_anew(
     changed = instance != labelled.instance
     touched = set(np.union1d(instance[changed], labelled.instance[changed]).tolist())
     of_face, class_of = face_labels(instance, surface.faces), {e.instance: e.class_id for e in entities}
-    kept = []
+    nonempty = []
     for entity in entities:
         if entity.instance in touched:
             entity = replace(entity, mesh=cut_mesh(surface, np.flatnonzero(of_face == entity.instance)))
         if len(entity.mesh.faces):
-            kept.append(entity)
+            nonempty.append(entity)
     class_id = labelled.class_id.copy()
     class_id[changed] = [class_of.get(number, 0) for number in instance[changed].tolist()]
-    lost = np.isin(instance, sorted(set(class_of) - {e.instance for e in kept}))
-    return kept, LabelledSurface(labelled.segment, np.where(lost, 0, class_id), np.where(lost, 0, instance))
+    lost = np.isin(instance, sorted(set(class_of) - {e.instance for e in nonempty}))
+    return nonempty, LabelledSurface(labelled.segment, np.where(lost, 0, class_id), np.where(lost, 0, instance))
 
 
 def _with_pieces(
@@ -162,13 +164,13 @@ def _with_pieces(
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return entities and labels with those of every piece (V,) after them, by its number."""
     of_face, first = face_labels(piece, surface.faces), 1 + int(labelled.instance.max(initial=0))
-    found, number = list(entities), np.zeros(int(piece.max(initial=0)) + 1, np.int32)
+    all_entities, number = list(entities), np.zeros(int(piece.max(initial=0)) + 1, np.int32)
     for label in range(1, len(number)):
         mesh = cut_mesh(surface, np.flatnonzero(of_face == label))
         if len(mesh.faces):
             number[label] = first + label
-            found.append(ExtractedEntity(first + label, unnamed, (), mesh, 0.0, 0))
+            all_entities.append(ExtractedEntity(first + label, unnamed, (), mesh, 0.0, 0))
     new = number[piece] > 0
     instance = np.where(new, number[piece], labelled.instance).astype(np.int32)
     class_id = np.where(new, np.int32(unnamed), labelled.class_id)
-    return found, LabelledSurface(labelled.segment, class_id, instance)
+    return all_entities, LabelledSurface(labelled.segment, class_id, instance)

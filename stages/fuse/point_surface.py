@@ -52,7 +52,7 @@ def tiles_of_points(
 def local_axes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return distances (N, K) [m] to the NEIGHBOURS nearest points, itself first, and axes (N, 3, 3) of the plane
     through them: the first column is normal to it, its sign whatever it is."""
-    distance, near = cKDTree(points).query(points, k=min(NEIGHBOURS, len(points)))
-    near = near.reshape(len(points), -1)
-    around = points[near] - points[near].mean(axis=1, keepdims=True)
+    distance, neighbours = cKDTree(points).query(points, k=min(NEIGHBOURS, len(points)))
+    neighbours = neighbours.reshape(len(points), -1)
+    around = points[neighbours] - points[neighbours].mean(axis=1, keepdims=True)
     return distance.reshape(len(points), -1), np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))[1]

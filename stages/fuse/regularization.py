@@ -14,6 +14,7 @@ Pair = tuple[int, int]
 
 
 NONE: Counter[int] = Counter()
+"""The counts of a label that was never seen apart; not to be changed."""
 
 
 class MergedLabels:
@@ -70,8 +71,8 @@ class PairEvidence:
     def observe(self, groups: Iterable[Iterable[tuple[int, int]]], matched: Iterable[int]) -> None:
         """Count one frame: `groups` holds the pairs of labels that were seen as one, by segment or instance of the
         frame; `matched` all labels of the frame. Pairs that were seen as one are not counted as apart."""
-        seen = [pair for group in groups for pair in group]
-        for pair in seen:
+        pairs_together = [pair for group in groups for pair in group]
+        for pair in pairs_together:
             self._increase(pair, 1)
         labels = list(dict.fromkeys(matched))
         for label in labels:
@@ -79,7 +80,7 @@ class PairEvidence:
             row.update(labels)
             row.pop(label)
         present = set(labels)
-        for first, second in set(seen):
+        for first, second in set(pairs_together):
             if first in present and second in present:
                 self._decrease(first, second)
                 self._decrease(second, first)
@@ -108,30 +109,30 @@ class PairEvidence:
             self._pairs[pair[0] if pair[1] == label else pair[1]].discard(pair)
             self._open.discard(pair)
             del self.together[pair]
-        for other in self.apart.pop(label, ()):
-            row = self.apart[other]
+        for neighbour in self.apart.pop(label, ()):
+            row = self.apart[neighbour]
             row.pop(label)
             if not row:
-                del self.apart[other]
+                del self.apart[neighbour]
 
     def rename(self, removed: int, kept: int) -> None:
         """Move the counts of label `removed` to `kept`."""
         for pair in sorted(self._pairs.pop(removed, ())):
-            other = pair[0] if pair[1] == removed else pair[1]
-            self._pairs[other].discard(pair)
+            partner = pair[0] if pair[1] == removed else pair[1]
+            self._pairs[partner].discard(pair)
             self._open.discard(pair)
             count = self.together.pop(pair)
-            if other != kept:
-                self._increase((min(other, kept), max(other, kept)), count)
+            if partner != kept:
+                self._increase((min(partner, kept), max(partner, kept)), count)
         moved = self.apart.pop(removed, NONE)
-        own = self.apart.setdefault(kept, Counter())
-        for other, count in moved.items():
-            row = self.apart[other]
+        kept_row = self.apart.setdefault(kept, Counter())
+        for partner, count in moved.items():
+            row = self.apart[partner]
             row.pop(removed)
-            if other != kept:
+            if partner != kept:
                 row[kept] = row.get(kept, 0) + count
-                own[other] = own.get(other, 0) + count
-        if not own:
+                kept_row[partner] = kept_row.get(partner, 0) + count
+        if not kept_row:
             del self.apart[kept]
 
     def _is_due(self, pair: Pair, minimum_frames: int, contested: bool) -> bool:

@@ -74,20 +74,20 @@ def associate_separately(
     counted most on its label and that no other frame instance has; without one a new label is made. An instance that
     leads on a segment without a prediction in this frame (`unpredicted`, global labels) is taken too.
     """
-    taken: set[int] = set()
+    used: set[int] = set()
     for label in unpredicted:
         counted = counts.instances(label, 0)
         if counted:
-            taken.add(min(counted, key=lambda p: (-counted[p], p)))
+            used.add(min(counted, key=lambda p: (-counted[p], p)))
     result: dict[tuple[int, int], int] = {}
     for prediction in predictions:
         key = (prediction.frame_instance, prediction.class_id)
         if key in result:
             continue
-        free = {p: n for p, n in counts.instances(prediction.segment, 0).items() if p not in taken}
+        free = {p: n for p, n in counts.instances(prediction.segment, 0).items() if p not in used}
         if free:
             result[key] = min(free, key=lambda p: (-free[p], p))
-            taken.add(result[key])
+            used.add(result[key])
         else:
             result[key] = next_instance
             next_instance += 1

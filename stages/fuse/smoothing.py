@@ -20,8 +20,8 @@ def _smooth(
 ) -> None:
     for rank in prange(order.shape[0]):
         for cell in range(VOXELS):
-            here = order[rank] * VOXELS + cell
-            if weight[here] <= 0:
+            voxel = order[rank] * VOXELS + cell
+            if weight[voxel] <= 0:
                 continue
             x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
             total = 0.0
@@ -32,8 +32,8 @@ def _smooth(
                 if after >= 0 and before >= 0 and weight[after] > 0 and weight[before] > 0:
                     total += 0.5 * (tsdf[after] + tsdf[before])
                     axes += 1
-            kept = weight[here]
-            result[here] = (kept * tsdf[here] + strength * total) / (kept + strength * axes)
+            own_weight = weight[voxel]
+            result[voxel] = (own_weight * tsdf[voxel] + strength * total) / (own_weight + strength * axes)
 
 
 def smoothed_tsdf(blocks: VoxelBlocks, strength: float) -> np.ndarray:

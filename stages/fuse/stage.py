@@ -139,16 +139,16 @@ def _integrate_frames(
                 used = frame.depth is not None and (frame.depth > 0).any()
                 if not used:
                     frame = replace(frame, depth=None)
-                wanted = used and pose is not None and frame.index in listed
-                yield frame, pose, masks.read(frame.index) if wanted else None
+                has_masks = used and pose is not None and frame.index in listed
+                yield frame, pose, masks.read(frame.index) if has_masks else None
 
         mapper = new_mapper(parameters, vocabulary)
         total = -(-len(reader) // parameters.every)
-        kept = 0
+        last_snapshot = 0
         for frame, pose, ids in context.progress.track(prefetched(read()), total=total, description="fuse"):
             # Of the last frame the finished map is the snapshot, so one is taken when another frame comes.
-            if parameters.snapshot_every and mapper.frames_integrated >= kept + parameters.snapshot_every:
-                kept = mapper.frames_integrated
+            if parameters.snapshot_every and mapper.frames_integrated >= last_snapshot + parameters.snapshot_every:
+                last_snapshot = mapper.frames_integrated
                 write_snapshot(mapper, vocabulary, source, context)
             if frame.depth is None:
                 skipped["no_depth"] += 1

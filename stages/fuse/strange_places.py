@@ -17,7 +17,7 @@ LEAST_THING_SCORE = 0.3
 """Score of the masks of things, averaged over all frame segments that were matched to an entity (0 where no mask was),
 from which on it is kept as one thing."""
 SURE = 0.5
-"""... and over which geometry leaves it alone: most looks saw a thing."""
+"""Score over which geometry leaves a thing alone: most looks saw a thing."""
 
 
 def thing_score(
@@ -46,9 +46,9 @@ def share_told(
     labelled: LabelledSurface, scores: Mapping[int, Mapping[int, float]], sightings: Mapping[int, int]
 ) -> np.ndarray:
     """Return the score (V,), 0..1, that masks of its class gave the surface per sighting of its segment label."""
-    pairs, place = np.unique(np.stack([labelled.segment, labelled.class_id]), axis=1, return_inverse=True)
-    told = [thing_score((int(s),), scores, frozenset({int(c)}), sightings) for s, c in pairs.T]
-    return np.asarray(told, float)[place.reshape(-1)]
+    pairs, pair_of_vertex = np.unique(np.stack([labelled.segment, labelled.class_id]), axis=1, return_inverse=True)
+    pair_scores = [thing_score((int(s),), scores, frozenset({int(c)}), sightings) for s, c in pairs.T]
+    return np.asarray(pair_scores, float)[pair_of_vertex.reshape(-1)]
 
 
 def without_names(
@@ -63,10 +63,10 @@ def without_names(
     Things whose `score_of` [by instance] is under LEAST_THING_SCORE are left out, and their surface is unlabelled.
     """
     doubtful = {e.instance for e in entities if e.class_id in things and score_of[e.instance] < LEAST_THING_SCORE}
-    kept = [e for e in entities if e.instance not in doubtful]
+    certain = [e for e in entities if e.instance not in doubtful]
     gone = np.isin(labelled.instance, sorted(doubtful))
     of_things = np.isin(labelled.class_id, sorted(things)) & ~gone
     class_id = np.where(gone, 0, np.where(of_things, unnamed, labelled.class_id)).astype(np.int32)
     instance = np.where(gone, 0, labelled.instance).astype(np.int32)
-    nameless = [replace(e, class_id=unnamed) if e.class_id in things else e for e in kept]
+    nameless = [replace(e, class_id=unnamed) if e.class_id in things else e for e in certain]
     return nameless, LabelledSurface(labelled.segment, class_id, instance)

@@ -59,23 +59,23 @@ def _crossings(
     for rank in prange(order.shape[0]):
         for cell in range(VOXELS):
             x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
-            here = order[rank] * VOXELS + cell
-            here_seen = weight[here] >= minimum_weight
+            voxel = order[rank] * VOXELS + cell
+            here_seen = weight[voxel] >= minimum_weight
             for axis in range(3):
                 a, b, c = int(axis == 0), int(axis == 1), int(axis == 2)
-                there = voxel_at(neighbours, rank, x + a, y + b, z + c)
-                there_seen = there >= 0 and weight[there] >= minimum_weight
+                next_voxel = voxel_at(neighbours, rank, x + a, y + b, z + c)
+                there_seen = next_voxel >= 0 and weight[next_voxel] >= minimum_weight
                 if here_seen and there_seen:
-                    if (tsdf[here] < 0) != (tsdf[there] < 0):
-                        crossings[here] |= 1 << axis if abs(tsdf[here] - tsdf[there]) <= jump else 8 << axis
+                    if (tsdf[voxel] < 0) != (tsdf[next_voxel] < 0):
+                        crossings[voxel] |= 1 << axis if abs(tsdf[voxel] - tsdf[next_voxel]) <= jump else 8 << axis
                 elif here_seen or there_seen:
-                    last = here if here_seen else there
+                    last = voxel if here_seen else next_voxel
                     if 0 <= tsdf[last] <= jump:
                         # From the last voxel that was seen, one more towards where it was seen from.
                         away = -1 if here_seen else 2
                         last = voxel_at(neighbours, rank, x + away * a, y + away * b, z + away * c)
                     if last >= 0 and weight[last] >= minimum_weight and tsdf[last] > jump:
-                        crossings[here] |= 8 << axis
+                        crossings[voxel] |= 8 << axis
 
 
 @njit(cache=True)
@@ -122,14 +122,14 @@ def _vertices(
         edges = np.empty(8, dtype=np.uint8)
         for cell in range(VOXELS):
             x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
-            wanted = ALL if hits[order[rank] * VOXELS + cell] >= OWN_HITS else SMALL_STEPS
-            found = 0
+            edge_mask = ALL if hits[order[rank] * VOXELS + cell] >= OWN_HITS else SMALL_STEPS
+            any_edges = 0
             for corner in range(8):
                 voxel = voxel_at(neighbours, rank, x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2))
                 voxels[corner] = voxel
-                edges[corner] = crossings[voxel] & wanted if voxel >= 0 else 0
-                found |= edges[corner]
-            if found == 0 or not _measured_near(neighbours, rank, x, y, z, hits):
+                edges[corner] = crossings[voxel] & edge_mask if voxel >= 0 else 0
+                any_edges |= edges[corner]
+            if any_edges == 0 or not _measured_near(neighbours, rank, x, y, z, hits):
                 continue
             for corner in range(8):
                 if voxels[corner] >= 0 and weight[voxels[corner]] < minimum_weight:
@@ -154,28 +154,28 @@ def _vertices(
                     sum_y += ((corner >> 1) & 1) + (along if axis == 1 else 0.0)
                     sum_z += (corner >> 2) + (along if axis == 2 else 0.0)
                     if write:
-                        near, far = (corner | bit, corner) if along > 0.5 else (corner, corner | bit)
-                        nearest = voxels[near] if voxels[near] >= 0 else voxels[far]
+                        near_corner, far_corner = (corner | bit, corner) if along > 0.5 else (corner, corner | bit)
+                        nearest = voxels[near_corner] if voxels[near_corner] >= 0 else voxels[far_corner]
                         red += color[nearest, 0]
                         green += color[nearest, 1]
                         blue += color[nearest, 2]
             if count_of_edges == 0:
                 continue
             if write:
-                place = start + count
-                index[rank * VOXELS + cell] = place
-                vertices[place, 0] = (origin[0] * SIDE + x + 0.5 + sum_x / count_of_edges) * voxel_size
-                vertices[place, 1] = (origin[1] * SIDE + y + 0.5 + sum_y / count_of_edges) * voxel_size
-                vertices[place, 2] = (origin[2] * SIDE + z + 0.5 + sum_z / count_of_edges) * voxel_size
+                vertex = start + count
+                index[rank * VOXELS + cell] = vertex
+                vertices[vertex, 0] = (origin[0] * SIDE + x + 0.5 + sum_x / count_of_edges) * voxel_size
+                vertices[vertex, 1] = (origin[1] * SIDE + y + 0.5 + sum_y / count_of_edges) * voxel_size
+                vertices[vertex, 2] = (origin[2] * SIDE + z + 0.5 + sum_z / count_of_edges) * voxel_size
                 scale = 1.0 / (count_of_edges * FIXED_POINT)
-                colors[place, 0] = np.uint8(min(255.0, red * scale + 0.5))
-                colors[place, 1] = np.uint8(min(255.0, green * scale + 0.5))
-                colors[place, 2] = np.uint8(min(255.0, blue * scale + 0.5))
+                colors[vertex, 0] = np.uint8(min(255.0, red * scale + 0.5))
+                colors[vertex, 1] = np.uint8(min(255.0, green * scale + 0.5))
+                colors[vertex, 2] = np.uint8(min(255.0, blue * scale + 0.5))
                 best = np.float32(2.0)
                 for corner in range(8):
                     if voxels[corner] >= 0 and segment[voxels[corner]] > 0 and abs(value[corner]) < best:
                         best = abs(value[corner])
-                        labels[place] = segment[voxels[corner]]
+                        labels[vertex] = segment[voxels[corner]]
             count += 1
         if not write:
             offsets[rank] = count
@@ -204,13 +204,13 @@ def _faces(
         quad = np.empty(4, dtype=np.int64)
         for cell in range(VOXELS):
             x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
-            here = order[rank] * VOXELS + cell
-            if crossings[here] == 0:
+            voxel = order[rank] * VOXELS + cell
+            if crossings[voxel] == 0:
                 continue
             for axis in range(3):
-                if not crossings[here] & (9 << axis):
+                if not crossings[voxel] & (9 << axis):
                     continue
-                least = OWN_HITS if crossings[here] & (8 << axis) else 0
+                least = OWN_HITS if crossings[voxel] & (8 << axis) else 0
                 # The four cells around the edge, counter-clockwise seen from its far end.
                 complete = True
                 for turn in range(4):
@@ -234,7 +234,7 @@ def _faces(
                 if not complete:
                     continue
                 if write:
-                    if weight[here] >= minimum_weight and tsdf[here] >= 0:
+                    if weight[voxel] >= minimum_weight and tsdf[voxel] >= 0:
                         quad[1], quad[3] = quad[3], quad[1]
                     first = 0.0
                     second_diagonal = 0.0
@@ -242,12 +242,12 @@ def _faces(
                         first += (vertices[quad[0], k] - vertices[quad[2], k]) ** 2
                         second_diagonal += (vertices[quad[1], k] - vertices[quad[3], k]) ** 2
                     turn = 0 if first <= second_diagonal else 1
-                    place = start + count
+                    face = start + count
                     for k in range(3):
-                        faces[place, k] = quad[(turn + k) % 4]
-                        faces[place + 1, k] = quad[(turn + (k + 2 if k else 0)) % 4]
-                    faces[place + 1, 1] = quad[(turn + 2) % 4]
-                    faces[place + 1, 2] = quad[(turn + 3) % 4]
+                        faces[face, k] = quad[(turn + k) % 4]
+                        faces[face + 1, k] = quad[(turn + (k + 2 if k else 0)) % 4]
+                    faces[face + 1, 1] = quad[(turn + 2) % 4]
+                    faces[face + 1, 2] = quad[(turn + 3) % 4]
                 count += 2
         if not write:
             offsets[rank] = count
@@ -292,7 +292,7 @@ def extract_surface(
     fields = (blocks.color.reshape(-1, 3), blocks.segment.reshape(-1))
     crossings = np.zeros(blocks.capacity * VOXELS, dtype=np.uint8)
     _crossings(order, neighbours, tsdf, weight, minimum_weight, jump, crossings)
-    found = crossings, blocks.hits.reshape(-1)
+    crossing_arrays = crossings, blocks.hits.reshape(-1)
     index = np.full(len(order) * VOXELS, -1, dtype=np.int32)
 
     def vertex_pass(write: bool, offsets: np.ndarray, count: int) -> Surface:
@@ -302,7 +302,7 @@ def extract_surface(
             order,
             neighbours,
             blocks.coordinates,
-            *found,
+            *crossing_arrays,
             tsdf,
             weight,
             *fields,
@@ -325,7 +325,7 @@ def extract_surface(
             order,
             rank_of_slot,
             neighbours,
-            *found,
+            *crossing_arrays,
             tsdf,
             weight,
             minimum_weight,
@@ -345,5 +345,5 @@ def extract_surface(
 def _without_lone_vertices(surface: Surface) -> Surface:
     used = np.zeros(len(surface.vertices), dtype=bool)
     used[surface.faces] = True
-    place = np.cumsum(used, dtype=np.int32) - np.int32(1)
-    return Surface(surface.vertices[used], place[surface.faces], surface.colors[used], surface.segment[used])
+    new_index = np.cumsum(used, dtype=np.int32) - np.int32(1)
+    return Surface(surface.vertices[used], new_index[surface.faces], surface.colors[used], surface.segment[used])

@@ -24,21 +24,23 @@ FLOOR = 0.06
 LOWEST_TOP, LEAST_TOP_AREA = 0.6, 0.25
 """Height [m] and area [m^2] of a level top on which other things stand; seats are lower."""
 SAME_LEVEL = 0.03
-"""[m]"""
+"""Largest difference in height of points on one level [m]."""
 RISE = 1.5 * SAME_LEVEL
-"""What is higher than this over a level top is not of it; so is what bends away from it a voxel above [m]."""
+"""Height over a level top from which on nothing is part of it [m]; nor is what bends away from it by a voxel."""
 APRON = 0.15
-"""What hangs together with a thing so far under its top is its body [m]."""
+"""Depth under a thing's top from which on what hangs together with it is its body [m]."""
 SHADOW = 0.15
 """Gaps in a level top this wide are of it: what stands there hides it [m]."""
 STACKED_SHARE, STACKED_GAP = 0.5, 0.35
 """Pieces above each other with this share of the smaller footprint in common, and this gap at most [m], are one."""
 TOLD = 0.75
-"""What so many of its views had in a table's masks is of it whatever its shape. A detector's masks took along what
-stands at tables in at most half of the views, true ones a desk's own shelf in nearly all."""
+"""Share of a piece's views in a table's masks from which on it is of the table whatever its shape. A detector's masks
+took along what stands at tables in at most half of the views, true ones a desk's own shelf in nearly all."""
 LEAST_RISE = 0.75
-"""What is so many voxels over a level top is of what lies on it; the highest quarter of that is a voxel over it."""
+"""Height over a level top, in voxels, from which on points are of what lies on it; the highest quarter of that is a
+voxel over it."""
 BENDING_STEPS = 5
+"""Times the bending of a top is fitted anew without its outliers; by eye."""
 FEWEST = 50
 """Vertices of a part that is looked at, and of a thing on a level top."""
 SCRAP_SHARE, SCRAP_DISTANCE = 0.25, 0.1
@@ -50,6 +52,7 @@ TOP = 0.75
 SMALLEST, LEAST_HEIGHT = 0.1, 0.06
 """Extents of a piece [m]."""
 NO_PART = -1
+"""Part of vertices that are in none."""
 
 
 def unnamed_pieces(
@@ -80,41 +83,41 @@ def unnamed_pieces(
     piece = np.zeros(len(vertices), np.int32)
     members = np.flatnonzero((instance == 0) & ~room & (vertices[:, 2] > FLOOR))
     points = vertices[members]
-    parts = _components(points, voxel, None if proposed is None else proposed[members])
-    whole = set() if proposed is None else set(parts[proposed[members] > 0].tolist())
-    kept_whole = set() if proposed is None else set(parts[np.isin(proposed[members], sorted(sure))].tolist())
-    parts, standing = _cut_at_tops(points, normals[members], parts, voxel, kept_whole)
+    components = _components(points, voxel, None if proposed is None else proposed[members])
+    proposed_parts = set() if proposed is None else set(components[proposed[members] > 0].tolist())
+    kept_whole = set() if proposed is None else set(components[np.isin(proposed[members], sorted(sure))].tolist())
+    components, standing = _cut_at_tops(points, normals[members], components, voxel, kept_whole)
     names, part_of, freed = np.where(room, 0, instance), np.full(len(vertices), NO_PART), set()
-    part_of[members] = parts
+    part_of[members] = components
     told = np.zeros(len(vertices)) if told is None else told
     for thing in sorted(set(topped) & set(np.unique(names).tolist())):
         own, on_top = _cut_from_named(vertices, normals, names, part_of, told, thing, voxel)
         freed |= own
         standing |= on_top
     members = np.flatnonzero(part_of != NO_PART)
-    points, parts = vertices[members], part_of[members]
+    points, components = vertices[members], part_of[members]
     for _, top in _tops(vertices, normals, names, voxel):
         if names[top[0]] > 0:
             level, footprint = float(np.median(vertices[top, 2])), _Footprint(vertices[top, :2], voxel)
-            standing |= _standing_on(level, footprint, points, parts)
+            standing |= _parts_standing_on(level, footprint, points, components)
     alone, of_named = np.ones(len(points), bool), instance.astype(np.int32)
     for name in np.unique(names[names > 0]).tolist():
         thing = vertices[names == name]
-        left = alone & _of_named(points, parts, thing) & ~np.isin(parts, sorted(freed))
-        alone &= ~left
+        of_thing = alone & _of_named(points, components, thing) & ~np.isin(components, sorted(freed))
+        alone &= ~of_thing
         if name not in tables:
-            of_named[members[_touching(points, np.where(left, parts, NO_PART), thing, voxel)]] = name
-    members, points, parts = members[alone], points[alone], parts[alone]
-    parts = _joined(points, normals[members], parts, standing, whole, voxel, minimum_area)
-    kept = []
-    for part in np.unique(parts):
-        own = members[parts == part]
+            of_named[members[_points_touching(points, np.where(of_thing, components, NO_PART), thing, voxel)]] = name
+    members, points, components = members[alone], points[alone], components[alone]
+    components = _join_parts(points, normals[members], components, standing, proposed_parts, voxel, minimum_area)
+    pieces = []
+    for part in np.unique(components):
+        own = members[components == part]
         extent = np.ptp(vertices[own], axis=0)
         large = len(own) * voxel**2 >= minimum_area and extent[:2].max() >= SMALLEST
         high = extent[2] >= LEAST_HEIGHT and vertices[own, 2].min() < CEILING
-        if (large and high) or (len(own) >= FEWEST and part in standing | whole):
-            kept.append(own)
-    for number, own in enumerate(sorted(kept, key=lambda own: (-len(own), own[0])), 1):
+        if (large and high) or (len(own) >= FEWEST and part in standing | proposed_parts):
+            pieces.append(own)
+    for number, own in enumerate(sorted(pieces, key=lambda own: (-len(own), own[0])), 1):
         piece[own] = number
     return piece, np.where(piece > 0, 0, of_named).astype(np.int32)
 
@@ -127,10 +130,10 @@ def _components(points: np.ndarray, voxel: float, proposed: np.ndarray | None = 
     if proposed is not None:
         pairs = pairs[(proposed[pairs] == 0).all(axis=1)]
     graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    parts = connected_components(graph, directed=False)[1]
+    components = connected_components(graph, directed=False)[1]
     if proposed is None:
-        return parts
-    return np.where(proposed > 0, len(points) + proposed, parts)
+        return components
+    return np.where(proposed > 0, len(points) + proposed, components)
 
 
 class _Footprint:
@@ -156,44 +159,46 @@ class _Footprint:
         return result
 
 
-def _tops(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float) -> list[tuple[int, np.ndarray]]:
+def _tops(
+    points: np.ndarray, normals: np.ndarray, components: np.ndarray, voxel: float
+) -> list[tuple[int, np.ndarray]]:
     """Return the level tops of all parts, the largest first: the part, and the numbers of the points."""
-    found = []
-    for part in np.unique(parts):
-        up = np.flatnonzero((parts == part) & (normals[:, 2] > LEVEL) & (points[:, 2] > LOWEST_TOP))
+    tops = []
+    for part in np.unique(components):
+        up = np.flatnonzero((components == part) & (normals[:, 2] > LEVEL) & (points[:, 2] > LOWEST_TOP))
         if len(up) * voxel**2 < LEAST_TOP_AREA:
             continue
         patch = _components(points[up] * [1.0, 1.0, 2.0], voxel)  # a step of more than a voxel parts two levels
         for number in np.flatnonzero(np.bincount(patch) * voxel**2 >= LEAST_TOP_AREA):
-            found.append((int(part), up[patch == number]))
-    return sorted(found, key=lambda top: (-len(top[1]), top[1][0]))
+            tops.append((int(part), up[patch == number]))
+    return sorted(tops, key=lambda top: (-len(top[1]), top[1][0]))
 
 
 def topped_parts(points: np.ndarray, normals: np.ndarray, voxel: float) -> np.ndarray:
     """Return which of points (N, 3), the floor at 0, are of a connected part with a level top on which things stand."""
-    parts = _components(points, voxel)
-    return np.isin(parts, [part for part, _ in _tops(points, normals, parts, voxel)])
+    components = _components(points, voxel)
+    return np.isin(components, [part for part, _ in _tops(points, normals, components, voxel)])
 
 
 def _cut_at_tops(
-    points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float, kept_whole: Collection[int] = ()
+    points: np.ndarray, normals: np.ndarray, components: np.ndarray, voxel: float, kept_whole: Collection[int] = ()
 ) -> tuple[np.ndarray, set[int]]:
     """Cut what stands on the level tops of each part from it, and what rises beside them: a chair, a tall cabinet.
 
     Return the parts (N,), and which of them stand on a top. Nothing is cut from those that are `kept_whole`.
     """
-    result, standing = parts.copy(), set()
-    after = int(parts.max(initial=0)) + 1
-    for part, top in _tops(points, normals, parts, voxel):
+    result, standing = components.copy(), set()
+    after = int(components.max(initial=0)) + 1
+    for part, top in _tops(points, normals, components, voxel):
         level, footprint = float(np.median(points[top, 2])), _Footprint(points[top, :2], voxel)
         if part in kept_whole:
-            standing |= _standing_on(level, footprint, points, result) - {part}
+            standing |= _parts_standing_on(level, footprint, points, result) - {part}
             continue
-        own = np.flatnonzero(result == part)
-        over, inside = points[own, 2] - level, footprint.holds(points[own])
-        rise = _over_top(points[own], points[top], voxel)
+        of_part = np.flatnonzero(result == part)
+        over, inside = points[of_part, 2] - level, footprint.holds(points[of_part])
+        rise = _over_top(points[of_part], points[top], voxel)
         risen = inside & (rise > LEAST_RISE * voxel)
-        above, rise = own[risen], rise[risen]
+        above, rise = of_part[risen], rise[risen]
         component = _components(points[above], voxel)
         for number in np.flatnonzero(np.bincount(component, minlength=1) >= FEWEST):
             thing = above[component == number]
@@ -201,20 +206,20 @@ def _cut_at_tops(
                 result[thing] = after
                 standing.add(after)
                 after += 1
-        own = own[result[own] == part]
-        over, inside = points[own, 2] - level, footprint.holds(points[own])
+        of_part = of_part[result[of_part] == part]
+        over, inside = points[of_part, 2] - level, footprint.holds(points[of_part])
         body = ~inside | (np.abs(over) > RISE)
-        own, over, inside = own[body], over[body], inside[body]
-        component = _components(points[own], voxel)
+        of_part, over, inside = of_part[body], over[body], inside[body]
+        component = _components(points[of_part], voxel)
         rising = (over > RISE) & ~inside
         under = inside & (over > -APRON) & (over < -RISE)
         for number in np.flatnonzero(np.bincount(component[rising], minlength=1) >= FEWEST):
             beside = component == number
             if (beside & under).sum() >= FEWEST:  # the two hang together: cut straight down
-                beside &= ~inside & _Footprint(points[own[beside & rising], :2], voxel).holds(points[own])
-            result[own[beside]] = after
+                beside &= ~inside & _Footprint(points[of_part[beside & rising], :2], voxel).holds(points[of_part])
+            result[of_part[beside]] = after
             after += 1
-        standing |= _standing_on(level, footprint, points, result)
+        standing |= _parts_standing_on(level, footprint, points, result)
     return result, standing
 
 
@@ -228,10 +233,10 @@ def _over_top(points: np.ndarray, top: np.ndarray, voxel: float) -> np.ndarray:
         return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
     columns, height = terms(top[:, :2]), top[:, 2] - level
-    kept = np.abs(height) < 2 * voxel
+    inliers = np.abs(height) < 2 * voxel
     for _ in range(BENDING_STEPS):
-        shape = np.linalg.lstsq(columns[kept], height[kept], rcond=None)[0]
-        kept = np.abs(height - columns @ shape) < voxel / 2
+        shape = np.linalg.lstsq(columns[inliers], height[inliers], rcond=None)[0]
+        inliers = np.abs(height - columns @ shape) < voxel / 2
     return points[:, 2] - level - terms(points[:, :2]) @ shape
 
 
@@ -240,7 +245,7 @@ def _cut_from_named(
     normals: np.ndarray,
     names: np.ndarray,
     part_of: np.ndarray,
-    told: np.ndarray,
+    name_scores: np.ndarray,
     name: int,
     voxel: float,
 ) -> tuple[set[int], set[int]]:
@@ -252,21 +257,21 @@ def _cut_from_named(
     loose = members[_of_named(vertices[members], part_of[members], vertices[names == name])]
     around = np.concatenate([np.flatnonzero(names == name), loose])
     cut, on_top = _cut_at_tops(vertices[around], normals[around], np.zeros(len(around), int), voxel)
-    mean = np.bincount(cut, weights=told[around]) / np.maximum(np.bincount(cut), 1)
+    mean = np.bincount(cut, weights=name_scores[around]) / np.maximum(np.bincount(cut), 1)
     cut[mean[cut] >= TOLD] = 0
     first, rising = 1 + int(part_of.max(initial=0)), around[cut > 0]
     part_of[rising], names[rising] = first + cut[cut > 0], 0
     return set(part_of[rising].tolist()), {first + part for part in on_top if part}
 
 
-def _standing_on(level: float, footprint: _Footprint, points: np.ndarray, parts: np.ndarray) -> set[int]:
+def _parts_standing_on(level: float, footprint: _Footprint, points: np.ndarray, components: np.ndarray) -> set[int]:
     """Return the parts that begin on a level top and lie over it."""
-    found = set()
-    for part in np.unique(parts[(points[:, 2] > level) & footprint.holds(points)]):
-        own = points[parts == part]
-        if own[:, 2].min() > level - RISE and footprint.holds(own).mean() > 0.5:
-            found.add(int(part))
-    return found
+    standing = set()
+    for part in np.unique(components[(points[:, 2] > level) & footprint.holds(points)]):
+        part_points = points[components == part]
+        if part_points[:, 2].min() > level - RISE and footprint.holds(part_points).mean() > 0.5:
+            standing.add(int(part))
+    return standing
 
 
 def _cells(points: np.ndarray, voxel: float) -> np.ndarray:
@@ -280,31 +285,31 @@ def _common(first: np.ndarray, second: np.ndarray) -> float:
     return len(np.intersect1d(first, second, assume_unique=True)) / len(first)
 
 
-def _of_named(points: np.ndarray, parts: np.ndarray, thing: np.ndarray) -> np.ndarray:
+def _of_named(points: np.ndarray, components: np.ndarray, thing: np.ndarray) -> np.ndarray:
     """Return which points (N,) are of parts that lie over or under a named thing (M, 3) and begin below its top."""
     result = np.zeros(len(points), bool)
     beside = cKDTree(thing[:, :2]).query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE
     top = float(np.quantile(thing[:, 2], TOP))
-    for part in np.unique(parts[beside]):
-        own = parts == part
-        result |= own & bool(points[own, 2].min() < top - SAME_LEVEL and beside[own].mean() >= WITHIN)
+    for part in np.unique(components[beside]):
+        of_part = components == part
+        result |= of_part & bool(points[of_part, 2].min() < top - SAME_LEVEL and beside[of_part].mean() >= WITHIN)
     return result
 
 
-def _touching(points: np.ndarray, parts: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
+def _points_touching(points: np.ndarray, components: np.ndarray, thing: np.ndarray, voxel: float) -> np.ndarray:
     """Return which points (N,) are of parts that touch a thing (M, 3) and are smaller than it."""
-    of_part = np.flatnonzero(parts != NO_PART)
-    near = of_part[cKDTree(thing).query(points[of_part], distance_upper_bound=2.0 * voxel)[0] < 2.0 * voxel]
-    names, sizes = np.unique(parts[of_part], return_counts=True)
-    return np.isin(parts, np.intersect1d(parts[near], names[sizes < len(thing)]))
+    of_part = np.flatnonzero(components != NO_PART)
+    touching = of_part[cKDTree(thing).query(points[of_part], distance_upper_bound=2.0 * voxel)[0] < 2.0 * voxel]
+    names, sizes = np.unique(components[of_part], return_counts=True)
+    return np.isin(components, np.intersect1d(components[touching], names[sizes < len(thing)]))
 
 
-def _joined(
+def _join_parts(
     points: np.ndarray,
     normals: np.ndarray,
-    parts: np.ndarray,
+    components: np.ndarray,
     standing: set[int],
-    whole: set[int],
+    proposed_parts: set[int],
     voxel: float,
     minimum_area: float,
 ) -> np.ndarray:
@@ -313,30 +318,30 @@ def _joined(
 
     What stands on a level top (`standing`) stays apart from what has it.
     """
-    result = parts.copy()
-    names, sizes = np.unique(parts, return_counts=True)
+    result = components.copy()
+    names, sizes = np.unique(components, return_counts=True)
     names = np.array([name for name in names[sizes >= FEWEST] if name not in standing], int)
-    own = {name: np.flatnonzero(parts == name) for name in names}
-    cells = {name: _cells(points[own[name]], voxel) for name in names}
-    trees = {name: cKDTree(points[own[name]]) for name in names}
-    low = {name: points[own[name], 2].min() for name in names}
-    top = {name: _top_height(points[own[name]], normals[own[name]], voxel) for name in names}
+    points_of = {name: np.flatnonzero(components == name) for name in names}
+    cells = {name: _cells(points[points_of[name]], voxel) for name in names}
+    trees = {name: cKDTree(points[points_of[name]]) for name in names}
+    low = {name: points[points_of[name], 2].min() for name in names}
+    top = {name: _top_height(points[points_of[name]], normals[points_of[name]], voxel) for name in names}
 
     for small in names.tolist():
-        near: list[tuple[float, int]] = []
+        neighbours: list[tuple[float, int]] = []
         for large in names.tolist():
             below, above = (small, large) if (low[small], small) < (low[large], large) else (large, small)
             on_top = low[above] > top[below] - SAME_LEVEL
-            if (len(own[large]), large) <= (len(own[small]), small) or on_top:
+            if (len(points_of[large]), large) <= (len(points_of[small]), small) or on_top:
                 continue
-            gap = float(trees[large].query(points[own[small]], distance_upper_bound=STACKED_GAP)[0].min())
+            gap = float(trees[large].query(points[points_of[small]], distance_upper_bound=STACKED_GAP)[0].min())
             stacked = _common(cells[small], cells[large]) >= STACKED_SHARE and gap < STACKED_GAP
-            scrap = len(own[small]) < min(SCRAP_SHARE * len(own[large]), minimum_area / voxel**2)
-            if stacked or (scrap and gap < SCRAP_DISTANCE and small not in whole):
-                near.append((gap, large))
-        if near:
-            kept, gone = sorted((result[own[small][0]], result[own[min(near)[1]][0]]))
-            result[result == gone] = kept
+            scrap = len(points_of[small]) < min(SCRAP_SHARE * len(points_of[large]), minimum_area / voxel**2)
+            if stacked or (scrap and gap < SCRAP_DISTANCE and small not in proposed_parts):
+                neighbours.append((gap, large))
+        if neighbours:
+            lower, gone = sorted((result[points_of[small][0]], result[points_of[min(neighbours)[1]][0]]))
+            result[result == gone] = lower
     return result
 
 

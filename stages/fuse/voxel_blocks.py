@@ -11,7 +11,9 @@ import numpy as np
 from numba import njit
 
 SIDE = 8
+"""Voxels along the edge of a block."""
 VOXELS = SIDE**3
+"""Voxels of a block."""
 COORDINATE_LIMIT = 1 << 20
 """Block and voxel coordinates lie within +-2^20: three of them fit into one 64-bit key."""
 AWAY = 1 << 24
@@ -29,6 +31,7 @@ FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "coordinates": (np.int32, (3,)),
     "last_touched": (np.int32, ()),
 }
+"""What a block holds: array -> type and shape per block."""
 
 
 @njit(cache=True, inline="always")
@@ -48,22 +51,22 @@ def mix(key: int, mask: int) -> int:
 def find(keys: np.ndarray, slots: np.ndarray, key: int) -> int:
     """Return the slot of `key` in the open-addressing table (keys (T,), -1 empty; slots (T,)), or -1."""
     mask = keys.shape[0] - 1
-    place = mix(key, mask)
-    while keys[place] != -1:
-        if keys[place] == key:
-            return slots[place]
-        place = (place + 1) & mask
+    hash_slot = mix(key, mask)
+    while keys[hash_slot] != -1:
+        if keys[hash_slot] == key:
+            return slots[hash_slot]
+        hash_slot = (hash_slot + 1) & mask
     return -1
 
 
 @njit(cache=True)
 def _insert(keys: np.ndarray, slots: np.ndarray, key: int, slot: int) -> None:
     mask = keys.shape[0] - 1
-    place = mix(key, mask)
-    while keys[place] != -1:
-        place = (place + 1) & mask
-    keys[place] = key
-    slots[place] = slot
+    hash_slot = mix(key, mask)
+    while keys[hash_slot] != -1:
+        hash_slot = (hash_slot + 1) & mask
+    keys[hash_slot] = key
+    slots[hash_slot] = slot
 
 
 @njit(cache=True)

@@ -15,17 +15,18 @@ UPRIGHT = 0.25
 FACING = np.cos(np.radians(15))
 """Cosine to a wall's normal over which surface faces as it does."""
 DIRECTIONS = 72
-"""In which planes are looked for; each is fitted after."""
+"""Directions in which planes of walls are looked for; each plane is fitted after."""
 COLUMN, COLUMN_AREA = 0.15, 0.01
 """Width [m] of upright columns, and the area [m^2] under which nothing was seen in one."""
 THICKNESS = 0.06
-"""What lies no farther from the plane of a wall is the wall: frames, switches, errors of the map [m]."""
+"""Largest distance from the plane of a wall of what is the wall: frames, switches, errors of the map [m]."""
 BEHIND = 1.2
 """How far behind a surface another one is looked for [m]."""
 WITHIN = 0.3
-"""What lies so far behind the plane belongs to the wall: reveals, what shines through [m]."""
+"""Largest distance behind the plane of what belongs to the wall: reveals, what shines through [m]."""
 LEAST_AREA, LEAST_LENGTH, LEAST_HEIGHT = 0.3, 1.0, 1.3
-"""Of a wall: area [m^2], columns in all [m], and the height [m] over the floor that a quarter of them reach."""
+"""Least measures of a wall: area [m^2], columns in all [m], and the height [m] over the floor that a quarter of them
+reach."""
 OPENING = 1.2
 """Narrower gaps between columns belong to the wall: openings, and what hides it [m]."""
 
@@ -44,15 +45,17 @@ def of_walls(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, 
 
     vertices (V, 3) [m], z up, the floor at 0; normals (V, 3); `voxel` [m], a vertex stands for one voxel of surface.
     """
-    found = np.zeros(len(vertices), bool)
+    on_walls = np.zeros(len(vertices), bool)
     for plane in _planes(vertices, normals, candidates, voxel):
         gaps = zip(plane.columns[:-1], plane.columns[1:], strict=True)
         hidden = [np.arange(a, b) for a, b in gaps if (b - a) * COLUMN < OPENING]
         span = np.concatenate([plane.columns, *hidden])
         distance = vertices[:, :2] @ plane.normal - plane.offset
-        near = (distance < THICKNESS) & (distance > -WITHIN)
-        found |= near & np.isin(_columns(vertices[:, :2], plane.normal), np.concatenate([span - 1, span, span + 1]))
-    return found & candidates
+        at_plane = (distance < THICKNESS) & (distance > -WITHIN)
+        on_walls |= at_plane & np.isin(
+            _columns(vertices[:, :2], plane.normal), np.concatenate([span - 1, span, span + 1])
+        )
+    return on_walls & candidates
 
 
 def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, voxel: float) -> list[_Plane]:
@@ -61,7 +64,7 @@ def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, v
     points, height = vertices[upright, :2], vertices[upright, 2]
     facing = normals[upright, :2] / np.linalg.norm(normals[upright, :2], axis=1, keepdims=True)
     fewest = COLUMN_AREA / voxel**2
-    left = np.ones(len(upright), bool)
+    unexplained = np.ones(len(upright), bool)
     views = []
     for angle in np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS:
         axis = np.array([np.cos(angle), np.sin(angle)])
@@ -71,7 +74,7 @@ def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, v
     while True:
         most, axis, start = 0, np.zeros(2), 0.0
         for direction, outermost, distance in views:
-            free = distance[left[outermost]]
+            free = distance[unexplained[outermost]]
             if len(free) > most:
                 counts = np.bincount(np.floor((free - free.min()) / THICKNESS).astype(int))
                 counts = counts + np.append(counts[1:], 0)
@@ -80,17 +83,19 @@ def _planes(vertices: np.ndarray, normals: np.ndarray, candidates: np.ndarray, v
                     start = float(free.min()) + (int(counts.argmax()) + 1) * THICKNESS
         if most * voxel**2 < LEAST_AREA:
             return planes
-        normal, offset = _fitted(points, facing, axis, start)
-        own = _outermost(points, np.flatnonzero(facing @ normal > FACING), normal, fewest)
-        own = own[np.abs(points[own] @ normal - offset) < THICKNESS]
-        left[own] = False
-        left &= (facing @ axis <= FACING) | (np.abs(points @ axis - start) > 1.01 * THICKNESS)  # all that was counted
-        columns, inverse = np.unique(_columns(points[own], normal), return_inverse=True)
+        normal, offset = _fit_plane(points, facing, axis, start)
+        on_plane = _outermost(points, np.flatnonzero(facing @ normal > FACING), normal, fewest)
+        on_plane = on_plane[np.abs(points[on_plane] @ normal - offset) < THICKNESS]
+        unexplained[on_plane] = False
+        unexplained &= (facing @ axis <= FACING) | (
+            np.abs(points @ axis - start) > 1.01 * THICKNESS
+        )  # all that was counted
+        columns, inverse = np.unique(_columns(points[on_plane], normal), return_inverse=True)
         top = np.full(len(columns), -np.inf)
-        np.maximum.at(top, inverse, height[own])
-        seen = np.bincount(inverse, minlength=len(columns)) >= fewest
-        if seen.sum() * COLUMN >= LEAST_LENGTH and np.quantile(top[seen], 0.75) >= LEAST_HEIGHT:
-            planes.append(_Plane(normal, offset, columns[seen]))
+        np.maximum.at(top, inverse, height[on_plane])
+        full_columns = np.bincount(inverse, minlength=len(columns)) >= fewest
+        if full_columns.sum() * COLUMN >= LEAST_LENGTH and np.quantile(top[full_columns], 0.75) >= LEAST_HEIGHT:
+            planes.append(_Plane(normal, offset, columns[full_columns]))
 
 
 def _columns(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -106,14 +111,14 @@ def _outermost(points: np.ndarray, chosen: np.ndarray, normal: np.ndarray, fewes
     return chosen[behind < fewest]
 
 
-def _fitted(points: np.ndarray, facing: np.ndarray, axis: np.ndarray, start: float) -> tuple[np.ndarray, float]:
+def _fit_plane(points: np.ndarray, facing: np.ndarray, axis: np.ndarray, start: float) -> tuple[np.ndarray, float]:
     """Return normal (2,) and offset of the plane that fits what lies around a first one best."""
     normal, offset = axis, start
     for _ in range(3):
-        own = points[(facing @ normal > FACING) & (np.abs(points @ normal - offset) < THICKNESS)]
-        if len(own) < 2:
+        inliers = points[(facing @ normal > FACING) & (np.abs(points @ normal - offset) < THICKNESS)]
+        if len(inliers) < 2:
             break
-        across = np.linalg.svd(own - own.mean(axis=0), full_matrices=False)[2][1]
+        across = np.linalg.svd(inliers - inliers.mean(axis=0), full_matrices=False)[2][1]
         normal = across * np.sign(across @ axis)
-        offset = float(np.median(own @ normal))
+        offset = float(np.median(inliers @ normal))
     return normal, offset

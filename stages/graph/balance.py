@@ -17,18 +17,19 @@ LOWEST_SHARE = 0.01
 CLEARANCE = 0.02
 """How far outside of its footing the middle of an object must lie before it counts as unbalanced [m]."""
 CLEARANCE_SHARE = 0.1
-"""... and in shares of its height: a board of 2 m that leans by less stands."""
+"""The same in shares of its height: a board of 2 m that leans by less stands."""
 TILTED_SHARE = 0.04
-"""... of a thing whose largest face is seen to lean: 0.04 is a panel that leans by 5 degrees."""
+"""The same for a thing whose largest face is seen to lean: 0.04 is a panel that leans by 5 degrees."""
 TILTED = (0.08, 0.8)
 """Upward part of the normal of a face that leans: 5 to 53 degrees off upright."""
 TOUCH = 0.03
-"""What an object leans on is at most this far from it [m]."""
+"""Largest distance between an object and what it leans on [m]."""
 LEAST_HEIGHT = 0.3
-"""... and touches it at this share of its height or above."""
+"""Share of its height at or above which an object touches what it leans on."""
 LEAST_TOUCHING = 5
+"""A thing of fewer points is not judged, and no thing leans on what it touches with fewer; by eye."""
 FOOTING_GAP = 0.1
-"""Of an object whose bottom is seen higher than this over all planes of its carrier the feet are missing [m]."""
+"""Height of an object's bottom over all planes of its carrier from which on its feet are missing [m]."""
 
 
 def footing(points: np.ndarray) -> np.ndarray:
@@ -88,17 +89,21 @@ def leaning_relation(child: Entity, parent: str, entities: list[Entity]) -> Rela
     outward /= max(float(np.linalg.norm(outward)), 1e-9)
     high = child.points[child.points[:, 2] >= child.bottom + LEAST_HEIGHT * (child.top - child.bottom)]
     best: tuple[float, int, str] | None = None
-    for other in entities:
-        if other.name in (child.name, parent) or other.class_name in ("floor", "ceiling") or not len(other.points):
+    for support in entities:
+        if (
+            support.name in (child.name, parent)
+            or support.class_name in ("floor", "ceiling")
+            or not len(support.points)
+        ):
             continue
-        distance, nearest = cKDTree(other.points).query(high, distance_upper_bound=TOUCH)
+        distance, nearest = cKDTree(support.points).query(high, distance_upper_bound=TOUCH)
         touching = np.isfinite(distance)
         if np.count_nonzero(touching) < LEAST_TOUCHING:
             continue
-        contact = other.points[nearest[touching], :2].mean(axis=0)
+        contact = support.points[nearest[touching], :2].mean(axis=0)
         if (contact - middle) @ outward <= 0.0:
             continue
-        candidate = (float(np.sort(distance[touching])[LEAST_TOUCHING - 1]), other.instance, other.name)
+        candidate = (float(np.sort(distance[touching])[LEAST_TOUCHING - 1]), support.instance, support.name)
         best = candidate if best is None else min(best, candidate)
     if best is None:
         return None

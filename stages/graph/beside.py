@@ -12,7 +12,7 @@ from scenewright.stages.graph.support import Candidate
 from scenewright.stages.graph.tree import descends_from
 
 FULLY_CARRIED = 0.9
-"""Over so much of its footprint a carrier needs no help."""
+"""Share of a thing's footprint from which on a carrier needs no help."""
 
 
 def relations_beside(

@@ -41,7 +41,7 @@ HIDDEN_TOP_DISTANCE = 0.15
 NAMELESS = "object"
 """Class of things that masks found and nobody named."""
 HIGHEST_FOOT = 0.5
-"""What is farther above furniture does not stand on it [m]: a hood hangs over the hob. Legs on the floor are longer."""
+"""Largest height over furniture of what stands on it [m]: a hood hangs over the hob. Legs on the floor are longer."""
 LEAST_SEAM = 0.2
 """Share of its foot along which a plane must be seen to reach up to an object that is hardly over it."""
 LOWER_CELL = 0.03
@@ -71,8 +71,8 @@ def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParam
     """
     candidates: list[Candidate] = []
     for parent in possible_parents(child, entities):
-        seen = [seen_candidate(child, parent, k, parameters) for k in parent.supporting]
-        accepted = [candidate for candidate in seen if candidate is not None]
+        seen_candidates = [seen_candidate(child, parent, k, parameters) for k in parent.supporting]
+        accepted = [candidate for candidate in seen_candidates if candidate is not None]
         candidates += accepted
         # A shelf shows its boards to a camera that is too low to see its top, on which the child stands.
         close = [candidate for candidate in accepted if abs(candidate.gap) <= HIDDEN_TOP_DISTANCE]
@@ -205,9 +205,9 @@ def seen_lower(child: Entity, height: float, entities: list[Entity]) -> float:
     for entity in entities:
         if entity.name != child.name and len(entity.points):
             points = entity.points[entity.points[:, 2] < height - SAME_HEIGHT]
-            place = transform_points_to_box(box, points)[:, :2] / box.size[:2] + 0.5
-            place = place[((place >= 0) & (place < 1)).all(axis=1)]
-            cells[tuple((place * cells.shape).astype(int).T)] = True
+            cell_position = transform_points_to_box(box, points)[:, :2] / box.size[:2] + 0.5
+            cell_position = cell_position[((cell_position >= 0) & (cell_position < 1)).all(axis=1)]
+            cells[tuple((cell_position * cells.shape).astype(int).T)] = True
     return float(cells.mean())
 
 

@@ -50,8 +50,8 @@ def load_entities(
             dropped[f"{entry.class_name}_{entry.instance}"] = entity
         else:
             entities.append(entity)
-    for name, whole in method.fragments(entities).items():
-        dropped[name] = f"a piece of {whole}"
+    for name, whole_name in method.fragments(entities).items():
+        dropped[name] = f"a piece of {whole_name}"
     return [entity for entity in entities if entity.name not in dropped], dropped
 
 
@@ -101,9 +101,9 @@ def entity_of(
     distance = parameters.plane_distance
     if semantic.is_layout:
         # Walls and floors come in pieces by nature.
-        box, kept = minimum_box(points), np.ones(len(points), dtype=bool)
+        box, in_box = minimum_box(points), np.ones(len(points), dtype=bool)
     else:
-        box, kept = method.box(points, normals, entry.class_name)
+        box, in_box = method.box(points, normals, entry.class_name)
         distance = max(min(distance, min(box.size) / 4), THINNEST_DISTANCE)
     diagonal = float(np.linalg.norm(box.size))
     if diagonal < parameters.minimum_diagonal:
@@ -125,9 +125,9 @@ def entity_of(
         movable=semantic.movable,
         mesh=entry.mesh,
         confidence=entry.confidence,
-        points=points[kept],
+        points=points[in_box],
         box=box,
-        patches=surface_planes(points[kept], normals[kept], search, random),
+        patches=surface_planes(points[in_box], normals[in_box], search, random),
     )
 
 

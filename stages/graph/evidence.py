@@ -131,9 +131,12 @@ def _from_above(relation: Relation, candidate: Candidate, child: Entity, ceiling
     measured: dict[str, object] = {"gap": float(candidate.gap), "contact": as_vector(contact)}
     if level:
         k = min(level)[1]
-        own = footprint(child.box)
-        shared = clip_polygon(convex_hull(ceiling.patches[k].points[:, :2]), own)
-        measured |= {"plane": k, "overlap": float(min(1.0, polygon_area(shared) / max(polygon_area(own), 1e-12)))}
+        child_footprint = footprint(child.box)
+        shared = clip_polygon(convex_hull(ceiling.patches[k].points[:, :2]), child_footprint)
+        measured |= {
+            "plane": k,
+            "overlap": float(min(1.0, polygon_area(shared) / max(polygon_area(child_footprint), 1e-12))),
+        }
     return relation.model_copy(update=measured)
 
 
@@ -172,7 +175,7 @@ def shared_middle(first: Box, second: Box) -> Vector3 | None:
 
 
 EVERY = 64
-"""Of so many points one is looked up first."""
+"""Every so many points one is looked up first."""
 
 
 class Surfaces:

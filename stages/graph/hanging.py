@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 NEIGHBOURHOOD = 0.5
 """The ceiling over an object is what lies within this ground distance of its middle [m]; the object hides the rest."""
 LEAST_POINTS = 10
+"""With fewer points of the ceiling around, its height is that of the whole ceiling; by eye."""
 
 
 def ceiling_height(ceiling: Entity, at: np.ndarray) -> float | None:
@@ -17,8 +18,8 @@ def ceiling_height(ceiling: Entity, at: np.ndarray) -> float | None:
     of all of it. None without points."""
     if not len(ceiling.points):
         return None
-    near = cKDTree(ceiling.points[:, :2]).query_ball_point(at, NEIGHBOURHOOD)
-    heights = ceiling.points[near, 2] if len(near) >= LEAST_POINTS else ceiling.points[:, 2]
+    neighbours = cKDTree(ceiling.points[:, :2]).query_ball_point(at, NEIGHBOURHOOD)
+    heights = ceiling.points[neighbours, 2] if len(neighbours) >= LEAST_POINTS else ceiling.points[:, 2]
     return float(np.median(heights))
 
 
@@ -29,9 +30,9 @@ def hanging_candidate(child: Entity, ceilings: list[Entity], limit: float) -> Ca
     """
     over = [(ceiling_height(ceiling, np.asarray(child.box.center[:2])), ceiling) for ceiling in ceilings]
     gaps = [(abs(height - child.top), ceiling.instance, ceiling.name) for height, ceiling in over if height is not None]
-    near = [entry for entry in gaps if entry[0] <= limit]
-    if not near:
+    in_reach = [entry for entry in gaps if entry[0] <= limit]
+    if not in_reach:
         return None
-    gap, _, name = min(near)
+    gap, _, name = min(in_reach)
     confidence = 1.0 - 0.5 * gap / limit if limit > 0 else 1.0
     return Candidate(child.name, name, confidence, "hangs_from", gap, 0.0, child.top, None)

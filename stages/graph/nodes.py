@@ -14,6 +14,7 @@ from scenewright.stages.kit.geometry.planes import PlaneFit, level_plane, plane_
 from scenewright.stages.kit.geometry.point_clouds import clusters
 
 GRAVITY = np.array([0.0, 0.0, -1.0])
+"""Direction of gravity; z is up in every map."""
 CONTAINER_CLASSES = frozenset(
     {"shelf", "bin", "bowl", "box", "sink", "vase", "cup", "backpack", "cabinet", "wall_cabinet"}
 )
@@ -23,7 +24,7 @@ THINNEST_DISTANCE = 0.005
 SAME_HEIGHT = 0.02
 """Horizontal patches of one entity nearer than this in height are one plane."""
 MAXIMUM_TILT = math.radians(10.0)
-"""ours: planes that tilt by more are no supporting planes, although a_th lets 25 degrees pass [rad]."""
+"""Largest tilt of a supporting plane in `ours`, although a_th lets 25 degrees pass [rad]."""
 
 
 @dataclass(frozen=True)
@@ -144,10 +145,12 @@ def with_small_supports(
     free = np.ones(len(points), dtype=bool)
     for fit in fits:
         free[fit.inliers] = False
-    rest = np.flatnonzero(free)
+    unexplained = np.flatnonzero(free)
     least = max(5, math.ceil(small.minimum_area / search.spacing**2))
-    supports = small_support_planes(points[rest], normals[rest], search.distance, threshold, least, random)
-    fits += [PlaneFit(fit.normal, fit.offset, rest[fit.inliers]) for fit in supports]
+    supports = small_support_planes(
+        points[unexplained], normals[unexplained], search.distance, threshold, least, random
+    )
+    fits += [PlaneFit(fit.normal, fit.offset, unexplained[fit.inliers]) for fit in supports]
     fits = level_planes(points, fits, threshold, least)
     fits = merge_levels(points, fits, threshold)
     if small.split_distance is not None:
@@ -213,9 +216,9 @@ def level_planes(
         reach = np.searchsorted(ordered, ordered + SAME_HEIGHT, side="right") - np.arange(len(ordered))
         first = int(np.argmax(reach))
         height = float(np.median(ordered[first : first + reach[first]]))
-        kept = fit.inliers[np.abs(heights - height) <= SAME_HEIGHT]
-        if len(kept) >= minimum_count:
-            result.append(PlaneFit(np.array([0.0, 0.0, 1.0]), -height, kept))
+        at_height = fit.inliers[np.abs(heights - height) <= SAME_HEIGHT]
+        if len(at_height) >= minimum_count:
+            result.append(PlaneFit(np.array([0.0, 0.0, 1.0]), -height, at_height))
     return result
 
 
@@ -228,11 +231,11 @@ def merge_levels(points: np.ndarray, fits: list[PlaneFit], horizontal_threshold:
     for fit in fits:
         height = float(points[fit.inliers, 2].mean())
         if is_horizontal(fit.normal, horizontal_threshold):
-            for k, other in enumerate(result):
-                level = abs(float(points[other.inliers, 2].mean()) - height) < SAME_HEIGHT
-                if level and is_horizontal(other.normal, horizontal_threshold):
-                    inliers = np.sort(np.concatenate([other.inliers, fit.inliers]))
-                    result[k] = PlaneFit(other.normal, other.offset, inliers)
+            for k, larger in enumerate(result):
+                level = abs(float(points[larger.inliers, 2].mean()) - height) < SAME_HEIGHT
+                if level and is_horizontal(larger.normal, horizontal_threshold):
+                    inliers = np.sort(np.concatenate([larger.inliers, fit.inliers]))
+                    result[k] = PlaneFit(larger.normal, larger.offset, inliers)
                     break
             else:
                 result.append(fit)

@@ -13,9 +13,11 @@ from scenewright.stages.kit.geometry.point_clouds import without_strays
 Extent = tuple[float, float]
 """Least and largest coordinate [m]."""
 QUARTER = np.pi / 2
+"""A quarter turn [rad]: by so much the sides of a box repeat."""
 UPRIGHT_SLOPE = 0.35
 """A surface whose normal rises by less than this belongs to a side."""
 LEAST_SIDE_POINTS = 30
+"""With fewer points on upright sides a box has no yaw of its own; by eye."""
 BIN = np.radians(2.0)
 """Width of the bins in which side directions are counted [rad]."""
 
@@ -37,10 +39,10 @@ def side_yaw(normals: np.ndarray, *, minimum_share: float) -> float | None:
     window = histogram + np.roll(histogram, 1) + np.roll(histogram, -1)
     mode = (int(np.argmax(window)) + 0.5) * BIN
     offsets = (azimuths - mode + QUARTER / 2) % QUARTER - QUARTER / 2
-    near = np.abs(offsets) < 3 * BIN
-    if near.mean() < minimum_share:
+    near_mode = np.abs(offsets) < 3 * BIN
+    if near_mode.mean() < minimum_share:
         return None
-    yaw = mode + float(np.median(offsets[near]))
+    yaw = mode + float(np.median(offsets[near_mode]))
     return float((yaw + QUARTER / 2) % QUARTER - QUARTER / 2)
 
 
@@ -73,17 +75,17 @@ def observed_box(points: np.ndarray, normals: np.ndarray, fit: BoxFit) -> tuple[
     say that it is. Else the yaw is that of the sides (`side_yaw`), or of the least rectangle, as the thesis has it
     (section 2.2.2).
     """
-    kept = without_strays(points, fit.stray_share, fit.stray_distance)
-    inside = points[kept]
+    not_stray = without_strays(points, fit.stray_share, fit.stray_distance)
+    inside = points[not_stray]
     bottom, top = trimmed_extent(inside[:, 2], fit.trim / 2)
-    if fit.may_be_round and (disc := round_footprint(inside, normals[kept])) is not None:
-        return box_over_disc(disc, inside, (bottom, top), fit.trim), kept
-    yaw = None if fit.side_share is None else side_yaw(normals[kept], minimum_share=fit.side_share)
+    if fit.may_be_round and (disc := round_footprint(inside, normals[not_stray])) is not None:
+        return box_over_disc(disc, inside, (bottom, top), fit.trim), not_stray
+    yaw = None if fit.side_share is None else side_yaw(normals[not_stray], minimum_share=fit.side_share)
     if yaw is None:
         _, _, yaw = minimum_rectangle(inside[:, :2])
     along, across = axes_of(yaw)
     sides = trimmed_extent(inside[:, :2] @ along, fit.trim), trimmed_extent(inside[:, :2] @ across, fit.trim)
-    return box_between(*sides, (bottom, top), yaw), kept
+    return box_between(*sides, (bottom, top), yaw), not_stray
 
 
 def box_over_disc(disc: RoundFootprint, points: np.ndarray, height: Extent, trim: float) -> Box:

@@ -82,8 +82,8 @@ class Ours:
             reach = parameters.wall_distance * (MOVABLE_REACH if child.movable else 1.0)
             wall = wall_candidate(child, walls, reach, trees)
             hanging = hanging_candidate(child, ceilings, reach)
-            held = [candidate for candidate in (wall, hanging) if candidate is not None]
-            choices += sorted(held, key=lambda candidate: -candidate.score)
+            held_up = [candidate for candidate in (wall, hanging) if candidate is not None]
+            choices += sorted(held_up, key=lambda candidate: -candidate.score)
             ranked[child.name] = choices + fallback_candidates(child, floors)
         return ranked
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 LEAST_POINTS = 20
+"""With fewer usable normals no axis is sought; by eye."""
 LEVEL_SHARE = 0.3
-"""Only normals whose level part is longer than this say where the axis is."""
+"""Least level part of a normal that says where the axis is."""
 LEAST_TURN = 0.08
 """The sides must have been seen around a corner: smaller eigenvalue of the spread of their directions, of their sum."""
 LARGEST_MISS = 0.2
@@ -17,8 +18,9 @@ miss by 0.1 to 0.16, faces of a box by 0.2 and more."""
 LEAST_SIDES = 0.3
 """Share of the points that must lie on sides: those of a book are no evidence for its outline."""
 RADIUS_QUANTILE = 0.9
+"""Quantile of the distances from the axis that is the radius; what stands out farther is handle or noise. By eye."""
 HANDLE_REACH = 1.25
-"""What lies farther out than this many radii is no noise of the wall."""
+"""Distance from the axis, in radii, from which on points are no noise of the wall."""
 HANDLE_SHARE = 0.03
 """Share of the points from which on what lies farther out is a handle or a spout."""
 HANDLE_AGREEMENT = 0.8
@@ -50,15 +52,15 @@ def round_footprint(points: np.ndarray, normals: np.ndarray) -> RoundFootprint |
         return None
     ground = points[usable, :2]
     across = np.stack([-normals[usable, 1], normals[usable, 0]], axis=1) / level[usable, None]
-    kept = np.ones(len(ground), dtype=bool)
+    inliers = np.ones(len(ground), dtype=bool)
     for _ in range(2):
-        spread = across[kept].T @ across[kept]
+        spread = across[inliers].T @ across[inliers]
         if np.linalg.eigvalsh(spread)[0] < LEAST_TURN * np.trace(spread):
             return None
         offsets = np.einsum("ij,ij->i", across, ground)
-        center = np.linalg.solve(spread, across[kept].T @ offsets[kept])
+        center = np.linalg.solve(spread, across[inliers].T @ offsets[inliers])
         misses = np.abs(offsets - across @ center)
-        kept = misses <= np.quantile(misses, 0.75)
+        inliers = misses <= np.quantile(misses, 0.75)
     distances = np.linalg.norm(points[:, :2] - center, axis=1)
     radius = float(np.quantile(distances[usable], RADIUS_QUANTILE))
     if float(np.median(misses)) > LARGEST_MISS * radius:

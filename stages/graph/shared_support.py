@@ -64,8 +64,8 @@ def together_with(main: PartialSupport, parts: list[PartialSupport]) -> list[Par
 
 def rests_between(child: Entity, carriers: list[str], entities: list[Entity]) -> bool:
     """Whether the middle of an object lies in the hull of what its footprint shares with those of its carriers."""
-    own = footprint(child.box)
-    shared = [clip_polygon(footprint(entity.box), own) for entity in entities if entity.name in carriers]
+    child_footprint = footprint(child.box)
+    shared = [clip_polygon(footprint(entity.box), child_footprint) for entity in entities if entity.name in carriers]
     corners = np.concatenate([polygon for polygon in shared if len(polygon)] or [np.zeros((0, 2))])
     if len(corners) < 3:
         return False
@@ -77,10 +77,10 @@ def shared_candidates(child: Entity, entities: list[Entity], parameters: GraphPa
     """Return relations to carriers of which none reaches b_th (2.2) alone and that do together: a board over two tables
     (Han 2024, section 2.6.5), or between which its middle lies. The one that carries most is the parent; the score
     counts the shares of all."""
-    parts = partial_supports(child, entities, parameters)
+    partial = partial_supports(child, entities, parameters)
     result = []
-    for main in parts:
-        others = together_with(main, parts)
+    for main in partial:
+        others = together_with(main, partial)
         total = min(1.0, main.share + sum(p.share for p in others))
         if not others or any(p.share > main.share for p in others):
             continue

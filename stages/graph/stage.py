@@ -27,14 +27,14 @@ def run(panoptic_map: PanopticMap, *, parameters: GraphParameters, context: Cont
     Where the map kept snapshots of itself, the graph of each is built as well, and timeline.json says how it grew.
     """
     method = METHODS[parameters.method](parameters)
-    kept: Kept = {}
+    unchanged: Kept = {}
     grown = []
     for snapshot in panoptic_map.snapshots():
         with context.progress.step("snapshots"):
             quiet = dataclass_replace(context, progress=SilentProgress())
-            built = build_graph(snapshot, method, parameters, quiet, kept)
+            built = build_graph(snapshot, method, parameters, quiet, unchanged)
             grown.append(Stand(snapshot.info.frames_integrated, built.graph, built.entities))
-    built = build_graph(panoptic_map, method, parameters, context, kept if grown else None)
+    built = build_graph(panoptic_map, method, parameters, context, unchanged if grown else None)
     graph, entities = built.graph, built.entities
     for name, reason in built.dropped.items():
         context.logger.info("%s is left out: %s", name, reason)

@@ -59,9 +59,9 @@ class Thesis:
         ranked: dict[str, list[Candidate]] = {}
         for child in objects_of(entities):
             wall = wall_candidate(child, walls, self.parameters.wall_distance, trees)
-            held = [] if wall is None else [wall]
+            on_wall = [] if wall is None else [wall]
             supports = candidates_for(child, entities, self.parameters)
-            ranked[child.name] = [*supports, *held, *fallback_candidates(child, floors)]
+            ranked[child.name] = [*supports, *on_wall, *fallback_candidates(child, floors)]
         return ranked
 
     def maximum_extension(self, entity: Entity) -> float:
@@ -93,8 +93,8 @@ def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParam
     """
     candidates: list[Candidate] = []
     for parent in possible_parents(child, entities):
-        seen = [seen_candidate(child, parent, k, parameters) for k in parent.supporting]
-        accepted = [candidate for candidate in seen if candidate is not None]
+        seen_candidates = [seen_candidate(child, parent, k, parameters) for k in parent.supporting]
+        accepted = [candidate for candidate in seen_candidates if candidate is not None]
         candidates += accepted
         if not accepted and parent.node_type != "layout":
             hidden = hidden_candidate(child, parent, parameters)

@@ -62,10 +62,10 @@ def lasting_ids(snapshots: list[dict[int, str]]) -> dict[int, str]:
             last.pop(track, None)
             last[track] = name  # in the order in which they were seen last
     ids: dict[int, str] = {}
-    taken: dict[str, int] = {}
+    uses: dict[str, int] = {}
     for track, name in reversed(last.items()):
-        taken[name] = taken.get(name, 0) + 1
-        ids[track] = name if taken[name] == 1 else f"{name}.{taken[name]}"
+        uses[name] = uses.get(name, 0) + 1
+        ids[track] = name if uses[name] == 1 else f"{name}.{uses[name]}"
     return ids
 
 

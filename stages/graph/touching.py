@@ -14,15 +14,17 @@ from scenewright.stages.kit.geometry.boxes import footprint_overlap
 from scipy.spatial import cKDTree
 
 SINKING = 0.01
-"""An object touches planes that are at most this far above its bottom (noise), ... [m]."""
+"""An object touches planes that are at most this far above its bottom (noise) [m]."""
 REACHING = 0.02
-"""... and at most this far below. What is cut off from below by things before it ends below their tops, not above."""
+"""An object touches planes that are at most this far below its bottom [m]. What is cut off from below by things before
+it ends below their tops, not above."""
 FOOT_HEIGHT = 0.015
 """Points within this height over the bottom belong to the foot [m]."""
 SEAM = 0.025
 """A point of the foot stands on a plane when one of the plane's points is this near it along the ground [m]: two cells
 of the grid on which surfaces are sampled, and what the borders of masks lose."""
 FOOT_POINTS = 3
+"""With fewer points at its bottom a thing has no foot; by eye."""
 STEEPEST = 1.0
 """Tangent of the angle by which cameras that look at things on tables look down, at most."""
 

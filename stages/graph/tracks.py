@@ -14,6 +14,7 @@ CELL = 0.04
 LEAST_SHARE = 0.5
 """Two nodes can be the same when so much of the smaller surface is in the larger one."""
 COORDINATE_LIMIT = 1 << 20
+"""Added to the coordinates of cells, so that three of 21 bits make one number."""
 
 
 def cells_of(points: np.ndarray) -> np.ndarray:
@@ -43,12 +44,12 @@ class Tracks:
 
     def follow(self, entities: list[Entity]) -> Followed:
         """Give every node of the next map a track: assignment with the most shared cells; new ones for the rest."""
-        own = [cells_of(entity.points) for entity in entities]
+        entity_cells = [cells_of(entity.points) for entity in entities]
         kinds = [entity.class_name if entity.node_type == "layout" else "" for entity in entities]
         tracks = sorted(self.cells)
         shared = np.zeros((len(tracks), len(entities)))
         for i, track in enumerate(tracks):
-            for j, cells in enumerate(own):
+            for j, cells in enumerate(entity_cells):
                 if self.layout.get(track, "") == kinds[j]:
                     common = len(np.intersect1d(self.cells[track], cells, assume_unique=True))
                     smaller = min(len(self.cells[track]), len(cells))
@@ -65,7 +66,7 @@ class Tracks:
         for i, track in enumerate(tracks):
             if track in self.alive and track not in of_node.values() and shared[i].any():
                 merged[track] = of_node[entities[int(shared[i].argmax())].name]
-        for entity, cells, kind in zip(entities, own, kinds, strict=True):
+        for entity, cells, kind in zip(entities, entity_cells, kinds, strict=True):
             self.cells[of_node[entity.name]] = cells
             if kind:
                 self.layout[of_node[entity.name]] = kind

@@ -7,9 +7,11 @@ from scenewright.stages.graph.nodes import Entity
 from scenewright.stages.graph.support import Candidate
 
 FLOOR_CONFIDENCE = 0.1
-"""Of a relation to the floor that only says: it has to stand on something."""
+"""Confidence of a relation to the floor that only says: it has to stand on something."""
 SCENE_CONFIDENCE = 0.05
+"""Confidence of a relation to the scene itself, where there is no floor either; by eye."""
 UPRIGHT_LAYOUT = ("wall", "door", "window", "curtain", "ceiling")
+"""Classes of the room that things are fixed to, and not laid on."""
 
 
 def objects_of(entities: list[Entity]) -> list[Entity]:

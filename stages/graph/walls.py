@@ -56,9 +56,9 @@ def wall_candidate(child: Entity, walls: list[Entity], limit: float, trees: dict
     so gives every wall the same score, and the first one every object.)
     """
     measured = [(wall_distance(child, wall, trees[wall.name], 2 * limit), wall.instance, wall) for wall in walls]
-    near = [entry for entry in measured if entry[0] <= limit]
-    if not near:
+    in_reach = [entry for entry in measured if entry[0] <= limit]
+    if not in_reach:
         return None
-    distance, _, wall = min(near, key=lambda entry: entry[:2])
+    distance, _, wall = min(in_reach, key=lambda entry: entry[:2])
     confidence = 1.0 - 0.5 * distance / limit if limit > 0 else 1.0
     return Candidate(child.name, wall.name, confidence, "carries_on_wall", distance, 0.0, child.bottom, None)

@@ -148,8 +148,8 @@ def all_actions() -> tuple[PlanAction, ...]:
 
 @cache
 def _by_name() -> Mapping[str, PlanAction]:
-    named = {action.name: action for action in all_actions()}
-    return {schema.name: action for action in all_actions() for schema in action.schemas} | named
+    by_action_name = {action.name: action for action in all_actions()}
+    return {schema.name: action for action in all_actions() for schema in action.schemas} | by_action_name
 
 
 def action_named(name: str) -> PlanAction:

@@ -14,8 +14,9 @@ from scenewright.stages.plan.rim_grasps import has_rim
 from scenewright.stages.plan.world_model import WorldModel
 
 LAYOUT = ("floor", "wall", "ceiling")
+"""Classes of the room itself, which nobody moves."""
 CARRIER_CLASSES = ("tray", "plate")
-"""What things are carried on."""
+"""Classes of things that others are carried on."""
 
 
 def affordance_atoms(model: WorldModel, objects: dict[str, str], size_uncertainty: float) -> set[Atom]:

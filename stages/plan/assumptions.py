@@ -30,6 +30,7 @@ USUAL: dict[str, tuple[float, float, float]] = {
 }
 """Diameter [m], height [m] and mass [kg] of classes that may be assumed."""
 COMFORT = 0.9
+"""An assumed thing is put where the height of the surface is nearest to this [m]; by eye."""
 _PRIOR = re.compile(r"^\s*(in|on)\s*\(\s*([a-z_]+)\s*,\s*(\w+)\s*\)\s*$")
 
 
@@ -117,7 +118,7 @@ def _best_region(model: WorldModel, belief: Belief, width: float, height: float)
 
 def _cylinder(name: str, radius: float, height: float, mass: float) -> str:
     """Return URDF text of an upright cylinder on the origin of its frame."""
-    place = f'<origin xyz="0 0 {height / 2}"/>'
+    origin = f'<origin xyz="0 0 {height / 2}"/>'
     shape = f'<geometry><cylinder radius="{radius}" length="{height}"/></geometry>'
     across = mass * (3 * radius**2 + height**2) / 12
     inertia = (
@@ -125,8 +126,8 @@ def _cylinder(name: str, radius: float, height: float, mass: float) -> str:
         f'<mass value="{mass}"/>'
     )
     return (
-        f'<robot name="{name}"><link name="{name}"><inertial>{place}{inertia}</inertial>'
-        f"<visual>{place}{shape}</visual><collision>{place}{shape}</collision></link></robot>"
+        f'<robot name="{name}"><link name="{name}"><inertial>{origin}{inertia}</inertial>'
+        f"<visual>{origin}{shape}</visual><collision>{origin}{shape}</collision></link></robot>"
     )
 
 
@@ -141,10 +142,15 @@ def match_beliefs(
     with_beliefs = {name: match for name, match in matches.items() if name not in {belief.name for belief in beliefs}}
     for belief in beliefs:
         container = with_beliefs[belief.container].matched
-        taken = {match.matched for match in with_beliefs.values()}
+        matched_names = {match.matched for match in with_beliefs.values()}
         best: tuple[float, str] | None = None
         for name, record in room.items():
-            if container is None or name in taken or record.class_name != belief.class_name or not record.carriable:
+            if (
+                container is None
+                or name in matched_names
+                or record.class_name != belief.class_name
+                or not record.carriable
+            ):
                 continue
             box = room[container].box
             away = np.linalg.norm(np.subtract(record.box.center, box.center))

@@ -25,15 +25,16 @@ from scenewright.stages.plan.seen_things import SeenThings
 from scenewright.stages.plan.world_model import WorldModel, body_planes, moved_record
 
 CAMERA = Camera(width=240, height=180, fx=260.0, fy=260.0, cx=119.5, cy=89.5)
+"""The camera of a look; **assumed**."""
 EYES = ((0.0, 1.35), (0.2, 0.85))
 """How far before the middle of the base and how high the cameras are [m]: the head's, and one that the hand holds up,
 which is not there while the hand holds something. **Assumed**: the arm gets there and back."""
 BEFORE_IT, OVER_IT = 1.2, (0.1, 0.45)
-"""What can be carried is looked at closely where it is nearer to the base than this [m], and by the free hand from over
-it: so far on the robot's side of it, so high [m]."""
+"""Largest distance from the base at which what can be carried is looked at closely [m], and where the free hand is for
+that: so far on the robot's side of it, and how high over it [m]."""
 HEADINGS, SWEPT, FALLEN = 8, (0.6, 1.4), 1.5
-"""What is not where it is believed is looked for in so many directions, on the floor so far from the base [m], up to so
-far from where it was [m]."""
+"""How a thing that is not where it is believed is looked for: in so many directions, on the floor so far from the base
+[m], up to so far from where it was [m]."""
 HIDDEN = 0.015
 """A carrier that looks smaller or larger than it is by more is partly hidden, or taken with what is beside it [m]."""
 MOST_TURNED = 0.2
@@ -41,8 +42,9 @@ MOST_TURNED = 0.2
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
+"""With fewer points a thing was not seen; by eye."""
 POINTS, FURNITURE_POINTS = 1500, 3000
-"""Of a shape that is fitted, and of each part of furniture."""
+"""Points of a shape that is fitted, and of each part of furniture."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class Look:
 
 
 NOTHING = Look(np.zeros((0, 3)), ())
+"""A look that shows nothing."""
 
 
 def _over(base: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -95,12 +98,12 @@ class CameraEyes:
         """Return the planned body where the pictures show it; None where they do not, and for what is far away and
         neither is carried nor has joints. `here` is not used: which thing it is, its class and place say."""
         record = self._model.records[body]
-        near = self._distance(body) < BEFORE_IT
-        if not record.carriable and not record.joints and not near:
+        is_close = self._distance(body) < BEFORE_IT
+        if not record.carriable and not record.joints and not is_close:
             return None
-        carrier = near and record.class_name in CARRIER_CLASSES
-        look = self._look_for(body, record.class_name, closely=near and record.carriable)
-        if len(look.points) < LEAST_POINTS and near and record.carriable:
+        carrier = is_close and record.class_name in CARRIER_CLASSES
+        look = self._look_for(body, record.class_name, closely=is_close and record.carriable)
+        if len(look.points) < LEAST_POINTS and is_close and record.carriable:
             look = self._search(body, record.class_name)
         points = look.points
         if len(points) < LEAST_POINTS:
@@ -111,7 +114,7 @@ class CameraEyes:
             record, text = moved_record(record, shape.pose, {}), carrier_text(body, shape, record.mass)
             return record, text, body_planes(record, text)
         pose, joints = self._model.pose(body), {j.name: self._model.joint_value(body, j.name) for j in record.joints}
-        if near and record.carriable and record.class_name not in CARRIER_CLASSES:
+        if is_close and record.carriable and record.class_name not in CARRIER_CLASSES:
             eyes = np.array([view.eye for view in look.views])
             pose, text = self._things.fitted(body, text, pose, points, eyes)
             record = moved_record(record, pose, {})
@@ -145,13 +148,13 @@ class CameraEyes:
 
     def _furniture(self, body: str, look: Look, joints: dict[str, float]) -> FittedFurniture:
         """Return how furniture stands from where it is believed, and the joint values at which it fits a look."""
-        world, parts = self._model.world, self._parts_of(body)
+        world, surface_of_link = self._model.world, self._parts_of(body)
 
         def surface_at(values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
             with world.joints_at(body, values):
-                poses = {link: world.link_pose(body, link) for link in parts}
-            points = [apply(poses[link], own) for link, (own, _) in parts.items()]
-            normals = [own @ poses[link][:3, :3].T for link, (_, own) in parts.items()]
+                poses = {link: world.link_pose(body, link) for link in surface_of_link}
+            points = [apply(poses[link], surface) for link, (surface, _) in surface_of_link.items()]
+            normals = [surface @ poses[link][:3, :3].T for link, (_, surface) in surface_of_link.items()]
             return np.concatenate(points), np.concatenate(normals)
 
         ranges = [Range(joint.name, joint.lower, joint.upper) for joint in self._model.records[body].joints]
@@ -173,7 +176,11 @@ class CameraEyes:
         if body not in self._parts:
             meshes = link_shapes(self._model.text(body))
             random = np.random.default_rng(0)
-            self._parts[body] = {k: surface_points(own, FURNITURE_POINTS, random) for k, own in meshes.items() if own}
+            self._parts[body] = {
+                k: surface_points(meshes_of_link, FURNITURE_POINTS, random)
+                for k, meshes_of_link in meshes.items()
+                if meshes_of_link
+            }
         return self._parts[body]
 
     def _look_for(self, body: str, class_name: str, *, closely: bool = False) -> Look:
@@ -193,16 +200,16 @@ class CameraEyes:
         found: what fell lies somewhere near."""
         base = self._robot.robot.configuration().base
         head = np.array([*base[:2], EYES[0][1]])
-        found = NOTHING
+        best_look = NOTHING
         for heading in base[2] + 2 * np.pi * np.arange(HEADINGS) / HEADINGS:
             for away in SWEPT:
                 target = np.array([*(base[:2] + away * np.array([np.cos(heading), np.sin(heading)])), 0.0])
                 look = self._looks(body, class_name, [(head, target)], CAMERA, FALLEN)
-                if len(look.points) > len(found.points):
-                    found = look
-        if not len(found.points):
-            return found
-        target = apply(inverse(self._robot.map_from_true()), np.median(found.points, axis=0)[None])[0]
+                if len(look.points) > len(best_look.points):
+                    best_look = look
+        if not len(best_look.points):
+            return best_look
+        target = apply(inverse(self._robot.map_from_true()), np.median(best_look.points, axis=0)[None])[0]
         views = [(head, target), (_over(base, target), target)][: 2 if self._robot.held is None else 1]
         return self._looks(body, class_name, views, scaled(CAMERA, 2.0), FALLEN)
 
@@ -227,25 +234,25 @@ class CameraEyes:
         if carriable:
             low = high = (low + high) / 2  # of furniture any side may be in sight
         renderer = self._pictures.sight(self._robot.world)
-        found, shown = np.zeros((0, 3)), []
+        thing_points, pictures = np.zeros((0, 3)), []
         for eye, target in views:
             pose = look_at(eye, target)
             picture = take(renderer, camera, pose, self._random)
             clouds = [
                 points
                 for number in np.unique(picture.instance)
-                if self._made_out(int(number), picture.instance == number, class_name)
+                if self._is_recognised(int(number), picture.instance == number, class_name)
                 and len(points := cloud(picture, picture.instance == number, map_from_true @ pose, whole=not carriable))
                 and not self._of_another(body, class_name, points)
             ]
-            if carriable and len(found):
-                low = high = np.median(found, axis=0)
+            if carriable and len(thing_points):
+                low = high = np.median(thing_points, axis=0)
             middles = [np.median(points, axis=0) for points in clouds]
             away = [float(np.linalg.norm(middle - np.clip(middle, low, high))) for middle in middles]
-            if clouds and min(away) < (SAME if carriable and len(found) else radius or self._radius):
-                found = np.concatenate([found, clouds[int(np.argmin(away))]])
-                shown.append(View(picture, map_from_true @ pose))
-        return Look(found, tuple(shown))
+            if clouds and min(away) < (SAME if carriable and len(thing_points) else radius or self._radius):
+                thing_points = np.concatenate([thing_points, clouds[int(np.argmin(away))]])
+                pictures.append(View(picture, map_from_true @ pose))
+        return Look(thing_points, tuple(pictures))
 
     def _of_another(self, body: str, class_name: str, points: np.ndarray) -> bool:
         """Whether points (N, 3) are rather of another thing of a class that is believed to be nearer to them, and as
@@ -266,7 +273,7 @@ class CameraEyes:
         nearest = min(map(away, others), default=np.inf)
         return nearest < min(SAME, away(body))
 
-    def _made_out(self, number: int, mask: np.ndarray, class_name: str) -> bool:
+    def _is_recognised(self, number: int, mask: np.ndarray, class_name: str) -> bool:
         """Whether the segmentation takes an instance of a picture for something of a class."""
         name = self._names.get(number, "")
         if not name or mask.sum() < LEAST_PIXELS:

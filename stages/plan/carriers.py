@@ -33,8 +33,8 @@ def carrier(world: PhysicsWorld, name: str) -> str | None:
     """Return the body of a world that pushes a thing upwards most, by the contacts of the last step; None: nothing."""
     push: dict[str, float] = defaultdict(float)
     for contact in world.contacts(world.bodies[name].body_id):
-        other = world.name_of(contact.other_body)
-        if other is None or other == name or contact.normal[2] < STEEP or contact.depth < -TOUCHING:
+        body = world.name_of(contact.other_body)
+        if body is None or body == name or contact.normal[2] < STEEP or contact.depth < -TOUCHING:
             continue
-        push[other] += float(contact.normal[2]) * (contact.force + 1e-3)  # what sleeps has no forces
-    return max(sorted(push), key=lambda other: push[other]) if push else None
+        push[body] += float(contact.normal[2]) * (contact.force + 1e-3)  # what sleeps has no forces
+    return max(sorted(push), key=lambda body: push[body]) if push else None

@@ -29,7 +29,7 @@ from scenewright.stages.plan.world_model import RobotState, Snapshot, WorldModel
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
 LOOKS = 3
-"""From so many places at most an action is looked at before it is carried out."""
+"""Most places from which an action is looked at before it is carried out."""
 JOINT_TOLERANCE = 0.05
 """A joint further than this from where a motion should have left it is taken to be where it is [rad or m]."""
 
@@ -108,8 +108,8 @@ class Conduct:
         origin = "start"
         number = start
         groups = _by_action(self.steps[start:])
-        for place, group in enumerate(groups):
-            following = [(later[-1].name, later[-1].arguments) for later in groups[place + 1 :]]
+        for index, group in enumerate(groups):
+            following = [(later[-1].name, later[-1].arguments) for later in groups[index + 1 :]]
             after, carried_out = self._act(state, group, origin, number, following)
             if not carried_out or after is None:
                 return after, number
@@ -138,12 +138,12 @@ class Conduct:
             self.physical.action = number
             anchor = self._anchor(group[-1]) if attempt == 0 else None
             try:
-                preferred = self._looked(group[-1], anchor)
+                preferred = self._look_again(group[-1], anchor)
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
                 further = put_there_later(name, arguments, following)
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style, further=further)
-                again = self.eyes is not None and self.eyes.again
-                before = self.model.snapshot() if again else None
+                looks_again = self.eyes is not None and self.eyes.again
+                before = self.model.snapshot() if looks_again else None
                 steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
@@ -160,12 +160,12 @@ class Conduct:
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 lost = state.holding is not None and self.physical.held is None
-                recovered = self._recovered(state, name, arguments)
+                recovered = self._try_recovering(state, name, arguments)
                 if recovered is None or lost:  # what was held is gone: nothing left to place
                     return recovered, False
                 state = recovered
                 continue
-            state = self._perceived(after)
+            state = self._perceive(after)
             try:
                 state = action.after_motion(self, state, arguments)
                 self._check_effect(name, arguments)
@@ -175,7 +175,7 @@ class Conduct:
                 if action.when_unmet == "stay":
                     return state, False
                 if action.when_unmet == "back":  # the tray was lost, or something is in the way of levelling it
-                    return self._recovered(state, name, arguments), False
+                    return self._try_recovering(state, name, arguments), False
         return state, False
 
     def _look_from_there(
@@ -188,31 +188,31 @@ class Conduct:
         for look in range(LOOKS):
             drive, step = steps[:2]
             self._execute(drive)
-            there = replace(state, base=drive.segments[-1].path[-1, :3])
+            arrived = replace(state, base=drive.segments[-1].path[-1, :3])
             self.model.restore(before)
-            there = self._perceived(there)
-            hold_for_checks(self.model, there)
-            preferred = self._looked(step, self._anchor(step))
+            arrived = self._perceive(arrived)
+            hold_for_checks(self.model, arrived)
+            preferred = self._look_again(step, self._anchor(step))
             if preferred is not None:
-                preferred = (there.base, preferred[1])
+                preferred = (arrived.base, preferred[1])
             before = self.model.snapshot()
             wish = replace(request, preferred=preferred)
             try:
-                measured = self._measured(wish, there.base)
-                return refine_action(self.model, there, step.name, measured, origin)
+                measured = self._without_uncertainty(wish, arrived.base)
+                return refine_action(self.model, arrived, step.name, measured, origin)
             except MotionFailed:
-                steps, after = refine_action(self.model, there, step.name, wish, origin)
+                steps, after = refine_action(self.model, arrived, step.name, wish, origin)
             if steps[0].name != DRIVE or look == LOOKS - 1:
                 break
-            state = there
+            state = arrived
         return steps, after
 
     @staticmethod
-    def _measured(request: MotionRequest, base: np.ndarray) -> MotionRequest:
+    def _without_uncertainty(request: MotionRequest, base: np.ndarray) -> MotionRequest:
         """Return a request for a motion from where a look was taken, which has shown how wide things are."""
         return replace(request, base=base, budgets=replace(request.budgets, size_uncertainty=0.0))
 
-    def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
+    def _try_recovering(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
         """Return the state after the way back, None (and a note) when the arm does not get there either."""
         try:
             return self._recover(state)
@@ -239,13 +239,13 @@ class Conduct:
     def _see(self, body: str, here: str) -> None:
         """Take over a body of the room as the eyes see it; what it stands on stays as believed."""
         assert self.eyes is not None
-        seen = self.eyes.seen(body, here)
-        if seen is None:
+        sighting = self.eyes.seen(body, here)
+        if sighting is None:
             return
-        record, text, planes = seen
+        record, text, planes = sighting
         believed = self.model.records[body]
-        kept = {"parent": believed.parent, "movable": believed.movable, "furniture": believed.furniture}
-        self.model.see(body, record.model_copy(update=kept), text, planes)
+        beliefs_kept = {"parent": believed.parent, "movable": believed.movable, "furniture": believed.furniture}
+        self.model.see(body, record.model_copy(update=beliefs_kept), text, planes)
         self.seen_frames[body] = inverse(self._map_from_true() @ self.physical.world.pose(here)) @ self.model.pose(body)
 
     def _map_from_true(self) -> np.ndarray:
@@ -278,7 +278,7 @@ class Conduct:
         body = step.arguments[tied_to]
         return Anchor(body, self.model.pose(body), self.model.text(body))
 
-    def _looked(self, step: Step, before: Anchor | None) -> tuple[np.ndarray, np.ndarray] | None:
+    def _look_again(self, step: Step, before: Anchor | None) -> tuple[np.ndarray, np.ndarray] | None:
         """Look, and return base pose and grasp (or place) of the planned step, moved along with the body they are tied
         to; None where there is no such body, and where eyes which err give it another shape than the motion was planned
         for: its frame is another, its rim or its handle elsewhere.
@@ -307,14 +307,14 @@ class Conduct:
         `condition_not_met` for such a joint while the action has not `ended`: what follows was planned around it, but
         the next action is planned anew."""
         for planned, goal in step.manipulation.joint_values.items() if step.manipulation is not None else ():
-            there, body = self.joint_names[planned], self.matched(self.model.owner(planned))
-            value = self.physical.world.joint_value(body, there)
+            room_joint, body = self.joint_names[planned], self.matched(self.model.owner(planned))
+            value = self.physical.world.joint_value(body, room_joint)
             if abs(value - goal) <= JOINT_TOLERANCE:
                 continue
             if not ended:
                 raise MotionFailed(
                     "condition_not_met",
-                    f"the joint {there} stands at {value:.3f} instead of {goal:.3f}",
+                    f"the joint {room_joint} stands at {value:.3f} instead of {goal:.3f}",
                     (planned,),
                     {"value": value, "goal": goal},
                 )
@@ -326,11 +326,11 @@ class Conduct:
 
     def joint_in_room(self, planned: str) -> tuple[Joint, float]:
         """Return the joint of the room that a planned joint is, and its value now. Raises MotionFailed `not_found`."""
-        body, there = self.matched(self.model.owner(planned)), self.joint_names[planned]
-        joint = next(joint for joint in self.room.records[body].joints if joint.name == there)
-        return joint, self.physical.world.joint_value(body, there)
+        body, room_joint = self.matched(self.model.owner(planned)), self.joint_names[planned]
+        joint = next(joint for joint in self.room.records[body].joints if joint.name == room_joint)
+        return joint, self.physical.world.joint_value(body, room_joint)
 
-    def _perceived(self, state: RobotState) -> RobotState:
+    def _perceive(self, state: RobotState) -> RobotState:
         """Correct what the robot believes of itself and of what it holds by what the joints and a look say."""
         base, arm = state.base, state.arm
         if self.physical.held is None:
@@ -359,7 +359,7 @@ class Conduct:
         if path is None:
             return state
         self.physical.follow(Segment(whole_body(state.base, path), 0.0, LEVEL_PACE, "", state.holding), None)
-        return self._perceived(replace(state, arm=path[-1]))
+        return self._perceive(replace(state, arm=path[-1]))
 
     def _take_along(self, item: str) -> None:
         """Join what is held with what stands on it, as they are in the room now: the load counts in collision checks.
@@ -369,11 +369,11 @@ class Conduct:
         load = self.model.load(item)
         planned = {match.matched: body for body, match in self.matches.items() if match.matched is not None}
         for body in (item, *load):
-            here = self.matches[body].matched
-            if here is None:
+            room_body = self.matches[body].matched
+            if room_body is None:
                 continue
             self.model.world.set_pose(body, self.pose_in_room(body))
-            below = carrier(self.physical.world, here)
+            below = carrier(self.physical.world, room_body)
             if body != item and below is not None and planned.get(below) not in (item, *load):
                 self.model.put_on(body, planned.get(below, NOTHING))
         self.model.take_aboard(item)
@@ -386,7 +386,7 @@ class Conduct:
         self.physical.recording.keyframe(self.physical.action, "failed")
         self.physical.follow(Segment(rows, self.model.description.opening, 0.5), None)
         base, arm = rows[-1, :3], rows[-1, 3:]
-        return self._perceived(RobotState(base, arm, state.holding, state.tool_from_item, state.body_from_tool))
+        return self._perceive(RobotState(base, arm, state.holding, state.tool_from_item, state.body_from_tool))
 
     # --- open loop --------------------------------------------------------------------------------------------
 
@@ -399,7 +399,10 @@ class Conduct:
             except MotionFailed as failed:
                 self._note(failed, step.name, step.arguments)
                 return False
-            later = any((step.name, step.arguments) == (other.name, other.arguments) for other in steps[number + 1 :])
+            later = any(
+                (step.name, step.arguments) == (later_step.name, later_step.arguments)
+                for later_step in steps[number + 1 :]
+            )
             if step.manipulation is not None and not later:
                 try:
                     self._check_effect(step.name, step.arguments)
@@ -435,11 +438,11 @@ def joint_pairs(
     """Return which joint of the room each planned joint is; joints without a counterpart are left out."""
     pairs: dict[str, str] = {}
     for name, record in planned.items():
-        there = matches[name].matched
-        if there is None:
+        room_body = matches[name].matched
+        if room_body is None:
             continue
         for joint in record.joints:
-            counterpart = match_joint(record, joint.name, room[there])
+            counterpart = match_joint(record, joint.name, room[room_body])
             if counterpart is not None and counterpart not in pairs.values():
                 pairs[joint.name] = counterpart
     return pairs

@@ -24,29 +24,29 @@ def match_bodies(planned: dict[str, SceneBody], true: dict[str, SceneBody], radi
     """Return a match per planned body: greedily by the distance of box centres, within `radius` [m], one to one."""
     pairs = []
     for name, record in planned.items():
-        for other, candidate in true.items():
+        for true_name, candidate in true.items():
             if alike(record.class_name, candidate.class_name):
                 away = float(np.linalg.norm(np.subtract(record.box.center, candidate.box.center)))
-                if away <= radius or (name == other and record.box == candidate.box):
-                    pairs.append((away, name, other))
+                if away <= radius or (name == true_name and record.box == candidate.box):
+                    pairs.append((away, name, true_name))
     matches = {name: BodyMatch(body=name, matched=None) for name in planned}
-    taken: set[str] = set()
-    for away, name, other in sorted(pairs):
-        if matches[name].matched is None and other not in taken:
-            matches[name] = BodyMatch(body=name, matched=other, distance=round(away, 6))
-            taken.add(other)
+    used: set[str] = set()
+    for away, name, true_name in sorted(pairs):
+        if matches[name].matched is None and true_name not in used:
+            matches[name] = BodyMatch(body=name, matched=true_name, distance=round(away, 6))
+            used.add(true_name)
     return matches
 
 
 def match_joint(planned: SceneBody, joint: str, true: SceneBody) -> str | None:
     """Return the joint of the true body that a planned joint is: the nearest moving part of the same type, by handle
     (or origin) in the world at value 0. None when the true body has none of that type."""
-    wanted = next(entry for entry in planned.joints if entry.name == joint)
+    planned_joint = next(entry for entry in planned.joints if entry.name == joint)
     best: tuple[float, str] | None = None
     for entry in true.joints:
-        if entry.type != wanted.type:
+        if entry.type != planned_joint.type:
             continue
-        away = float(np.linalg.norm(_anchor(planned, wanted) - _anchor(true, entry)))
+        away = float(np.linalg.norm(_anchor(planned, planned_joint) - _anchor(true, entry)))
         if best is None or away < best[0]:
             best = (away, entry.name)
     return None if best is None else best[1]

@@ -12,6 +12,7 @@ from scenewright.stages.kit.tasks.strips import Domain
 from scenewright.stages.plan.action import all_actions
 
 START = "start"
+"""Where the robot stands before its first drive."""
 
 DOMAIN = Domain(
     name="mobile_manipulation",
@@ -46,3 +47,4 @@ DOMAIN = Domain(
     | {name: kinds for action in all_actions() for name, kinds in action.predicates.items()},
     schemas=tuple(schema for action in all_actions() for schema in action.schemas),
 )
+"""What the robot can do, in symbols; the actions bring their schemas."""

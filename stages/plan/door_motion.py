@@ -29,6 +29,7 @@ OVERSHOOT = 0.02
 PRESS = 0.006
 """The commanded finger tips are this far inside the door's surface, so that they stay in touch [m]."""
 GRIP_SLACK = 0.012
+"""Opening to which the fingers close on a handle [m]; by eye."""
 OPEN = 0.5
 """Share of a joint's range above which it counts as open."""
 
@@ -45,9 +46,9 @@ def plan_close(
     value = model.joint_value(body, joint_name)
     tally = Tally()
     search = JointSearch(model, state, body, joint, request.budgets, request.random, tally, request.base)
-    whole = _push(search, value, -OVERSHOOT)
-    if whole is not None:
-        return (whole,)
+    single_push = _push(search, value, -OVERSHOOT)
+    if single_push is not None:
+        return (single_push,)
     for share in (0.5, 0.7, 0.3):
         middle = value * share
         first = _push(search, value, middle)

@@ -17,7 +17,7 @@ from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.world_model import WorldModel, moved_record, true_record
 
 NEAR_BY = 1.5
-"""From so near a look counts as one from near by [m]."""
+"""Largest distance of a look from near by [m]."""
 CELL = 0.05
 """A thing that was moved by more is seen anew [m]."""
 Seen = tuple[SceneBody, str, tuple[SurfacePlane, ...]]
@@ -56,7 +56,9 @@ class TrueEyes:
     def seen(self, body: str, here: str) -> Seen:
         """Return the truth; what it stands on stays as believed."""
         record = true_record(self._physical.world, here, self._room.records[here])
-        names = {there: planned for planned, there in self._joint_names.items() if planned.startswith(f"{body}__")}
+        names = {
+            room_joint: planned for planned, room_joint in self._joint_names.items() if planned.startswith(f"{body}__")
+        }
         record, text = renamed(record, self._room.texts[here], body, names)
         return record, text, self._room.planes[here]
 
@@ -74,11 +76,11 @@ class NoisyEyes:
         """Return it where localisation's error puts it."""
         record, text, planes = self._true.seen(body, here)
         at, base = np.array(record.world_from_body)[:2, 3], self._robot.robot.configuration().base
-        side, near = quarter_turn(base.tolist(), at.tolist()), hypot(*(base[:2] - at)) < NEAR_BY
+        side, is_close = quarter_turn(base.tolist(), at.tolist()), hypot(*(base[:2] - at)) < NEAR_BY
         lies = hash(tuple(np.rint(at / CELL).astype(int).tolist()))
-        if self._errors.misses(here, lies, side, near):
+        if self._errors.misses(here, lies, side, is_close):
             return None
-        if self._errors.class_of(here, record.class_name, side, near) != record.class_name:
+        if self._errors.class_of(here, record.class_name, side, is_close) != record.class_name:
             return None
         pose = self._robot.map_from_true() @ np.array(record.world_from_body)
         return moved_record(record, pose, dict(record.joint_values)), text, planes

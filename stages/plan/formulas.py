@@ -18,10 +18,11 @@ from scenewright.stages.kit.tasks.pddl_expressions import Expression, entries, p
 from scenewright.stages.kit.tasks.strips import Atom
 
 MOST_INSTANCES, MOST_ALTERNATIVES, DEEPEST = 20_000, 512, 12
-"""Of a quantifier's bindings in all; of the goal; of nested parts."""
+"""Most bindings of a goal's quantifiers in all, most alternatives of a goal, and most nested parts."""
 Literal = tuple[Atom, bool]
 Alternative = frozenset[Literal]
 TRUE: tuple[Alternative, ...] = (frozenset(),)
+"""What always holds: one alternative without atoms. Without alternatives nothing holds."""
 HINT = "docs/PLANNING.md, Goals"
 _SHORT = re.compile(r"^\s*(not\s+)?(\w[\w-]*)\s*\(\s*([^()]*?)\s*\)\s*$")
 
@@ -64,12 +65,12 @@ class _Reader:
             either: Expression = ["or", ["not", listed[1]], listed[2]]
             return self.read(either, binding, holds, depth + 1)
         if head in ("and", "or"):
-            parts = (self.read(each, binding, holds, depth + 1) for each in listed[1:])
-            return self._joined(parts, (head == "and") == holds)
+            branches = (self.read(each, binding, holds, depth + 1) for each in listed[1:])
+            return self._combine(branches, (head == "and") == holds)
         if head in ("forall", "exists"):
             self._count(listed, 3, f"`{head}` takes variables and a part")
-            parts = (self.read(listed[2], inner, holds, depth + 1) for inner in self._bindings(listed[1], binding))
-            return self._joined(parts, (head == "forall") == holds)
+            branches = (self.read(listed[2], inner, holds, depth + 1) for inner in self._bindings(listed[1], binding))
+            return self._combine(branches, (head == "forall") == holds)
         terms = [word(each, "a term of the goal") for each in listed[1:]]
         for term in terms:
             if term.startswith("?") and term not in binding:
@@ -85,8 +86,8 @@ class _Reader:
             return (frozenset((each, True) for each in atoms),)
         return tuple(frozenset({(each, False)}) for each in sorted(atoms))
 
-    def _count(self, listed: list[Expression], wanted: int, message: str) -> None:
-        if len(listed) != wanted:
+    def _count(self, listed: list[Expression], length: int, message: str) -> None:
+        if len(listed) != length:
             raise self.refuse(message)
 
     def _bindings(self, variables: Expression, binding: dict[str, str]) -> Iterator[dict[str, str]]:
@@ -95,40 +96,43 @@ class _Reader:
             if not name.startswith("?") or name in binding:
                 raise self.refuse(f"{name} is no variable, or bound twice")
             if kind and kind not in self.names.objects.values():
-                known = ", ".join(sorted(set(self.names.objects.values()))[:12])
-                raise self.refuse(f"the scene has no {kind!r}; it has {known}")
-        choices = [[each for each, own in self.names.objects.items() if not kind or own == kind] for _, kind in pairs]
+                kinds = ", ".join(sorted(set(self.names.objects.values()))[:12])
+                raise self.refuse(f"the scene has no {kind!r}; it has {kinds}")
+        choices = [
+            [each for each, object_kind in self.names.objects.items() if not kind or object_kind == kind]
+            for _, kind in pairs
+        ]
         for values in product(*choices):
             self.left -= 1
             if self.left < 0:
                 raise self.refuse(f"more than {MOST_INSTANCES} cases to look at; quantify over fewer things")
             yield {**binding, **dict(zip((name for name, _ in pairs), values, strict=True))}
 
-    def _joined(self, parts: Iterator[tuple[Alternative, ...]], together: bool) -> tuple[Alternative, ...]:
+    def _combine(self, branches: Iterator[tuple[Alternative, ...]], together: bool) -> tuple[Alternative, ...]:
         if not together:
-            found = tuple(dict.fromkeys(alternative for part in parts for alternative in part))
-            return self._bounded(_least(found))
+            all_found = tuple(dict.fromkeys(alternative for part in branches for alternative in part))
+            return self._check_count(_least(all_found))
         result = TRUE
-        for part in parts:
-            merged = (one | two for one in result for two in part)
-            result = self._bounded(_least(tuple(dict.fromkeys(each for each in merged if _sound(each)))))
+        for part in branches:
+            merged = (first | two for first in result for two in part)
+            result = self._check_count(_least(tuple(dict.fromkeys(each for each in merged if _sound(each)))))
         return result
 
-    def _bounded(self, found: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
-        if len(found) > MOST_ALTERNATIVES:
+    def _check_count(self, options: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+        if len(options) > MOST_ALTERNATIVES:
             raise self.refuse(f"more than {MOST_ALTERNATIVES} ways to reach it; name some of the things")
-        return found
+        return options
 
 
 def _sound(alternative: Alternative) -> bool:
     return not any((atom, not holds) in alternative for atom, holds in alternative)
 
 
-def _least(found: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+def _least(options: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
     """Leave out alternatives that ask for more than another one (few are compared: the rest stays)."""
-    if len(found) > 200:
-        return found
-    return tuple(each for each in found if not any(other < each for other in found))
+    if len(options) > 200:
+        return options
+    return tuple(each for each in options if not any(alternative < each for alternative in options))
 
 
 def alternatives(text: str, names: Names) -> tuple[Alternative, ...]:
@@ -169,7 +173,7 @@ def _long_form(text: str, reader: _Reader) -> Expression:
 def together(parts: list[tuple[Alternative, ...]], text: str) -> tuple[Alternative, ...]:
     """Return the alternatives of several goals that all have to hold. Raises UsageError for too many."""
     reader = _Reader(Names({}, lambda atom, where, quantified: None), text)
-    return reader._joined(iter(parts), True)
+    return reader._combine(iter(parts), True)
 
 
 def literal_text(literal: Literal) -> str:

@@ -20,6 +20,7 @@ from scenewright.stages.plan.pose_fit import FAR, KEPT, SURE
 from scipy.spatial import cKDTree
 
 ROUNDS = 15
+"""Steps of one fit; by eye."""
 FEW, MANY = 500, 2000
 """Points seen that a first and a last fit go by."""
 STEPS, FINE = 13, 7
@@ -79,7 +80,7 @@ def fit_furniture(
     `allowed` is none: where little but a door is seen, furniture that is turned as far explains it as well.
     """
     eyes = np.array([view.eye for view in views])
-    few, many = _sides(seen, eyes, FEW), _sides(seen, eyes, MANY)
+    few_sides, many_sides = _sides(seen, eyes, FEW), _sides(seen, eyes, MANY)
 
     def placed(sides: Surface, values: dict[str, float], start: np.ndarray) -> FittedFurniture:
         surface = facing(surface_at(values), eyes, start)
@@ -93,22 +94,24 @@ def fit_furniture(
         fits = [placed(sides, found.joints | {name: float(value)}, start) for start in starts for value in values]
         return min([found, *fits], key=lambda fit: fit.misfit)
 
-    found = placed(few, dict(believed), np.eye(4))
+    found = placed(few_sides, dict(believed), np.eye(4))
     for joint in ranges:
-        found = best_of(few, joint.name, np.linspace(joint.lower, joint.upper, STEPS), found, (np.eye(4), found.motion))
-    found = placed(many, found.joints, found.motion)
+        found = best_of(
+            few_sides, joint.name, np.linspace(joint.lower, joint.upper, STEPS), found, (np.eye(4), found.motion)
+        )
+    found = placed(many_sides, found.joints, found.motion)
     for joint in ranges:
         step = (joint.upper - joint.lower) / (STEPS - 1)
         for reach in (step, step / 2):  # place and joint come home together
             around = found.joints[joint.name] + np.linspace(-reach, reach, FINE)
-            found = best_of(many, joint.name, np.clip(around, joint.lower, joint.upper), found, (found.motion,))
-        for rest in (believed[joint.name], joint.lower, joint.upper):
-            resting = placed(many, found.joints | {joint.name: rest}, found.motion)
+            found = best_of(many_sides, joint.name, np.clip(around, joint.lower, joint.upper), found, (found.motion,))
+        for resting_value in (believed[joint.name], joint.lower, joint.upper):
+            resting = placed(many_sides, found.joints | {joint.name: resting_value}, found.motion)
             if resting.misfit < found.misfit + SURE:
                 found = resting
                 break
     surface = facing(surface_at(found.joints), eyes, np.eye(4))
-    unmoved = misfit(many[0], views, surface, np.eye(4))
+    unmoved = misfit(many_sides[0], views, surface, np.eye(4))
     return FittedFurniture(np.eye(4), found.joints, unmoved) if unmoved < found.misfit + STILL else found
 
 
@@ -126,24 +129,27 @@ def fit_place(seen: Surface, surface: Surface, start: np.ndarray) -> np.ndarray:
     for _ in range(ROUNDS):
         back = np.hstack([apply(inverse(motion), seen[0]), LEVER * seen[1] @ motion[:3, :3]])
         away, nearest = tree.query(back)
-        near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(back)))]
-        own, normal = apply(motion, points[nearest[near]]), normals[nearest[near]] @ motion[:3, :3].T
-        step = _level_step(own, normal, seen[0][near], beyond)
+        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(back)))]
+        surface_points, normal = (
+            apply(motion, points[nearest[nearest_rows]]),
+            normals[nearest[nearest_rows]] @ motion[:3, :3].T,
+        )
+        step = _level_step(surface_points, normal, seen[0][nearest_rows], beyond)
         motion = step @ motion
         if np.abs(step - np.eye(4)).max() < STILL:
             break
     return motion
 
 
-def _level_step(own: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond: float) -> np.ndarray:
+def _level_step(points: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond: float) -> np.ndarray:
     """Return the turn about the vertical and level shift (4, 4) by one step of Gauss and Newton that brings points
     (N, 3) with normals (N, 3) to planes through their goals (N, 3), or to the goals where those are farther along the
     surface than `beyond` [m]."""
-    offset = goals - own
+    offset = goals - points
     along = offset - np.einsum("ij,ij->i", offset, normals)[:, None] * normals
     over_edge = np.linalg.norm(along, axis=1) > beyond
-    middle = own[:, :2].mean(axis=0)
-    x, y = (own[:, :2] - middle).T
+    middle = points[:, :2].mean(axis=0)
+    x, y = (points[:, :2] - middle).T
     rows = [np.column_stack([normals[:, 0], normals[:, 1], x * normals[:, 1] - y * normals[:, 0]])]
     sides = [np.einsum("ij,ij->i", offset, normals)]
     one, none = np.ones(int(over_edge.sum())), np.zeros(int(over_edge.sum()))
@@ -152,9 +158,9 @@ def _level_step(own: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond:
     matrix, side = np.concatenate(rows), np.concatenate(sides)
     reach = max(float(np.sqrt((x**2 + y**2).mean())), 1e-3)  # at which a turn is a shift
     matrix = matrix / (1.0, 1.0, reach)
-    told, ways = np.linalg.eigh(matrix.T @ matrix / len(own))
-    known = ways[:, told > LEAST_TOLD]
-    moved = known @ ((known.T @ matrix.T @ side) / (told[told > LEAST_TOLD] * len(own)))
+    eigenvalues, eigenvectors = np.linalg.eigh(matrix.T @ matrix / len(points))
+    certain_axes = eigenvectors[:, eigenvalues > LEAST_TOLD]
+    moved = certain_axes @ ((certain_axes.T @ matrix.T @ side) / (eigenvalues[eigenvalues > LEAST_TOLD] * len(points)))
     shift_x, shift_y, turn = moved / (1.0, 1.0, reach)
     step: np.ndarray = transform_from_yaw(float(turn), np.zeros(3))
     step[:2, 3] = middle + np.array([shift_x, shift_y]) - step[:2, :2] @ middle
@@ -164,11 +170,11 @@ def _level_step(own: np.ndarray, normals: np.ndarray, goals: np.ndarray, beyond:
 def facing(surface: Surface, eyes: np.ndarray, motion: np.ndarray) -> Surface:
     """Return the part of a surface, moved by a motion (4, 4), that faces one of the eyes (K, 3)."""
     points, normals = surface
-    shown = np.zeros(len(points), dtype=bool)
+    is_facing = np.zeros(len(points), dtype=bool)
     for eye in apply(inverse(motion), eyes):
         rays = eye - points
-        shown |= np.einsum("ij,ij->i", rays, normals) > FACING * np.linalg.norm(rays, axis=1)
-    return points[shown], normals[shown]
+        is_facing |= np.einsum("ij,ij->i", rays, normals) > FACING * np.linalg.norm(rays, axis=1)
+    return points[is_facing], normals[is_facing]
 
 
 def misfit(seen: np.ndarray, views: Sequence[View], surface: Surface, motion: np.ndarray) -> float:
@@ -182,12 +188,12 @@ def misfit(seen: np.ndarray, views: Sequence[View], surface: Surface, motion: np
     beside = np.abs(np.einsum("ij,ij->i", back - points[nearest], normals[nearest]))
     along = np.sqrt(np.maximum(away**2 - beside**2, 0.0))
     outward = float(np.minimum(np.where(along < _reach(tree, points), beside, away), FAR).mean())
-    behind = [_seen_behind(apply(motion, points), view) for view in views]
-    in_sight = np.concatenate([own[np.isfinite(own)] for own in behind]) if behind else np.zeros(0)
+    behind = [_depth_behind(apply(motion, points), view) for view in views]
+    in_sight = np.concatenate([depths[np.isfinite(depths)] for depths in behind]) if behind else np.zeros(0)
     return outward + (float(np.clip(in_sight, 0.0, FAR).mean()) if len(in_sight) else 0.0)
 
 
-def _seen_behind(points: np.ndarray, view: View) -> np.ndarray:
+def _depth_behind(points: np.ndarray, view: View) -> np.ndarray:
     """Return how far behind points (N, 3) a picture shows something [m] (N,); nan where it shows nothing, where they
     are out of it, and where something before them hides them."""
     pixels, depth = project(apply(inverse(view.map_from_camera), points), view.picture.camera)
@@ -195,8 +201,8 @@ def _seen_behind(points: np.ndarray, view: View) -> np.ndarray:
     at = np.rint(np.nan_to_num(pixels, nan=-1.0)).astype(int)
     inside = np.all((at >= 0) & (at < (width, height)), axis=1)
     at[~inside] = 0
-    shown = view.picture.depth[at[:, 1], at[:, 0]]
-    behind: np.ndarray = np.where(inside & (shown > 0), shown - depth, np.nan)
+    picture_depth = view.picture.depth[at[:, 1], at[:, 0]]
+    behind: np.ndarray = np.where(inside & (picture_depth > 0), picture_depth - depth, np.nan)
     return np.where(behind > -FAR, behind, np.nan)
 
 
@@ -205,10 +211,10 @@ def _reach(tree: cKDTree, points: np.ndarray) -> float:
     return GAP * float(np.median(tree.query(points, k=2)[0][:, 1]))
 
 
-def _sides(seen: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
+def _sides(surface_points: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
     """Return about `most` of the points (N, 3) that cameras at `eyes` (K, 3) saw, and the normals (N, 3) there, towards
     the nearest camera: of the plane through the points around."""
-    points, cloud = _thinned(seen, most), _thinned(seen, AROUND_OF)
+    points, cloud = _thin_out(surface_points, most), _thin_out(surface_points, AROUND_OF)
     around = cloud[cKDTree(cloud).query(points, k=min(AROUND, len(cloud)))[1]]
     offset = around - around.mean(axis=1, keepdims=True)
     normals: np.ndarray = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))[1][:, :, 0]
@@ -216,5 +222,5 @@ def _sides(seen: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
     return points, normals * np.where(np.einsum("ij,ij->i", normals, rays) < 0, -1.0, 1.0)[:, None]
 
 
-def _thinned(points: np.ndarray, most: int) -> np.ndarray:
+def _thin_out(points: np.ndarray, most: int) -> np.ndarray:
     return points[:: max(1, len(points) // most)]

@@ -34,7 +34,6 @@ FAMILIES = {"pick": ("pick", "lift", "take_out"), "place": ("place", "stack")}
 TAUGHT = "taught"
 """Added to the name of a learned predicate that the chain has with a meaning of its own."""
 HINT = "docs/PLANNING.md, A domain of your own"
-LARGEST_LEARNED = 64 * 2**20
 
 
 @dataclass(frozen=True)
@@ -76,10 +75,13 @@ class GivenDomain:
     def in_words(self, sentence: str, objects: Mapping[str, str]) -> frozenset[Atom] | None:
         """Return the atoms of a goal in words that were taught, None where a part was not."""
         atoms: set[Atom] = set()
-        for part, named in goal_phrases(sentence, objects):
+        for part, objects_named in goal_phrases(sentence, objects):
             if part not in self.goals:
                 return None
-            atoms |= {(self.name_here(name), *(named[place] for place in places)) for name, places in self.goals[part]}
+            atoms |= {
+                (self.name_here(name), *(objects_named[argument] for argument in places))
+                for name, places in self.goals[part]
+            }
         return frozenset(atoms)
 
     def ungrounded(self, objects: Mapping[str, str], classes: Mapping[str, str]) -> tuple[str, ...]:
@@ -88,8 +90,8 @@ class GivenDomain:
         added = {atom[0] for schema in self.domain.schemas for atom in schema.add}
         used = {atom[0] for schema in self.domain.schemas for atom in (*schema.preconditions, *schema.negative)}
         for name, kinds in self.domain.predicates.items():
-            known = DOMAIN.predicates.get(name)
-            if name in self.seen or name in added or (known is not None and len(known) == len(kinds)):
+            scene_kinds = DOMAIN.predicates.get(name)
+            if name in self.seen or name in added or (scene_kinds is not None and len(scene_kinds) == len(kinds)):
                 continue
             if name in used:
                 words.append(f"predicate {name} of {len(kinds)} (no operator makes it true, nothing perceived is it)")
@@ -106,25 +108,25 @@ class GivenDomain:
         operators: ground actions of the chain that one of its operators allows. `classes`: body -> class.
 
         Raises BadInput when not one of its operators can be done in the scene."""
-        own, own_actions = positive_task(DOMAIN, problem)
-        whole, operators = self._ground(problem, classes)
+        chain_task, own_actions = positive_task(DOMAIN, problem)
+        domain_task, operators = self._ground(problem, classes)
         merged = [action for action in own_actions if not action_named(action.name).has_motion]
         before = len(merged)
         by_body: dict[tuple[str, ...], list[GroundAction]] = {}
         for operator in operators:
-            for way in _ways(operator.name):
-                key = (way, *operator.arguments[: _compared(way)])
+            for schema_name in _ways(operator.name):
+                key = (schema_name, *operator.arguments[: _compared_count(schema_name)])
                 by_body.setdefault(key, []).append(operator)
         for action in own_actions:
             for operator in by_body.get((action.name, *_bodies(action)), ()):
                 merged.append(_both(action, operator))
-            if _bodies(action) != action.arguments[: _compared(action.name)]:
-                for operator in by_body.get((action.name, *action.arguments[: _compared(action.name)]), ()):
+            if _bodies(action) != action.arguments[: _compared_count(action.name)]:
+                for operator in by_body.get((action.name, *action.arguments[: _compared_count(action.name)]), ()):
                     merged.append(_both(action, operator))
         if len(merged) == before:
             raise BadInput(f"{self.source}: none of its operators can be done in this scene", hint=HINT)
-        false = frozenset(atom for atom in whole.initial if atom[0].startswith("not-"))
-        return replace(own, initial=own.initial | false), _with_opposites(merged, own.goal)
+        false = frozenset(atom for atom in domain_task.initial if atom[0].startswith("not-"))
+        return replace(chain_task, initial=chain_task.initial | false), _with_opposites(merged, chain_task.goal)
 
     def _ground(self, problem: Problem, classes: Mapping[str, str]) -> tuple[Problem, list[GroundAction]]:
         """Return the domain's ground actions; types are static predicates here, as a thing has several of them."""
@@ -133,13 +135,15 @@ class GivenDomain:
         typed = {
             (f"is-{kind}", name)
             for kind in kinds
-            for name, own in problem.objects.items()
-            if _is(self.domain, name, own, classes.get(name, ""), kind)
+            for name, object_type in problem.objects.items()
+            if _is(self.domain, name, object_type, classes.get(name, ""), kind)
         }
         schemas = tuple(self._plain(schema) for schema in self.domain.schemas if _ways(schema.name))
         domain = Domain(self.domain.name, {}, {}, schemas)
-        whole = Problem("given", dict.fromkeys(problem.objects, ""), problem.initial | bodies | typed, frozenset())
-        return positive_task(domain, whole)
+        domain_problem = Problem(
+            "given", dict.fromkeys(problem.objects, ""), problem.initial | bodies | typed, frozenset()
+        )
+        return positive_task(domain, domain_problem)
 
     def _plain(self, schema: Schema) -> Schema:
         """Return a schema without types, in the task's names."""
@@ -160,27 +164,27 @@ class GivenDomain:
 
 def _ways(operator: str) -> tuple[str, ...]:
     """Return the chain's schemas that carry out an operator; none where there is no such motion."""
-    known = {schema.name for action in all_actions() if action.has_motion for schema in action.schemas}
+    schema_names = {schema.name for action in all_actions() if action.has_motion for schema in action.schemas}
     base = operator.split("-")[0]
-    return tuple(name for name in FAMILIES.get(base, (base,)) if name in known)
+    return tuple(name for name in FAMILIES.get(base, (base,)) if name in schema_names)
 
 
-def _compared(way: str) -> int:
+def _compared_count(schema_name: str) -> int:
     """Return how many of the first arguments have to be those of the operator: what is put needs a place too."""
-    return 2 if action_named(way).hand == "puts" else 1
+    return 2 if action_named(schema_name).hand == "puts" else 1
 
 
 def _bodies(action: GroundAction) -> tuple[str, ...]:
     """Return the arguments that are compared, the owners of joints for joints."""
-    return tuple(name.split(PART_SEPARATOR)[0] for name in action.arguments[: _compared(action.name)])
+    return tuple(name.split(PART_SEPARATOR)[0] for name in action.arguments[: _compared_count(action.name)])
 
 
-def _is(domain: Domain, name: str, own: str, class_name: str, kind: str) -> bool:
+def _is(domain: Domain, name: str, object_type: str, class_name: str, kind: str) -> bool:
     """Whether an object is of a type: its class, a type of the chain, or one above one of these in the domain."""
-    if kind == class_name or (kind in DOMAIN.types and DOMAIN.is_a(own, kind)):
+    if kind == class_name or (kind in DOMAIN.types and DOMAIN.is_a(object_type, kind)):
         return True
     below = [each for each, parent in domain.types.items() if parent == kind and each != kind]
-    return any(_is(domain, name, own, class_name, each) for each in below)
+    return any(_is(domain, name, object_type, class_name, each) for each in below)
 
 
 def _both(action: GroundAction, operator: GroundAction) -> GroundAction:
@@ -215,18 +219,19 @@ def _with_opposites(actions: list[GroundAction], goal: frozenset[Atom]) -> list[
 def read_given_domain(path: Path) -> GivenDomain:
     """Read `--domain`: a PDDL file, or the folder of a domain that was learned in rooms. Raises BadInput."""
     if path.is_dir():
-        return _learned(path)
+        return _read_learned(path)
     domain = parse_domain(file_text(path, LARGEST_SETTINGS))
     for name, kinds in domain.predicates.items():
-        known = DOMAIN.predicates.get(name)
-        if known is not None and len(known) != len(kinds):
+        scene_kinds = DOMAIN.predicates.get(name)
+        if scene_kinds is not None and len(scene_kinds) != len(kinds):
             raise BadInput(
-                f"{path}: predicate {name} takes {len(kinds)} arguments, the scene's {name} {len(known)}", hint=HINT
+                f"{path}: predicate {name} takes {len(kinds)} arguments, the scene's {name} {len(scene_kinds)}",
+                hint=HINT,
             )
     return GivenDomain(str(path), domain)
 
 
-def _learned(path: Path) -> GivenDomain:
+def _read_learned(path: Path) -> GivenDomain:
     if not (path / "domain.json").is_file():
         raise BadInput(f"{path}: no domain.json there", hint="give the folder that `predicates teach` wrote, or PDDL")
     document = LearnedDomainFile.read(path / "domain.json")
@@ -246,5 +251,5 @@ def _learned(path: Path) -> GivenDomain:
         if goal.phrase >= len(document.phrases):
             raise BadInput(f"{path}: there is no phrase {goal.phrase}", hint="teach it again")
         goals.setdefault(goal.text, []).append((document.phrases[goal.phrase].predicate, goal.places))
-    seen = {name: meanings[name].arguments for name in domain.predicates}
-    return GivenDomain(str(path), domain, meanings, seen, {text: tuple(each) for text, each in goals.items()})
+    argument_kinds = {name: meanings[name].arguments for name in domain.predicates}
+    return GivenDomain(str(path), domain, meanings, argument_kinds, {text: tuple(each) for text, each in goals.items()})

@@ -26,9 +26,9 @@ def check_goal(
     """
     checks = []
     for literal in goal:
-        found = learned(literal)
-        if found is not None:
-            checks.append(found)
+        learned_check = learned(literal)
+        if learned_check is not None:
+            checks.append(learned_check)
             continue
         plain = literal.removeprefix("not ")
         predicate, inner = plain.rstrip(")").split("(")
@@ -39,9 +39,9 @@ def check_goal(
             detail = f"the room has no body of the class of {missing[0]} near it"
             checks.append(Check(condition=literal, holds=False, detail=detail))
             continue
-        here = tuple(matches[name].matched or "" for name in owners)
-        joints = tuple(world.bodies[here[0]].joints) if names[0] in matches else (joint_names[names[0]],)
-        check = goal_checks()[predicate](GoalInRoom(world, literal, here, joints, held))
+        room_names = tuple(matches[name].matched or "" for name in owners)
+        joints = tuple(world.bodies[room_names[0]].joints) if names[0] in matches else (joint_names[names[0]],)
+        check = goal_checks()[predicate](GoalInRoom(world, literal, room_names, joints, held))
         checks.append(check if plain == literal else check.model_copy(update={"holds": not check.holds}))
     return tuple(checks)
 

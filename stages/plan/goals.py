@@ -9,6 +9,7 @@ from scenewright.stages.kit.tasks.strips import Atom, atom_text
 from scenewright.stages.plan.world_model import WorldModel
 
 TABLE_CLASSES = ("table", "desk")
+"""Classes that a goal means by a table."""
 
 
 def default_goals(model: WorldModel, initial: frozenset[Atom], opening: float, most: int = 6) -> list[tuple[str, ...]]:

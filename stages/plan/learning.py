@@ -15,7 +15,9 @@ from scenewright.stages.kit.tasks.strips import Atom, GroundAction, atom_text
 from scenewright.stages.plan.action import schemas_of_hand
 
 TAKING, PUTTING = schemas_of_hand("takes"), schemas_of_hand("puts")
+"""Schemas of actions that take something into the hand, and that put it down."""
 MOVED = "moved"
+"""Predicate that is added to the task: the thing was taken at least once."""
 Key = tuple[str, tuple[str, ...]]
 
 
@@ -32,7 +34,7 @@ class Lessons:
 
     def apply(self, actions: list[GroundAction]) -> list[GroundAction]:
         """Return the actions that are left, with what was learned built in."""
-        wanted = {atom[1] for atoms in self.needs.values() for atom in atoms if atom[0] == MOVED}
+        to_move = {atom[1] for atoms in self.needs.values() for atom in atoms if atom[0] == MOVED}
         changed = []
         for action in actions:
             key = (action.name, action.arguments)
@@ -40,7 +42,7 @@ class Lessons:
                 continue
             if key in self.needs:
                 action = replace(action, preconditions=action.preconditions | self.needs[key])
-            if action.name in TAKING and action.arguments[0] in wanted:
+            if action.name in TAKING and action.arguments[0] in to_move:
                 action = replace(action, add=action.add | {(MOVED, action.arguments[0])})
             changed.append(action)
         return changed
@@ -56,7 +58,7 @@ class Lessons:
             self.words.append(f"{action.text} is tried again after {atom_text(further)}")
             return
         same = self._same_cause(action, failure, actions)
-        self.blocked |= {(other.name, other.arguments) for other in same}
+        self.blocked |= {(same_cause.name, same_cause.arguments) for same_cause in same}
         others = f" and {len(same) - 1} more that fail for the same reason" if len(same) > 1 else ""
         self.words.append(f"{action.text}{others} is not tried again: {failure.kind}")
 
@@ -74,7 +76,7 @@ class Lessons:
             return (MOVED, self.held)  # put down somewhere and taken again, by another grasp
         if PART_SEPARATOR not in name:
             return None
-        doors = {atom for other in actions for atom in other.add if atom[0] in ("open", "closed")}
+        doors = {atom for candidate in actions for atom in candidate.add if atom[0] in ("open", "closed")}
         for joint in sorted({atom[1] for atom in doors if atom[1].startswith(f"{name}_") or atom[1] == name}):
             now = "open" if ("open", joint) in state else "closed"
             opposite = ("closed" if now == "open" else "open", joint)
@@ -89,11 +91,13 @@ class Lessons:
         unreachable = failure.kind == "no_inverse_kinematics" and (
             failure.numbers.get("unreachable") == failure.numbers.get("tried")
         )
-        for other in actions:
-            if (other.name, other.arguments) == (action.name, action.arguments):
+        for candidate in actions:
+            if (candidate.name, candidate.arguments) == (action.name, action.arguments):
                 continue
-            taken = action.name in TAKING and other.name in TAKING and other.arguments[0] == action.arguments[0]
-            beside = taken and other.arguments[1] == action.arguments[1]
-            if (failure.kind == "no_grasp" and taken) or (unreachable and beside):
-                same.append(other)
+            takes_same = (
+                action.name in TAKING and candidate.name in TAKING and candidate.arguments[0] == action.arguments[0]
+            )
+            beside = takes_same and candidate.arguments[1] == action.arguments[1]
+            if (failure.kind == "no_grasp" and takes_same) or (unreachable and beside):
+                same.append(candidate)
         return same

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 RAISE = 0.12
 """Height over the surface at which a laden tray is moved sideways [m]."""
 RETREAT = 0.14
+"""How far the tool goes back along its axis from what was put down [m]; by eye."""
 LEVEL_PACE = 0.25
 """Share of the full speed with a load."""
 DRAWN_IN = (0.0, 0.1, 0.2)
@@ -66,8 +67,8 @@ def level_place(
     assert state.tool_from_item is not None
     checker = model.checker
     touch = model.links(item)
-    held = base_pose(base, model.description) @ forward(model.chain, state.arm) @ state.tool_from_item
-    yaw = float(np.arctan2(held[1, 0], held[0, 0]))
+    held_pose = base_pose(base, model.description) @ forward(model.chain, state.arm) @ state.tool_from_item
+    yaw = float(np.arctan2(held_pose[1, 0], held_pose[0, 0]))
     for turn in (0.0, 0.4, -0.4):
         checker.carry(item, state.tool_from_item)
         checker.allow(touch=touch)

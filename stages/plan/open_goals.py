@@ -47,16 +47,16 @@ def named_goal(
     nodes = {node.instance: node for node in graph.nodes if node.instance and node.id in objects}
     if not any(region.instance in nodes for region in language.info.regions):
         raise BadInput(f"{language.root}: none of its places is in the scene", hint="label the map of this scene")
-    return tuple(_named(literal, objects, nodes, finder) for literal in literals)
+    return tuple(_replace_quoted(literal, objects, nodes, finder) for literal in literals)
 
 
-def _named(literal: str, objects: Mapping[str, str], nodes: Mapping[int, GraphNode], finder: Finder) -> str:
+def _replace_quoted(literal: str, objects: Mapping[str, str], nodes: Mapping[int, GraphNode], finder: Finder) -> str:
     predicate = literal.split("(")[0].strip()
     kinds = DOMAIN.predicates.get(predicate, ())
 
     def node_of(match: re.Match[str]) -> str:
-        place = re.sub(_QUOTED, "", literal[: match.start()]).count(",")
-        kind = kinds[place] if place < len(kinds) else None
+        argument = re.sub(_QUOTED, "", literal[: match.start()]).count(",")
+        kind = kinds[argument] if argument < len(kinds) else None
         return _likeliest(checked_text(match[1]), kind, objects, nodes, finder)
 
     return _QUOTED.sub(node_of, literal)
@@ -66,14 +66,16 @@ def _likeliest(
     text: str, kind: str | None, objects: Mapping[str, str], nodes: Mapping[int, GraphNode], finder: Finder
 ) -> str:
     fits = finder.fits(text)
-    there = [(k, nodes[region.instance]) for k, region in enumerate(finder.info.regions) if region.instance in nodes]
-    there = [(k, node) for k, node in there if kind is None or DOMAIN.is_a(objects[node.id], kind)]
+    candidates = [
+        (k, nodes[region.instance]) for k, region in enumerate(finder.info.regions) if region.instance in nodes
+    ]
+    candidates = [(k, node) for k, node in candidates if kind is None or DOMAIN.is_a(objects[node.id], kind)]
     words = text.lower().split()
-    names = {k: node.class_name.split("_") for k, node in there}
+    names = {k: node.class_name.split("_") for k, node in candidates}
     longest = max((len(name) for name in names.values() if words[-len(name) :] == name), default=0)
     if longest:
-        there = [(k, node) for k, node in there if len(names[k]) == longest and words[-longest:] == names[k]]
-    best = max(((float(fits.probabilities[k]), node.id) for k, node in there), default=(0.0, "nothing"))
+        candidates = [(k, node) for k, node in candidates if len(names[k]) == longest and words[-longest:] == names[k]]
+    best = max(((float(fits.probabilities[k]), node.id) for k, node in candidates), default=(0.0, "nothing"))
     if best[0] < LEAST_PROBABILITY and longest < len(words):
         strange = ", for the encoder has learned no pictures like these" if finder.is_strange else ""
         raise UsageError(

@@ -22,9 +22,13 @@ from scenewright.stages.plan.tray_loading import easiest_first, lifts_left, lift
 from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
+"""How far the tool comes along its axis, and over its place a thing arrives [m]; by eye."""
 LIFT = 0.03
+"""How far a thing is first lifted, and over its place under a cover a thing arrives [m]; by eye."""
 DRAWER_LIFT = 0.2
+"""How far over its place in a drawer a thing arrives [m]; by eye."""
 SLOW = 0.35
+"""Share of the arm's full speed beside things; by eye."""
 FRICTION_USED = 0.3
 """Half of the friction **assumed** of rubber on household things: grasps that ask for no more are tried first, as what
 is held is carried with starts and stops."""
@@ -41,6 +45,7 @@ PITCHES: dict[GraspStyle, tuple[float, ...]] = {
     "level": (0.0, 0.35, 0.7),
     "steep": (1.1, np.pi / 2),
 }
+"""How far the hand is tilted out of the level [rad], by how it may come; by eye."""
 
 
 @dataclass(frozen=True)
@@ -86,9 +91,9 @@ def _two_finger_grasps(
         )
 
     firm, loose = sampled(FRICTION_USED), sampled(np.inf)
-    wanted = _palm_free(points, firm, model.description.palm) or _palm_free(points, loose, model.description.palm)
-    kept = {id(grasp) for grasp in wanted}
-    return wanted, [grasp for grasp in (*firm, *loose) if id(grasp) not in kept]
+    preferred = _palm_free(points, firm, model.description.palm) or _palm_free(points, loose, model.description.palm)
+    preferred_ids = {id(grasp) for grasp in preferred}
+    return preferred, [grasp for grasp in (*firm, *loose) if id(grasp) not in preferred_ids]
 
 
 def _palm_free(points: np.ndarray, grasps: list[Grasp], palm: tuple[float, float]) -> list[Grasp]:
@@ -97,14 +102,14 @@ def _palm_free(points: np.ndarray, grasps: list[Grasp], palm: tuple[float, float
     half = np.array([palm[1], palm[0]]) / 2
 
     def free(grasp: Grasp) -> bool:
-        own = apply(inverse(grasp.body_from_tool), points)
-        behind = (own[:, 2] < PALM_ROOM - PALM_BEHIND) & (own[:, 2] > -HAND_END)
-        return not bool(np.any(behind & np.all(np.abs(own[:, :2]) < half, axis=1)))
+        points_in_hand = apply(inverse(grasp.body_from_tool), points)
+        behind = (points_in_hand[:, 2] < PALM_ROOM - PALM_BEHIND) & (points_in_hand[:, 2] > -HAND_END)
+        return not bool(np.any(behind & np.all(np.abs(points_in_hand[:, :2]) < half, axis=1)))
 
     return [grasp for grasp in grasps if free(grasp)]
 
 
-def _bearable(model: WorldModel, item: str, grasps: list[Grasp]) -> list[Grasp]:
+def _bearable_grasps(model: WorldModel, item: str, grasps: list[Grasp]) -> list[Grasp]:
     """Return the grasps in which the fingers bear the moment of a carrier and its load. Raises MotionFailed `no_grasp`
     when it turns in all of them."""
     if not grasps:
@@ -129,7 +134,7 @@ def _retreat(world_from_tool: np.ndarray, distance: float) -> np.ndarray:
     return pose
 
 
-def _shifted(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
+def _shifted_pose(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
     moved = pose.copy()
     moved[:3, 3] += shift
     return moved
@@ -173,7 +178,7 @@ def plan_pick(
     widest = model.description.opening + budgets.size_uncertainty
     # what is laden is held straight from above: the load stays level while the arm moves
     grasps = (
-        _bearable(model, item, rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty))
+        _bearable_grasps(model, item, rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty))
         if model.laden(item)
         else []
     )
@@ -251,7 +256,7 @@ def _try_pick(
     world_from_tool = world_from_item @ grasp.body_from_tool
     checker = model.checker
     opening = model.description.opening
-    model.robot.set(_open(state, opening))
+    model.robot.set(_opened_configuration(state, opening))
     checker.allow(touch=model.links(item))
     arm = arm_planner.reachable(base, world_from_tool, tally)
     if arm is None or not arm_planner.free(base, arm, tally):
@@ -264,17 +269,17 @@ def _try_pick(
     tool_from_item = inverse(world_from_tool) @ world_from_item
     # What overlaps the item where it is believed to be is an error of belief: it may overlap as much on the way out.
     within = {link: depth + 0.003 for link, depth in checker.overlaps(item).items()}
-    rest = {link: RESTING_DEPTH for link in (*model.links(source), *_supports(model, item))}
-    rest = {link: max(within.get(link, 0.0), depth) for link, depth in rest.items()} | {
-        link: depth for link, depth in within.items() if link not in rest
+    allowed_depths = {link: RESTING_DEPTH for link in (*model.links(source), *_supports(model, item))}
+    allowed_depths = {link: max(within.get(link, 0.0), depth) for link, depth in allowed_depths.items()} | {
+        link: depth for link, depth in within.items() if link not in allowed_depths
     }
     lifted = None
     laden = model.laden(item)
     checker.carry(item, tool_from_item)
-    checker.allow(touch=model.links(item), rest_on=rest)
+    checker.allow(touch=model.links(item), rest_on=allowed_depths)
     try:
         for lift in (RAISE,) if laden else (LIFT, 0.012):
-            up = arm_planner.line(base, arm, _shifted(world_from_tool, np.array([0, 0, lift])), tally)
+            up = arm_planner.line(base, arm, _shifted_pose(world_from_tool, np.array([0, 0, lift])), tally)
             if up is None:
                 continue
             checker.allow(touch=model.links(item), rest_on=within)
@@ -283,16 +288,16 @@ def _try_pick(
                 break
             steep = grasp.pitch > 1.2
             for distance in (0.25, 0.15):
-                goal = _shifted(world_from_tool, np.array([0.0, 0.0, lift]))
+                goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
                 flat = goal[:3, 2] * np.array([1, 1, 0])
                 shift = np.array([0, 0, distance]) if steep else -flat / max(np.linalg.norm(flat), 1e-6) * distance
-                back = arm_planner.line(base, up[-1], _shifted(goal, shift), tally)
+                back = arm_planner.line(base, up[-1], _shifted_pose(goal, shift), tally)
                 if back is not None:
                     lifted = np.concatenate([up, back[1:]])
                     break
             if lifted is not None:
                 break
-            checker.allow(touch=model.links(item), rest_on=rest)
+            checker.allow(touch=model.links(item), rest_on=allowed_depths)
         if lifted is None:
             return None
         checker.allow(touch=model.links(item))
@@ -307,7 +312,7 @@ def _try_pick(
     finally:
         checker.put_down(world_from_item)
         checker.allow(touch=model.links(item))
-    model.robot.set(_open(state, opening))
+    model.robot.set(_opened_configuration(state, opening))
     checker.allow()
     try:
         reach = arm_planner.path(base, state.arm, approach[0])
@@ -327,7 +332,7 @@ def _try_pick(
     )
 
 
-def _open(state: RobotState, opening: float) -> Configuration:
+def _opened_configuration(state: RobotState, opening: float) -> Configuration:
     return Configuration(state.base, state.arm, opening)
 
 
@@ -368,26 +373,28 @@ def plan_place(
         )
     serves = True
     if on_tray and places:
-        places, serves = _liftable(model, item, target, door, budgets, random, places, preferred, further)
+        places, serves = _liftable_places(model, item, target, door, budgets, random, places, preferred, further)
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     checker = model.checker
     queue: list[tuple[np.ndarray, Placement]] = []
     wish = [] if preferred is None else [(preferred[0], Placement(preferred[1], *_cover(places, preferred[1])))]
-    model.robot.set(_open(state, model.description.opening))
+    model.robot.set(_opened_configuration(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     checker.allow(touch=model.links(item))
-    for place in places[: max(4, budgets.bases // 6)]:
-        goal = place.world_from_item[:3, 3]
+    for placement in places[: max(4, budgets.bases // 6)]:
+        goal = placement.world_from_item[:3, 3]
         if base is None:
             bases = possible_bases(model.description, state.base, goal, model.room, budgets.bases // 8, random)
             bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
         else:
             bases = base[None]
-        queue += [(at, place) for at in bases]
+        queue += [(at, placement) for at in bases]
     queue = wish + queue[: budgets.pairs] if serves else queue[: budgets.pairs] + wish
     try:
-        attempts = (_try_place(model, state, item, target, at, place, arm_planner, tally) for at, place in queue)
+        attempts = (
+            _try_place(model, state, item, target, at, placement, arm_planner, tally) for at, placement in queue
+        )
         motion = _first_motion(attempts, budgets.paths)
         if motion is not None:
             return motion
@@ -398,7 +405,7 @@ def plan_place(
     raise AssertionError("unreachable")
 
 
-def _liftable(
+def _liftable_places(
     model: WorldModel,
     item: str,
     tray: str,
@@ -413,18 +420,19 @@ def _liftable(
     first, and whether the preferred one (see `plan_place`) does what the best of them do: it was chosen on a tray that
     was believed to be another."""
     wish = [] if preferred is None else [preferred[1]]
-    poses = np.array([*(place.world_from_item for place in places), *wish])
-    left = lifts_left(model, tray, item, poses, budgets.size_uncertainty)
-    later = left
-    if further and left.any():
+    poses = np.array([*(placement.world_from_item for placement in places), *wish])
+    lifts_now = lifts_left(model, tray, item, poses, budgets.size_uncertainty)
+    later = lifts_now
+    if further and lifts_now.any():
         spots = sample_placements(model, further[0], tray, door, random)
         beside = np.array([spot.world_from_item for spot in spots]).reshape(-1, 4, 4)
         later = lifts_left_beside(model, tray, item, poses, further[0], beside, budgets.size_uncertainty)
     order = sorted(
-        range(len(places)), key=lambda index: (not later[index], not places[index].roomy, -later[index], -left[index])
+        range(len(places)),
+        key=lambda index: (not later[index], not places[index].roomy, -later[index], -lifts_now[index]),
     )
-    serves = all(counts[-1] or not counts.any() for counts in (left, later))
-    return [places[index] for index in order if left[index] or not left.any()], serves
+    serves = all(counts[-1] or not counts.any() for counts in (lifts_now, later))
+    return [places[index] for index in order if lifts_now[index] or not lifts_now.any()], serves
 
 
 def _cover(places: list[Placement], world_from_item: np.ndarray) -> tuple[bool, bool]:
@@ -451,36 +459,36 @@ def _try_place(
         return level_place(model, state, item, base, placement, rest_on, arm_planner, tally)
     checker = model.checker
     item_from_tool = inverse(state.tool_from_item)
-    model.robot.set(_open(state, model.description.opening))
+    model.robot.set(_opened_configuration(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
-    place = placement.world_from_item
+    item_pose = placement.world_from_item
     # a foot that is let down on a tray's rim tips over
     depth = 0.0 if model.records[target].carriable else RESTING_DEPTH
-    touch, rest = model.links(item), dict.fromkeys(model.links(target), depth)
-    checker.allow(touch=touch, rest_on=rest)
+    touch, allowed_depths = model.links(item), dict.fromkeys(model.links(target), depth)
+    checker.allow(touch=touch, rest_on=allowed_depths)
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
-    outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])
+    outward = np.arctan2(*(item_pose[:2, 3] - base[:2])[::-1])
     upright_from_item = model.standing(item)
     hand = (upright_from_item @ item_from_tool)[:3, 2]
     steep = abs(hand[2]) > 0.95
     for wish in (0.0, 0.6, -0.6):
-        yaw = float(np.arctan2(place[1, 0], place[0, 0])) if steep else outward - np.arctan2(hand[1], hand[0])
-        upright = transform_from_yaw(yaw + wish, place[:3, 3]) @ upright_from_item
+        yaw = float(np.arctan2(item_pose[1, 0], item_pose[0, 0])) if steep else outward - np.arctan2(hand[1], hand[0])
+        upright = transform_from_yaw(yaw + wish, item_pose[:3, 3]) @ upright_from_item
         world_from_tool = upright @ item_from_tool
         arm = arm_planner.reachable(base, world_from_tool, tally)
         if arm is None or not arm_planner.free(base, arm, tally):
             continue
         height = LIFT if placement.covered else DRAWER_LIFT if placement.in_drawer else APPROACH
-        above = _shifted(world_from_tool, np.array([0, 0, height]))
+        above = _shifted_pose(world_from_tool, np.array([0, 0, height]))
         down = arm_planner.line(base, arm, above, tally)
         if down is None:
             continue
         checker.allow(touch=touch)
         if placement.covered:
             flat = above[:3, 2] * np.array([1, 1, 0])
-            out = arm_planner.line(base, down[-1], _shifted(above, -0.25 * flat), tally)
+            out = arm_planner.line(base, down[-1], _shifted_pose(above, -0.25 * flat), tally)
             if out is None:
-                checker.allow(touch=touch, rest_on=rest)
+                checker.allow(touch=touch, rest_on=allowed_depths)
                 continue
             down = np.concatenate([down, out[1:]])
         break
@@ -494,7 +502,7 @@ def _try_place(
     checker.put_down(upright)
     try:
         opening = model.description.opening
-        model.robot.set(_open(state, opening))
+        model.robot.set(_opened_configuration(state, opening))
         checker.allow(touch=touch)
         away_pose = _retreat(world_from_tool, APPROACH + 0.02)
         away = arm_planner.line(base, arm, away_pose, tally)

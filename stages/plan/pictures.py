@@ -20,9 +20,10 @@ from scenewright.stages.kit.simulation.world import PhysicsWorld
 HAND, FINGER, PEDESTAL, ARM = (70, 72, 78), (40, 42, 46), (58, 66, 84), (236, 238, 240)
 """Colours of the robot."""
 PALETTE = ((166, 143, 120), (139, 158, 171), (171, 139, 139), (146, 164, 136), (181, 166, 127), (150, 141, 168))
+"""Colours (sRGB) of furniture that has none of its own, in turn; by eye."""
 
 
-def _moved(soup: TriangleSoup, pose: np.ndarray) -> TriangleSoup:
+def _moved_soup(soup: TriangleSoup, pose: np.ndarray) -> TriangleSoup:
     turn = pose[:3, :3].T.astype(np.float32)
     return replace(
         soup,
@@ -32,13 +33,13 @@ def _moved(soup: TriangleSoup, pose: np.ndarray) -> TriangleSoup:
     )
 
 
-def _joined(soups: list[TriangleSoup]) -> TriangleSoup:
+def _join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
     names = ("corners", "face_normals", "corner_normals", "corner_colors", "instance", "material")
     columns = {name: np.concatenate([getattr(soup, name) for soup in soups]) for name in names}
     return TriangleSoup(**columns, material_table=soups[0].material_table)
 
 
-def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
+def _painted_mesh(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
     plain = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     paint(plain, np.array([*color, 255], dtype=np.uint8))
     return plain
@@ -57,18 +58,18 @@ class RoomPictures:
         low, high = [], []
         for number, (name, record) in enumerate(records.items(), start=1):
             shapes = link_shapes(texts[name], "visual")
-            parts = {joint.part for joint in record.joints}
+            joint_links = {joint.part for joint in record.joints}
             for link, meshes in shapes.items():
                 colored = [
-                    mesh if has_colors(mesh) else _painted(mesh, PALETTE[number % len(PALETTE)]) for mesh in meshes
+                    mesh if has_colors(mesh) else _painted_mesh(mesh, PALETTE[number % len(PALETTE)]) for mesh in meshes
                 ]
                 if not any(len(mesh.faces) for mesh in colored):
                     continue
                 soup = build_soup([(number, mesh) for mesh in colored])
-                if record.movable or link in parts:
+                if record.movable or link in joint_links:
                     self._moving[link] = soup
                     continue
-                placed = _moved(soup, world.link_pose(name, link))
+                placed = _moved_soup(soup, world.link_pose(name, link))
                 if record.class_name == "wall":
                     self._shell.append(placed)
                 elif record.class_name != "ceiling":
@@ -81,24 +82,28 @@ class RoomPictures:
         for link, meshes in link_shapes(mobile_robot_urdf(robot)).items():
             if meshes:
                 color = colors.get(link, ARM)
-                self._moving[f"robot/{link}"] = build_soup([(10_000, _painted(mesh, color)) for mesh in meshes])
+                self._moving[f"robot/{link}"] = build_soup([(10_000, _painted_mesh(mesh, color)) for mesh in meshes])
 
     def _renderer(self, snapshot: Snapshot, shell: bool) -> SceneRenderer:
-        moving = [_moved(soup, snapshot.links[link]) for link, soup in self._moving.items() if link in snapshot.links]
+        moving = [
+            _moved_soup(soup, snapshot.links[link]) for link, soup in self._moving.items() if link in snapshot.links
+        ]
         if not shell:
-            return SceneRenderer(_joined([*self._still, *moving]), antialias=False)
+            return SceneRenderer(_join_soups([*self._still, *moving]), antialias=False)
         x, y = (self.low + self.high)[:2] / 2
         lights = (
             AreaLight((x + 0.8, y - 0.6, 9.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.62, 0.60, 0.57)),
             AreaLight((x - 0.9, y + 0.9, 8.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.18, 0.19, 0.21)),
         )
-        return SceneRenderer(_joined([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49))
+        return SceneRenderer(
+            _join_soups([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49)
+        )
 
     def sight(self, world: PhysicsWorld) -> SceneRenderer:
         """Return what cameras in the room see now, the robot aside."""
         links = moving_links(world)
-        moving = [_moved(soup, links[link]) for link, soup in self._moving.items() if link in links]
-        return SceneRenderer(_joined([*self._still, *self._shell, *moving]), shadows=False, antialias=False)
+        moving = [_moved_soup(soup, links[link]) for link, soup in self._moving.items() if link in links]
+        return SceneRenderer(_join_soups([*self._still, *self._shell, *moving]), shadows=False, antialias=False)
 
     def overview(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
         """Return (H, W, 3) uint8: the whole room from above and aside, without walls and ceiling."""
@@ -116,7 +121,7 @@ class RoomPictures:
     def near(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
         """Return (H, W, 3) uint8: the robot at work, from where most of it and of its fingers can be seen."""
         renderer = self._renderer(snapshot, True)
-        robot = np.array([snapshot.links[name][:3, 3] for name in sorted(self._shown(snapshot))])
+        robot = np.array([snapshot.links[name][:3, 3] for name in sorted(self._arm_links(snapshot))])
         hand = snapshot.links[f"robot/{self.robot.hand_link}"]
         points = np.concatenate([robot, apply(hand, np.array([[0, 0, 0.08], [0, 0, 0.11], [0, 0, 0.13]]))])
         weights = np.concatenate([np.full(len(robot), 0.5 / len(robot)), np.full(3, 0.5 / 3)])
@@ -139,7 +144,7 @@ class RoomPictures:
         up_target = np.array([middle[0], middle[1], 0.85 * middle[2] + 0.05])
         return renderer.render(camera, look_at(eye, up_target)).color
 
-    def _shown(self, snapshot: Snapshot) -> list[str]:
+    def _arm_links(self, snapshot: Snapshot) -> list[str]:
         """Return the names in a snapshot of the robot's links from the foot of its arm to its hand."""
         others = {"anchor", "slide_x", "slide_y", PEDESTAL_LINK, self.robot.tool_link, *self.robot.finger_links}
         links = [name for name in snapshot.links if name.startswith("robot/")]

@@ -34,8 +34,8 @@ def plan_text(plan: PlanFile, steps: list[Step]) -> str:
     if plan.failures:
         lines += ["", "failures on the way:"]
         for failure in plan.failures:
-            place = f" in {failure.action}" if failure.action else ""
-            lines.append(f"  {failure.kind}{place}: {failure.message}")
+            in_action = f" in {failure.action}" if failure.action else ""
+            lines.append(f"  {failure.kind}{in_action}: {failure.message}")
     if plan.assumptions:
         lines += ["", "what the execution was allowed to know:"]
         lines += [f"  - {text}" for text in plan.assumptions]

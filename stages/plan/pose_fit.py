@@ -7,6 +7,7 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scipy.spatial import cKDTree
 
 ROUNDS = 25
+"""Steps of one fit; by eye."""
 KEPT = 0.8
 """Share of the seen points, the nearest, that a round goes by: the rest may be of something else."""
 FAR = 0.05
@@ -33,8 +34,8 @@ def fit_upright(seen: np.ndarray, shape: np.ndarray, *, as_believed: bool = Fals
     for _ in range(ROUNDS):
         back = (seen - motion[:3, 3]) @ motion[:3, :3]
         away, nearest = tree.query(back)
-        near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
-        step = align_upright(apply(motion, shape[nearest[near]]), seen[near])
+        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
+        step = align_upright(apply(motion, shape[nearest[nearest_rows]]), seen[nearest_rows])
         motion = step @ motion
         if np.abs(step - np.eye(4)).max() < 1e-5:
             break

@@ -22,6 +22,7 @@ from scenewright.stages.plan.world_model import WorldModel
 MOST_GOALS, GOAL_STATES = 6, 6000
 """Alternatives of a goal that are given geometry; states of the search that ranks them."""
 REACHED = "goal-reached"
+"""Predicate that is added to the task: one of the goal's alternatives holds."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,8 @@ class Reading:
         """Return the task of ground literals. Raises UsageError as `parse_goal` does."""
         if self.given is not None:
             initial |= self.given.perceived(model, graph)
-        wanted, unwanted = self._atoms(model, objects, literals)
-        return replace(task_problem(objects, initial, wanted), negative_goal=unwanted)
+        goal_atoms, unwanted = self._atoms(model, objects, literals)
+        return replace(task_problem(objects, initial, goal_atoms), negative_goal=unwanted)
 
     def task(self, model: WorldModel, problem: Problem) -> tuple[Problem, list[GroundAction]]:
         """Return the problem without negation and its ground actions. Raises BadInput as `GivenDomain.task` does."""
@@ -67,11 +68,11 @@ class Reading:
             texts += [text] if words is None else [literal_text((atom, True)) for atom in sorted(words)]
         if self.given is None and all(_plain(text) for text in texts):
             return [parse_goal(tuple(texts), objects)[1]]
-        names = Names(_classes(model) | _joints(objects), partial(self._meant, objects))
-        found = together([alternatives(text, names) for text in texts], " ".join(goal))
-        if not found:
+        names = Names(_classes(model) | _joints(objects), partial(self._meaning, objects))
+        alternatives_found = together([alternatives(text, names) for text in texts], " ".join(goal))
+        if not alternatives_found:
             raise UsageError(f"goal {' '.join(goal)[:200]!r} can never hold", hint="docs/PLANNING.md, Goals")
-        return self._ranked(model, graph, objects, initial, found)
+        return self._rank(model, graph, objects, initial, alternatives_found)
 
     def check(self, model: WorldModel, graph: ContactGraphFile, literal: str) -> Check | None:
         """Return whether a literal of a learned predicate holds; None for one that the room itself is asked for."""
@@ -80,29 +81,29 @@ class Reading:
         plain = literal.removeprefix("not ")
         name, inner = plain.rstrip(")").split("(")
         atom = (name, *(word.strip() for word in inner.split(",") if word.strip()))
-        found = self.given.check(model, graph, atom, literal)
-        return found if found is None or plain == literal else negated(found)
+        verdict = self.given.check(model, graph, atom, literal)
+        return verdict if verdict is None or plain == literal else negated(verdict)
 
     def _atoms(
         self, model: WorldModel, objects: dict[str, str], literals: tuple[str, ...]
     ) -> tuple[frozenset[Atom], frozenset[Atom]]:
-        wanted: set[Atom] = set()
+        to_hold: set[Atom] = set()
         unwanted: set[Atom] = set()
-        names = Names(_classes(model) | _joints(objects), partial(self._meant, objects))
+        names = Names(_classes(model) | _joints(objects), partial(self._meaning, objects))
         for literal in literals:
             (alternative, *_) = alternatives(literal, names) or (frozenset(),)
-            wanted |= {atom for atom, holds in alternative if holds}
+            to_hold |= {atom for atom, holds in alternative if holds}
             unwanted |= {atom for atom, holds in alternative if not holds}
-        return frozenset(wanted), frozenset(unwanted)
+        return frozenset(to_hold), frozenset(unwanted)
 
-    def _meant(self, objects: dict[str, str], atom: Atom, text: str, quantified: bool) -> frozenset[Atom] | None:
+    def _meaning(self, objects: dict[str, str], atom: Atom, text: str, quantified: bool) -> frozenset[Atom] | None:
         """Return what an atom of a goal stands for: the chain's, or a predicate of the given domain."""
         name = atom[0].removesuffix(f"-{TAUGHT}")
         if self.given is None or name not in self.given.domain.predicates:
             return _of_chain(objects, atom, quantified)
-        wanted = len(self.given.domain.predicates[name])
-        if len(atom) - 1 != wanted:
-            raise UsageError(f"goal {text!r}: {name} takes {wanted} arguments")
+        argument_count = len(self.given.domain.predicates[name])
+        if len(atom) - 1 != argument_count:
+            raise UsageError(f"goal {text!r}: {name} takes {argument_count} arguments")
         for term in atom[1:]:
             if term not in objects:
                 raise UsageError(f"goal {text!r}: the scene has no {term!r}")
@@ -110,27 +111,27 @@ class Reading:
             return _of_chain(objects, atom, quantified)
         return frozenset({(self.given.name_here(name), *atom[1:])})
 
-    def _ranked(
+    def _rank(
         self,
         model: WorldModel,
         graph: ContactGraphFile,
         objects: dict[str, str],
         initial: frozenset[Atom],
-        found: tuple[Alternative, ...],
+        alternatives_found: tuple[Alternative, ...],
     ) -> list[tuple[str, ...]]:
         """Return alternatives as literals in the order in which one search after the other reaches them."""
-        left = {tuple(sorted(map(literal_text, each))): each for each in found}
+        unranked = {tuple(sorted(map(literal_text, each))): each for each in alternatives_found}
         ranked: list[tuple[str, ...]] = []
-        if any(not each for each in left):
+        if any(not each for each in unranked):
             return [()]
         if self.given is not None:
             initial |= self.given.perceived(model, graph)
-        unwanted = frozenset(atom for each in found for atom, holds in each if not holds)
+        unwanted = frozenset(atom for each in alternatives_found for atom, holds in each if not holds)
         start = replace(task_problem(objects, initial, frozenset()), negative_goal=unwanted)
         problem, actions = self.task(model, start)
         problem = replace(problem, goal=frozenset({(REACHED,)}))
-        while left and len(ranked) < MOST_GOALS:
-            ways = [
+        while unranked and len(ranked) < MOST_GOALS:
+            achievers = [
                 GroundAction(
                     REACHED,
                     literals,
@@ -138,14 +139,14 @@ class Reading:
                     frozenset({(REACHED,)}),
                     frozenset(),
                 )
-                for literals, each in left.items()
+                for literals, each in unranked.items()
             ]
-            plan = plan_task(problem, [*actions, *ways], limit=GOAL_STATES, improvement=100)
-            chosen = plan.actions[-1].arguments if plan.actions else next(iter(left))
+            plan = plan_task(problem, [*actions, *achievers], limit=GOAL_STATES, improvement=100)
+            chosen = plan.actions[-1].arguments if plan.actions else next(iter(unranked))
             if not plan.actions and ranked:
                 break  # what is left can't be reached
             ranked.append(chosen)
-            del left[chosen]
+            del unranked[chosen]
         return ranked
 
 

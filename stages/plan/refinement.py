@@ -25,7 +25,7 @@ DRIVE = "drive"
 LADEN_PACE = 0.25
 """Share of the full speed at which the robot drives with a laden tray."""
 BASES = 3
-"""From so many bases is an action tried that the robot does not get to."""
+"""Most bases from which an action is tried that the robot does not get to."""
 FINAL = ("no_grasp",)
 """Failures that no other draw of the random choices can avoid."""
 
@@ -74,7 +74,9 @@ def put_there_later(
     if action_named(name).hand != "puts":
         return ()
     return tuple(
-        later[0] for other, later in following if action_named(other).hand == "puts" and later[1] == arguments[1]
+        later[0]
+        for later_name, later in following
+        if action_named(later_name).hand == "puts" and later[1] == arguments[1]
     )
 
 
@@ -87,12 +89,12 @@ def refine_action(
     at most. Raises MotionFailed; the model is then as before.
     """
     snapshot = model.snapshot()
-    for left in reversed(range(BASES)):
+    for tries_left in reversed(range(BASES)):
         try:
-            return _refined(model, state, name, request, origin)
+            return _refine_from_bases(model, state, name, request, origin)
         except _NoWay as no_way:
             model.restore(snapshot)
-            if not left:
+            if not tries_left:
                 raise no_way.failed from None
             request = replace(request, preferred=None)
         except MotionFailed:
@@ -109,7 +111,7 @@ class _NoWay(Exception):
         self.failed = failed
 
 
-def _refined(
+def _refine_from_bases(
     model: WorldModel, state: RobotState, name: str, request: MotionRequest, origin: str
 ) -> tuple[list[Step], RobotState]:
     """As `refine_action`, by the first bases that manipulations are found from. Raises MotionFailed and _NoWay."""
@@ -158,19 +160,19 @@ def refine_plan(
     origin = START
     plain = [(action.name, action.arguments) for action in actions]
     try:
-        for place, action in enumerate(actions):
+        for index, action in enumerate(actions):
             kind, arguments = action_named(action.name), action.arguments
             if not kind.has_motion:
                 continue
-            style = grasp_style(model, arguments[0], plain[place + 1 :]) if kind.hand == "takes" else "any"
+            style = grasp_style(model, arguments[0], plain[index + 1 :]) if kind.hand == "takes" else "any"
             try:
-                further = put_there_later(kind.name, arguments, plain[place + 1 :])
+                further = put_there_later(kind.name, arguments, plain[index + 1 :])
                 request = MotionRequest(arguments, budgets, random, style=style, further=further)
-                own, state = refine_action(model, state, kind.name, request, origin)
+                action_steps, state = refine_action(model, state, kind.name, request, origin)
             except MotionFailed as failed:
                 failure = failed.failure.model_copy(update={"action": action.text})
-                raise RefinementFailed(place, action, failure) from None
-            steps += own
+                raise RefinementFailed(index, action, failure) from None
+            steps += action_steps
             origin = kind.target(arguments)
     finally:
         model.restore(snapshot)
@@ -252,7 +254,7 @@ def _no_task_plan(problem: Problem, plan: TaskPlan, lessons: Lessons) -> Failure
     without = f" ({'; '.join(lessons.words)})" if lessons.words else ""
     if plan.unreachable:
         names = ", ".join(atom_text(atom) for atom in plan.unreachable)
-        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, plan.unreachable)}"
+        message = f"no sequence of actions makes {names} true{without}{_lacking_affordances(problem, plan.unreachable)}"
     elif plan.exhausted:
         names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
         message = f"each of {names} can be reached, but not all together{without}"
@@ -267,18 +269,18 @@ def _no_task_plan(problem: Problem, plan: TaskPlan, lessons: Lessons) -> Failure
     )
 
 
-def _lacking(problem: Problem, unreachable: tuple[Atom, ...]) -> str:
+def _lacking_affordances(problem: Problem, unreachable: tuple[Atom, ...]) -> str:
     """Return the affordances that goals lack, in words: why they cannot be reached, as far as single things say it."""
     words = []
     for predicate, *names in unreachable:
         item, target = names[0], names[-1]
         if predicate in ("open", "closed"):
-            wanted: tuple[Atom, ...] = (("reachable", item),)
+            affordances: tuple[Atom, ...] = (("reachable", item),)
         else:
-            wanted = (("graspable", item), ("reachable", item))
-        words += [f"{atom[1]} is not {atom[0]}" for atom in wanted if atom not in problem.initial]
+            affordances = (("graspable", item), ("reachable", item))
+        words += [f"{atom[1]} is not {atom[0]}" for atom in affordances if atom not in problem.initial]
         doors = [atom[1] for atom in problem.initial if atom[0] == "entrance" and atom[2] == target]
         places = {"on": [target], "in": doors}.get(predicate, [])
-        if places and not any(("fits", item, place) in problem.initial for place in places):
+        if places and not any(("fits", item, target_name) in problem.initial for target_name in places):
             words.append(f"{target} has no room for {item}")
     return f": {', '.join(dict.fromkeys(words))}" if words else ""

@@ -16,9 +16,13 @@ from scenewright.stages.kit.motion.doors import body_from_moved
 from scenewright.stages.kit.simulation.shapes import joined
 
 LEVEL = 0.98
+"""Least upward part of the normal of a face that things stand on (11 degrees); by eye."""
 MERGE_HEIGHT = 0.006
+"""Faces whose heights differ by less are one surface [m]; by eye."""
 LEAST_AREA = 0.005
+"""Smaller surfaces carry nothing [m^2]; by eye."""
 LEAST_WIDTH = 0.06
+"""Narrower surfaces carry nothing [m]; by eye."""
 LEAST_SURFACE = 0.2
 """Share of the rectangle that has to have surface."""
 LEAST_CLEARANCE = 0.04
@@ -32,11 +36,13 @@ LEAST_WAY_OUT = 0.4
 NEAR_LEVEL = 0.06
 """An item stands on a region when its bottom is at most this far from its level [m]."""
 BESIDE = 0.03
+"""How far the middle of a foot may lie outside of the region that it stands on [m]; by eye."""
 SLIDE_STEP = 0.015
-"""Of a drawer, between two looks at what is over it [m]: rails are not thinner."""
+"""Distance between two looks at what is over a drawer as it slides [m]: rails are not thinner."""
 CELL = 0.02
 """Edge of the cells on which surface and free height are noted [m]."""
 CIRCLE = np.column_stack([np.cos(np.pi / 4 * np.arange(8)), np.sin(np.pi / 4 * np.arange(8))])
+"""Eight directions around a spot (8, 2), of length 1."""
 
 
 @dataclass(frozen=True)
@@ -129,17 +135,17 @@ def _levels(shape: _Shape, number: int) -> list[tuple[np.ndarray, np.ndarray, fl
     up = np.flatnonzero((shape.owner == number) & (shape.mesh.face_normals[:, 2] > LEVEL))
     triangles = shape.mesh.triangles[up]
     heights, areas = triangles[:, :, 2].mean(axis=1), shape.mesh.area_faces[up]
-    left = np.ones(len(up), dtype=bool)
+    unused = np.ones(len(up), dtype=bool)
     levels = []
-    for place in np.argsort(-heights, kind="stable"):
-        if not left[place]:
+    for face in np.argsort(-heights, kind="stable"):
+        if not unused[face]:
             continue
-        group = left & (np.abs(heights - heights[place]) < MERGE_HEIGHT)
-        left &= ~group
+        group = unused & (np.abs(heights - heights[face]) < MERGE_HEIGHT)
+        unused &= ~group
         corners = triangles[group].reshape(-1, 3)
         low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
         if areas[group].sum() > LEAST_AREA and float((high - low).min()) > LEAST_WIDTH:
-            levels.append((low, high, float(heights[place])))
+            levels.append((low, high, float(heights[face])))
     return levels
 
 
@@ -215,9 +221,9 @@ def region_at(regions: Iterable[Region], feet: Iterable[np.ndarray]) -> Region |
     """Return the region on which a thing stands, None when it stands on none of them. `feet`: the middle of its foot
     (3,) in the closed body frame of each region."""
     best: tuple[float, Region] | None = None
-    for region, place in zip(regions, feet, strict=True):
-        off = abs(float(place[2]) - region.level)
-        over = bool(np.all(place[:2] > region.low - BESIDE) and np.all(place[:2] < region.high + BESIDE))
+    for region, foot in zip(regions, feet, strict=True):
+        off = abs(float(foot[2]) - region.level)
+        over = bool(np.all(foot[:2] > region.low - BESIDE) and np.all(foot[:2] < region.high + BESIDE))
         if over and off < (NEAR_LEVEL if best is None else best[0]):
             best = (off, region)
     return None if best is None else best[1]

@@ -16,6 +16,7 @@ DEPTH = 0.024
 FOOT_ROOM = 0.012
 """The tool point stays this far over the lowest point of the thing: the finger tips reach below it [m]."""
 LEAST_DEPTH = 0.012
+"""A rim is grasped only where the fingers reach at least so far below it [m]; by eye."""
 THICKEST = 0.03
 """Walls are at most this thick [m]."""
 FINGER_ROOM = 0.045
@@ -23,7 +24,7 @@ FINGER_ROOM = 0.045
 OFFSETS = (-0.09, -0.06, -0.03, 0.03, 0.06, 0.09)
 """Straight walls are taken beside their middle too [m]: the palm has to pass what stands on the tray."""
 FLOOR = 0.008
-"""What is lower than this in a flat thing is its floor [m]."""
+"""Height below which a flat thing's points are its floor [m]."""
 BREADTH = 0.011
 """Half the breadth of a finger tip [m]."""
 WALL_SPAN = 0.035

@@ -37,7 +37,9 @@ from scenewright.stages.plan.tree_state import after_step, graph_of_state, obser
 from scenewright.stages.plan.world_model import RobotState, WorldModel, body_planes
 
 RECORD_RATE = 10.0
+"""Snapshots of the simulation that are kept [1/s]."""
 SETTLE_SECONDS = 1.0
+"""How long the room is left alone before it is looked at [s]; by eye."""
 ROBOT_ERRORS, CAMERA_NOISE = 5, 6
 """Streams of the seed."""
 START = -1
@@ -203,7 +205,7 @@ def execute(
         conduct.steps,
         executed_in="reconstructed" if order.ground_truth is None else "ground_truth",
         checks=checks,
-        matches=tuple(match for name, match in matches.items() if name in _named(conduct.steps, planned)),
+        matches=tuple(match for name, match in matches.items() if name in _names_in_steps(conduct.steps, planned)),
         assumptions=(*used, LOOK_AROUND) if replanning.places else used,
         failures=(*failures, *conduct.failures, *replanning.failures),
         tried=tuple(replanning.tried),
@@ -273,7 +275,7 @@ def _start_failures(physical: PhysicalRobot) -> list[Failure]:
     return []
 
 
-def _named(steps: list[Step], planned: dict[str, SceneBody]) -> set[str]:
+def _names_in_steps(steps: list[Step], planned: dict[str, SceneBody]) -> set[str]:
     """Return the names in the steps' arguments, and the owners of joints among them."""
     arguments = {argument for step in steps for argument in step.arguments}
     return arguments | {name for name in planned for argument in arguments if argument.startswith(f"{name}__")}
@@ -291,13 +293,13 @@ def _differences(
     expected = replace(believed, parents={**believed.parents, **observed[START].parents})
     for number, step in enumerate(steps):
         if number in anew:
-            seen = anew[number]
+            tree_then = anew[number]
             expected = replace(
                 expected,
-                parents={**expected.parents, **seen.parents},
-                poses={**expected.poses, **seen.poses},
-                joints={**expected.joints, **seen.joints},
-                held=seen.held,
+                parents={**expected.parents, **tree_then.parents},
+                poses={**expected.poses, **tree_then.poses},
+                joints={**expected.joints, **tree_then.joints},
+                held=tree_then.held,
             )
         expected = after_step(expected, step)
         if number in observed:
@@ -320,8 +322,8 @@ def draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParame
     images: dict[int, np.ndarray] = {}
     if parameters.video_rate > 0:
         every = max(1, round(RECORD_RATE / parameters.video_rate))
-        wanted = list(range(0, len(recording.snapshots), every))
-        for index in context.progress.track(wanted, description="video"):
+        snapshot_indices = list(range(0, len(recording.snapshots), every))
+        for index in context.progress.track(snapshot_indices, description="video"):
             images[index] = pictures.overview(recording.snapshots[index], small)
     write_execution(
         context.output / "execution.mcap", recording.snapshots, images, small, pictures.overview_pose(small)

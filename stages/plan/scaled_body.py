@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 LENGTHS = (("origin", "xyz"), ("box", "size"), ("cylinder", "radius"), ("cylinder", "length"), ("sphere", "radius"))
+"""Tags and attributes of a URDF that are lengths."""
 
 
 def scaled_text(text: str, scale: float) -> str:

@@ -20,19 +20,20 @@ from scipy.ndimage import convolve
 CELL = 0.005
 """Edge of a cell of the height map [m]."""
 LEAST_POINTS, LEAST_SHARE = 2, 0.4
-"""Of a cell, and of what cells have in the middle: beside an edge single pixels take the depth of what lies behind."""
+"""Least points of a cell, and their share of what cells have in the middle: beside an edge single pixels take the
+depth of what lies behind."""
 TOP = 80
 """Percentile of the heights of a cell's points that is its height: a thin wall has floor beside it."""
 WALL = 0.008
-"""What is higher over the floor is the rim [m]."""
+"""Height over the floor from which on cells are the rim [m]."""
 FLOOR = 0.004
 """A floor is this thick; its lower side is not seen [m]."""
 STEP = 0.006
 """Heights of the rim are told apart by this [m]."""
 BESIDE_LOAD = 0.015
-"""So near to what stands on it pixels may have that thing's depth [m]."""
+"""Distance from what stands on it within which pixels may have that thing's depth [m]."""
 LEAST_CELLS = 100
-"""Of a floor that was seen."""
+"""Least cells of a floor that was seen."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +66,13 @@ def seen_carrier(points: np.ndarray, load: np.ndarray, yaw: float) -> SeenCarrie
     near_load = np.zeros(len(points), dtype=bool)
     for x, y, radius in load:
         near_load |= np.hypot(points[:, 0] - x, points[:, 1] - y) < radius + BESIDE_LOAD
-    own = apply(inverse(transform_from_yaw(turn, np.array([*middle, 0.0]))), points)
-    heights = _heights(own, size)
-    seen = heights[np.isfinite(heights)]
-    if len(seen) < LEAST_CELLS:
+    points_in_box = apply(inverse(transform_from_yaw(turn, np.array([*middle, 0.0]))), points)
+    heights = _heights(points_in_box, size)
+    finite_heights = heights[np.isfinite(heights)]
+    if len(finite_heights) < LEAST_CELLS:
         return None
-    level = float(np.median(seen))
-    heights = _heights(own[~near_load | (own[:, 2] < level + WALL)], size)
+    level = float(np.median(finite_heights))
+    heights = _heights(points_in_box[~near_load | (points_in_box[:, 2] < level + WALL)], size)
     wall = _without_single(np.nan_to_num(heights, nan=-np.inf) > level + WALL)
     low = level - FLOOR
     floor = (np.array([0.0, 0.0, FLOOR / 2]), np.array([*size, FLOOR]))
@@ -94,15 +95,15 @@ def _dense(points: np.ndarray) -> np.ndarray:
     return points[counts[number.reshape(-1)] >= least]
 
 
-def _heights(own: np.ndarray, size: np.ndarray) -> np.ndarray:
+def _heights(points: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Return the height [m] of each cell (X, Y) of a rectangle (2,) about the origin, nan where too little was seen."""
     shape = np.maximum(1, np.rint(size / CELL)).astype(int)
-    cells = np.clip(np.floor((own[:, :2] + size / 2) / size * shape), 0, shape - 1).astype(int)
+    cells = np.clip(np.floor((points[:, :2] + size / 2) / size * shape), 0, shape - 1).astype(int)
     flat = cells[:, 0] * shape[1] + cells[:, 1]
     heights = np.full(int(np.prod(shape)), np.nan)
     order = np.argsort(flat, kind="stable")
     numbers, starts = np.unique(flat[order], return_index=True)
-    for number, group in zip(numbers, np.split(own[order, 2], starts[1:]), strict=True):
+    for number, group in zip(numbers, np.split(points[order, 2], starts[1:]), strict=True):
         if len(group) >= LEAST_POINTS:
             heights[number] = np.percentile(group, TOP)
     return heights.reshape(shape)

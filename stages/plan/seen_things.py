@@ -10,7 +10,7 @@ from scenewright.stages.plan.sticking_out import sticking_out
 from scenewright.stages.plan.thing_fit import fit_thing
 
 POINTS = 3000
-"""On a shape that is fitted."""
+"""Points on a shape that is fitted."""
 
 
 class SeenThings:
@@ -33,28 +33,28 @@ class SeenThings:
         all of it, as places and radii of feet are counted from there.
         """
         planned = self._planned.setdefault(name, text)
-        believed = _moved(pose, -self._middles.get(name, np.zeros(3)))
+        believed = _moved_pose(pose, -self._middles.get(name, np.zeros(3)))
         best, shape, surface = None, planned, None
         for candidate in [planned, *([self._learned[name]] if name in self._learned else [])]:
-            own = _surface(candidate)
-            fit = fit_thing(points, eyes, own, believed)
+            candidate_surface = _surface(candidate)
+            fit = fit_thing(points, eyes, candidate_surface, believed)
             if best is None or fit.misfit < best.misfit:
-                best, shape, surface = fit, candidate, own
+                best, shape, surface = fit, candidate, candidate_surface
         assert best is not None and surface is not None
         if shape == planned:
-            more = sticking_out(apply(inverse(best.pose), points), best.scale * surface[0])
-            if more:
-                shape = with_boxes(planned, [(center / best.scale, size / best.scale) for center, size in more])
+            boxes = sticking_out(apply(inverse(best.pose), points), best.scale * surface[0])
+            if boxes:
+                shape = with_boxes(planned, [(center / best.scale, size / best.scale) for center, size in boxes])
                 self._learned[name] = shape
         middle = np.zeros(3)
         if shape != planned:
             own_points = best.scale * _surface(shape)[0]
             middle[:2] = (own_points.min(axis=0) + own_points.max(axis=0))[:2] / 2
         self._middles[name] = middle
-        return _moved(best.pose, middle), shifted_text(scaled_text(shape, best.scale), -middle)
+        return _moved_pose(best.pose, middle), shifted_text(scaled_text(shape, best.scale), -middle)
 
 
-def _moved(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
+def _moved_pose(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
     """Return a pose (4, 4) moved by a shift (3,) of its own frame."""
     moved = pose.copy()
     moved[:3, 3] += pose[:3, :3] @ shift

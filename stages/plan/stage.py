@@ -112,8 +112,8 @@ def run(
             cameras = None
             if sequence is not None and "pose" in sequence.info.streams:
                 cameras = read_tum(sequence.path("trajectory.tum"))[1][:, :3, 3]
-            asked = Scene(model, graph, objects, initial, reading)
-            state, planning = _find(asked, budgets, parameters, context, cameras)
+            scene_to_plan = Scene(model, graph, objects, initial, reading)
+            state, planning = _find(scene_to_plan, budgets, parameters, context, cameras)
         problem = planning.problem or task_problem(objects, initial, frozenset())
         written = DOMAIN if reading.given is None else reading.given.domain
         context.output.joinpath("domain.pddl").write_text(domain_text(written), encoding="utf-8")
@@ -164,7 +164,7 @@ def _find(
     """Return where the robot starts, and the plan of the first goal that has one (or the first goal, without)."""
     planning, model = Found(), scene.model
     carry = model.description.carry
-    planning.ungrounded = _ungrounded(scene, parameters, context)
+    planning.ungrounded = _warn_of_ungrounded(scene, parameters, context)
     goals = [(scene.problem(literals), literals) for literals in _candidates(scene, parameters, planning.failures)]
     if not goals and not planning.failures:
         planning.failures.append(_nothing_to_do(model, scene.graph, scene.initial))
@@ -216,17 +216,17 @@ def _start(
     return base
 
 
-def _ungrounded(scene: Scene, parameters: PlanParameters, context: Context) -> tuple[str, ...]:
+def _warn_of_ungrounded(scene: Scene, parameters: PlanParameters, context: Context) -> tuple[str, ...]:
     """Return what can't be grounded of a given domain, and say it in one line."""
-    given = scene.reading.given
-    if given is None:
+    domain = scene.reading.given
+    if domain is None:
         return ()
     if parameters.planner != "builtin":
         raise UsageError("--planner fast-downward plans in the scene's own domain", hint="leave --domain or it out")
     classes = {name: record.class_name for name, record in scene.model.records.items()}
-    words = given.ungrounded(scene.objects, classes)
+    words = domain.ungrounded(scene.objects, classes)
     if words:
-        context.logger.warning("%s: can't be grounded in this scene: %s", given.source, "; ".join(words))
+        context.logger.warning("%s: can't be grounded in this scene: %s", domain.source, "; ".join(words))
     return tuple(f"not grounded: {each}" for each in words)
 
 

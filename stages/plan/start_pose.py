@@ -7,6 +7,7 @@ from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.plan.world_model import WorldModel
 
 SHELL = ("floor", "wall", "ceiling")
+"""Classes of the room itself, beside which the robot does not start."""
 
 
 def start_base(

@@ -15,9 +15,10 @@ BEYOND = 0.01
 CELL = 0.005
 """Edge of the cells that they fill [m]."""
 LEAST_POINTS = 3
-"""Of a cell: beside an edge single pixels take a depth between near and far."""
+"""Least points of a cell: beside an edge single pixels take a depth between near and far."""
 LEAST_SHARE = 0.04
-"""Of what was seen. A handle is a tenth or a twentieth of it; strays, from what stands beside a thing, a fortieth."""
+"""Least share of what was seen. A handle is a tenth or a twentieth of it; strays, from what stands beside a thing, a
+fortieth."""
 LINK = 0.03
 """Points of one part are no farther apart [m]."""
 

@@ -8,7 +8,9 @@ from scenewright.schemas.base import as_vector
 from scenewright.schemas.scene_parts import SurfacePlane
 
 MERGE_HEIGHT = 0.01
+"""Faces whose heights differ by less are one plane [m]; by eye."""
 LEAST_AREA = 0.02
+"""Smaller planes are left out [m^2]; by eye."""
 
 
 def top_planes(meshes: list[trimesh.Trimesh]) -> tuple[SurfacePlane, ...]:

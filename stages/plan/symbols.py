@@ -141,9 +141,9 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
             raise UsageError(f"goal {literal!r}: {predicate} takes {len(allowed[predicate])} arguments")
         for name in arguments:
             if name not in objects:
-                near = difflib.get_close_matches(name, objects, n=3, cutoff=0.4)
+                similar_names = difflib.get_close_matches(name, objects, n=3, cutoff=0.4)
                 raise UsageError(
-                    f"goal {literal!r}: the scene has no {name!r}", hint=f"near: {', '.join(near) or 'none'}"
+                    f"goal {literal!r}: the scene has no {name!r}", hint=f"near: {', '.join(similar_names) or 'none'}"
                 )
         normal.append(atom_text((predicate, *arguments)))
         doors = [name for name in objects if name.startswith(f"{arguments[0]}__")]

@@ -15,8 +15,11 @@ from scenewright.stages.plan.world_model import WorldModel
 TaskName = Literal["fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"]
 Goals = list[tuple[str, ...]]
 TABLES = ("table", "desk")
+"""Classes that a task means by tables."""
 SHELVES = ("shelf", "wall_shelf", "cabinet")
+"""Classes that a task means by shelves."""
 MOST_GOALS = 6
+"""Most goals that a task gives; by eye."""
 MOST_STACKED = 2
 """Things put on a tray before it is carried."""
 
@@ -70,7 +73,7 @@ def task_goals(task: TaskName, model: WorldModel, initial: frozenset[Atom]) -> G
     return goals[:MOST_GOALS]
 
 
-def _missing(task: str, message: str, numbers: dict[str, float]) -> MotionFailed:
+def _no_goal(task: str, message: str, numbers: dict[str, float]) -> MotionFailed:
     return MotionFailed("no_goal", f"{task}: {message}", (), numbers)
 
 
@@ -85,7 +88,7 @@ def fridge_to_microwave(facts: SceneFacts) -> Goals:
                 fridge = facts.inside[item]
                 ranked.append((round(facts.width(item), 3), facts.distance(fridge, oven), item, oven, fridge))
     if not ranked:
-        raise _missing(
+        raise _no_goal(
             "fridge-to-microwave",
             f"{len(fridges)} fridges with {len(food)} things that the hand can take, {len(ovens)} microwaves within "
             "reach: none of the things fits into one (what a closed fridge hides can be declared with --assume)",
@@ -110,16 +113,16 @@ def tidy_the_desk(facts: SceneFacts) -> Goals:
                 open_shelf = facts.model.records[target].class_name not in ("shelf", "wall_shelf")
                 ranked.append((-len(fitting), open_shelf, facts.distance(desk, target), fitting, target))
     if not ranked:
-        raise _missing(
+        raise _no_goal(
             "tidy-the-desk",
             f"{len(desks)} desks and {len(targets)} shelves within reach: nothing small on a desk fits on one",
             {"desks": len(desks), "shelves": len(targets)},
         )
     goals = [tuple(atom_text(("on", item, target)) for item in fitting) for _, _, _, fitting, target in sorted(ranked)]
-    return goals[:2] + _shared_out(sorted(ranked)[:2]) + goals[2:]
+    return goals[:2] + _share_out(sorted(ranked)[:2]) + goals[2:]
 
 
-def _shared_out(ranked: list[tuple[int, bool, float, tuple[str, ...], str]]) -> Goals:
+def _share_out(ranked: list[tuple[int, bool, float, tuple[str, ...], str]]) -> Goals:
     """Return goals in which the things of one desk that fit on either of two targets are shared between them."""
     if len(ranked) < 2 or ranked[0][3] != ranked[1][3] or len(ranked[0][3]) < 2:
         return []
@@ -146,7 +149,7 @@ def put_away_in_drawer(facts: SceneFacts) -> Goals:
         for unit in units:
             ranked.append((round(facts.width(item), 3), round(facts.distance(item, unit), 3), item, unit))
     if not ranked:
-        raise _missing(
+        raise _no_goal(
             "put-away-in-drawer",
             f"{len(things)} small things in the open and {len(drawers)} drawers within reach: none fits into one",
             {"items": len(things), "drawers": len(drawers)},
@@ -165,15 +168,17 @@ def stack_and_carry(facts: SceneFacts) -> Goals:
     surfaces = facts.bodies(*TABLES)
     ranked = []
     for tray in trays:
-        here = facts.on[tray]
-        beside = facts.small([item for item, where in facts.on.items() if where in (here, *surfaces)])
+        tray_support = facts.on[tray]
+        beside = facts.small([item for item, where in facts.on.items() if where in (tray_support, *surfaces)])
         beside = sorted(item for item in beside if facts.holds("fits", item, tray))
         for target in surfaces:
-            if target != here and facts.holds("fits", tray, target) and beside:
-                near = sorted(beside, key=lambda item: (facts.on[item] != here, facts.slenderness(item), item))
-                ranked.append((facts.distance(here, target), tray, target, tuple(near)))
+            if target != tray_support and facts.holds("fits", tray, target) and beside:
+                load_order = sorted(
+                    beside, key=lambda item: (facts.on[item] != tray_support, facts.slenderness(item), item)
+                )
+                ranked.append((facts.distance(tray_support, target), tray, target, tuple(load_order)))
     if not ranked:
-        raise _missing(
+        raise _no_goal(
             "stack-and-carry",
             f"{len(trays)} trays that can be lifted and {len(surfaces)} tables within reach: there is no tray with "
             "something small to put on it and another table to carry it to",
@@ -194,3 +199,4 @@ RULES: dict[TaskName, Callable[[SceneFacts], Goals]] = {
     "put-away-in-drawer": put_away_in_drawer,
     "stack-and-carry": stack_and_carry,
 }
+"""Task -> what sets its goals in a scene."""

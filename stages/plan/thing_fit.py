@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 FEW, MANY = 300, 800
 """Points seen that a first and a last fit go by."""
 ROUNDS = 16
+"""Steps of one fit; by eye."""
 KEPT = 0.95
 """Share of the seen points, the nearest, that a round goes by: a handle, which tells the heading, is a tenth."""
 SCALES, FINER = np.linspace(0.8, 1.25, 10), (-0.025, -0.0125, 0.0125, 0.025)
@@ -38,7 +39,7 @@ BESIDE = 0.008
 FACING = 0.3
 """Least cosine between a surface's normal and the way to the camera: flatter ones depth cameras hardly see."""
 CELL, BEHIND = 0.01, 0.015
-"""What lies farther than this behind what the same bundle of rays of this breadth meets is hidden by it [m]."""
+"""Breadth of a bundle of rays, and how far behind what it meets first a surface is hidden by it [m]."""
 
 
 @dataclass(frozen=True)
@@ -60,21 +61,23 @@ def fit_thing(
     `seen` (N, 3): points of it that cameras at `eyes` (K, 3) saw; `shape`: points (M, 3) around it and their outward
     normals, own frame; `believed`: its pose (4, 4), from which another attitude must be better by `SURE`.
     """
-    few, many = _thinned(seen, FEW), _thinned(seen, MANY)
+    few_points, many_points = _thin_out(seen, FEW), _thin_out(seen, MANY)
     turned = [_yaw(2 * np.pi * k / HEADINGS) @ believed[:3, :3] for k in range(HEADINGS)]
-    first = _best_scale(many, eyes, shape, _hopeful(few, eyes, shape, turned, upright=True)[0], upright=True)
+    first = _best_scale(
+        many_points, eyes, shape, _hopeful(few_points, eyes, shape, turned, upright=True)[0], upright=True
+    )
     if first.misfit < FITS + SURE:
         return first
     others = [first]
-    for pose in _hopeful(few, eyes, shape, _attitudes(), upright=False)[:HOPEFUL]:
+    for pose in _hopeful(few_points, eyes, shape, _attitudes(), upright=False)[:HOPEFUL]:
         stands = abs(pose[2, 2]) > LEVEL
-        others.append(_best_scale(many, eyes, shape, _upright(pose) if stands else pose, upright=stands))
+        others.append(_best_scale(many_points, eyes, shape, _upright(pose) if stands else pose, upright=stands))
     best = min(others, key=lambda fit: fit.misfit)
     return best if best.misfit < first.misfit - SURE else first
 
 
 def _hopeful(
-    seen: np.ndarray,
+    seen_points: np.ndarray,
     eyes: np.ndarray,
     shape: tuple[np.ndarray, np.ndarray],
     attitudes: list[np.ndarray],
@@ -82,11 +85,13 @@ def _hopeful(
     upright: bool,
 ) -> list[np.ndarray]:
     """Return the poses (4, 4) that a fit from each of the attitudes (3, 3) ends in, those that fit best first."""
-    poses = [_fitted(seen, shape[0], _over(seen, shape[0], turn), upright=upright) for turn in attitudes]
-    return sorted(poses, key=lambda pose: _misfit(seen, eyes, shape, pose))
+    poses = [
+        _fit_pose(seen_points, shape[0], _over(seen_points, shape[0], turn), upright=upright) for turn in attitudes
+    ]
+    return sorted(poses, key=lambda pose: _misfit(seen_points, eyes, shape, pose))
 
 
-def _thinned(points: np.ndarray, most: int) -> np.ndarray:
+def _thin_out(points: np.ndarray, most: int) -> np.ndarray:
     return points[:: max(1, len(points) // most)]
 
 
@@ -106,68 +111,68 @@ def _upright(pose: np.ndarray) -> np.ndarray:
 
 def _attitudes() -> list[np.ndarray]:
     """Return rotations (3, 3) in which a thing that stood may lie: upright, upside down, on its side."""
-    found = []
+    rotations = []
     for heading in 2 * np.pi * np.arange(HEADINGS) / HEADINGS:
         axis = np.array([np.cos(heading), np.sin(heading), 0.0])
         across = np.array([-axis[1], axis[0], 0.0])
         for roll in 2 * np.pi * np.arange(ROLLS) / ROLLS:
             side = np.cos(roll) * across + np.sin(roll) * np.array([0.0, 0.0, 1.0])
-            found.append(np.column_stack([side, np.cross(axis, side), axis]))
+            rotations.append(np.column_stack([side, np.cross(axis, side), axis]))
     for k in range(ROLLS):
-        found += [_yaw(2 * np.pi * k / ROLLS), _yaw(2 * np.pi * k / ROLLS) @ np.diag([1.0, -1.0, -1.0])]
-    return found
+        rotations += [_yaw(2 * np.pi * k / ROLLS), _yaw(2 * np.pi * k / ROLLS) @ np.diag([1.0, -1.0, -1.0])]
+    return rotations
 
 
-def _over(seen: np.ndarray, shape: np.ndarray, turn: np.ndarray) -> np.ndarray:
+def _over(seen_points: np.ndarray, shape: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Return the pose (4, 4) in an attitude in which the boxes' middles are one over the other, tops level."""
-    own = shape @ turn.T
-    low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
+    turned_shape = shape @ turn.T
+    low, high = np.percentile(seen_points, 2, axis=0), np.percentile(seen_points, 98, axis=0)
     pose = np.eye(4)
     pose[:3, :3] = turn
-    pose[:2, 3] = (low + high - own.min(axis=0) - own.max(axis=0))[:2] / 2
-    pose[2, 3] = high[2] - own[:, 2].max()
+    pose[:2, 3] = (low + high - turned_shape.min(axis=0) - turned_shape.max(axis=0))[:2] / 2
+    pose[2, 3] = high[2] - turned_shape[:, 2].max()
     return pose
 
 
-def _fitted(seen: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: bool) -> np.ndarray:
+def _fit_pose(seen_points: np.ndarray, shape: np.ndarray, pose: np.ndarray, *, upright: bool) -> np.ndarray:
     """Return the pose (4, 4) near a first one at which the seen points lie nearest to the shape, trimmed; `upright`: it
     is turned about the vertical only."""
     tree = cKDTree(shape)
     for _ in range(ROUNDS):
-        away, nearest = tree.query(apply(inverse(pose), seen))
-        near = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen)))]
-        source, target = apply(pose, shape[nearest[near]]), seen[near]
+        away, nearest = tree.query(apply(inverse(pose), seen_points))
+        nearest_rows = np.argsort(away, kind="stable")[: max(3, int(KEPT * len(seen_points)))]
+        source, target = apply(pose, shape[nearest[nearest_rows]]), seen_points[nearest_rows]
         pose = (align_upright if upright else align_rigidly)(source, target) @ pose
     return pose
 
 
 def _best_scale(
-    seen: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray, *, upright: bool
+    seen_points: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray, *, upright: bool
 ) -> FittedThing:
     """Return the fit in the size that fits best, tops level with the top that it begins with."""
 
     def fitted(scale: float) -> FittedThing:
-        own = (scale * shape[0], shape[1])
+        scaled_shape = (scale * shape[0], shape[1])
         start = pose.copy()
         start[2, 3] += (1 - scale) * float((shape[0] @ pose[2, :3]).max())
-        found = _fitted(seen, own[0], start, upright=upright)
-        return FittedThing(found, scale, _misfit(seen, eyes, own, found))
+        fitted_pose = _fit_pose(seen_points, scaled_shape[0], start, upright=upright)
+        return FittedThing(fitted_pose, scale, _misfit(seen_points, eyes, scaled_shape, fitted_pose))
 
     best = min(map(fitted, SCALES.tolist()), key=lambda fit: fit.misfit)
     return min([best, *(fitted(best.scale + step) for step in FINER)], key=lambda fit: fit.misfit)
 
 
-def _misfit(seen: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray) -> float:
+def _misfit(seen_points: np.ndarray, eyes: np.ndarray, shape: tuple[np.ndarray, np.ndarray], pose: np.ndarray) -> float:
     points, normals = apply(pose, shape[0]), shape[1] @ pose[:3, :3].T
-    away, nearest = cKDTree(points).query(seen)
-    beside = np.abs(np.einsum("ij,ij->i", seen - points[nearest], normals[nearest]))
+    away, nearest = cKDTree(points).query(seen_points)
+    beside = np.abs(np.einsum("ij,ij->i", seen_points - points[nearest], normals[nearest]))
     outward = float(np.minimum(np.where(away < BESIDE, beside, away), FAR).mean())
-    shown = np.zeros(len(points), dtype=bool)
+    visible = np.zeros(len(points), dtype=bool)
     for eye in eyes:
-        shown |= in_sight(points, normals, eye)
-    if not shown.any():
+        visible |= in_sight(points, normals, eye)
+    if not visible.any():
         return 2 * FAR
-    away = np.sort(np.minimum(cKDTree(seen).query(points[shown])[0], FAR))
+    away = np.sort(np.minimum(cKDTree(seen_points).query(points[visible])[0], FAR))
     return outward + float(away[: max(1, int(KEPT * len(away)))].mean())
 
 

@@ -12,8 +12,9 @@ from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.plan.refinement import Step
 
 PERIOD = 0.05
-"""Between rows of the planned motion [s]."""
+"""Time between rows of the planned motion [s]."""
 GRIPPER_SECONDS = 0.6
+"""How long the fingers take to close or open [s]; **assumed**."""
 
 
 def planned_rows(steps: list[Step], robot: RobotDescription) -> tuple[dict[str, np.ndarray], list[tuple[int, int]]]:
@@ -33,9 +34,11 @@ def planned_rows(steps: list[Step], robot: RobotDescription) -> tuple[dict[str, 
             opening = 0.0 if segment.item is not None and segment.event != "grasp" else segment.opening
             widths = np.full(len(rows), opening)
             if segment.event:
-                held = round(GRIPPER_SECONDS / PERIOD)
-                rows = np.concatenate([rows, np.tile(rows[-1], (held, 1))])
-                widths = np.concatenate([widths, np.full(held, 0.0 if segment.event == "grasp" else robot.opening)])
+                held_rows = round(GRIPPER_SECONDS / PERIOD)
+                rows = np.concatenate([rows, np.tile(rows[-1], (held_rows, 1))])
+                widths = np.concatenate(
+                    [widths, np.full(held_rows, 0.0 if segment.event == "grasp" else robot.opening)]
+                )
             times.append(clock + PERIOD * np.arange(len(rows)))
             clock += PERIOD * len(rows)
             bodies.append(rows)
@@ -45,7 +48,7 @@ def planned_rows(steps: list[Step], robot: RobotDescription) -> tuple[dict[str, 
         ranges.append((start, count))
     if not bodies:
         return _arrays(np.zeros(0), np.zeros((0, len(speed))), np.zeros(0), np.zeros(0, dtype=np.int32)), ranges
-    columns = [np.concatenate(parts) for parts in (times, bodies, openings, actions)]
+    columns = [np.concatenate(chunks) for chunks in (times, bodies, openings, actions)]
     return _arrays(*columns), ranges
 
 

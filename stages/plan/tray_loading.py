@@ -16,6 +16,7 @@ PALM_ROOM = 0.008
 BESIDE = 0.012
 """Things stand at least this far apart [m]: a finger is between them as one is put down."""
 GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
 
 
 def free_lanes(tool_poses: np.ndarray, feet: np.ndarray, palm: tuple[float, float]) -> np.ndarray:
@@ -85,7 +86,7 @@ class Lifts:
         if not len(self._poses):
             return 0
         at = self._standing | put
-        feet = np.array([[*place, self._radius[name]] for name, place in at.items()])
+        feet = np.array([[*position, self._radius[name]] for name, position in at.items()])
         masses = np.array([self._mass[name] for name in (self._tray, *at)])
         moments = holding_moments(self._poses, np.concatenate([self._middle[None], feet[:, :2]]), masses)
         return int((free_lanes(self._poses, feet, self._hand.palm) & (moments < self._hand.holding_moment)).sum())
@@ -95,7 +96,7 @@ def lifts_left(model: WorldModel, tray: str, item: str, places: np.ndarray, unce
     """Return, per pose world_from_item (N, 4, 4), by how many rim grasps the tray can be lifted when the item stands
     there, the palm over nothing and the fingers bearing the moment: (N,) int. `uncertainty` as in `rim_grasps` [m]."""
     lifts = Lifts(model, tray, (item,), uncertainty)
-    return np.array([lifts.left({item: place[:2, 3]}) for place in places], dtype=int)
+    return np.array([lifts.left({item: pose[:2, 3]}) for pose in places], dtype=int)
 
 
 def lifts_left_beside(
@@ -105,9 +106,11 @@ def lifts_left_beside(
     poses `spots` (M, 4, 4) where it has room; what sticks out of things, as handles do, can be turned away."""
     lifts = Lifts(model, tray, (item, other), uncertainty)
     apart = BESIDE + sum(narrowest_width(model.points(name)) / 2 for name in (item, other))
-    left = np.zeros(len(places), dtype=int)
-    for number, place in enumerate(places):
+    lifts_per_pose = np.zeros(len(places), dtype=int)
+    for number, pose in enumerate(places):
         for spot in spots:
-            if np.linalg.norm(place[:2, 3] - spot[:2, 3]) > apart:
-                left[number] = max(left[number], lifts.left({item: place[:2, 3], other: spot[:2, 3]}))
-    return left
+            if np.linalg.norm(pose[:2, 3] - spot[:2, 3]) > apart:
+                lifts_per_pose[number] = max(
+                    lifts_per_pose[number], lifts.left({item: pose[:2, 3], other: spot[:2, 3]})
+                )
+    return lifts_per_pose

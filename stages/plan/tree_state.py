@@ -56,9 +56,9 @@ def observed_state(
             HAND if match.matched == held else NOTHING if below is None else planned.get(below, f"room:{below}")
         )
     joints = {}
-    for joint, there in joint_names.items():
-        body = next(name for name, entry in world.bodies.items() if there in entry.joints)
-        joints[joint] = world.joint_value(body, there)
+    for joint, room_joint in joint_names.items():
+        body = next(name for name, entry in world.bodies.items() if room_joint in entry.joints)
+        joints[joint] = world.joint_value(body, room_joint)
     return TreeState(parents, poses, joints, planned.get(held) if held is not None else None)
 
 

@@ -22,6 +22,7 @@ from scenewright.stages.poses.world import laid_onto
 LEAST_TRACKS = 30
 """Fewer tracks than this adjust nothing."""
 BELIEVED = 0.5
+"""Least weight, after optimisation, of an edge whose features make tracks; by eye."""
 CONTRADICTION = 4.0
 """The edges that dense alignment gave may contradict the adjusted poses so much more than those before [times]."""
 LOSS_SCALE = 2.0
@@ -79,8 +80,10 @@ def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[i
         return item
 
     for edge in edges:
-        for there, here in _agreeing(keys[edge.target].features, keys[edge.source].features, edge.target_from_source):
-            first, second = root((edge.target, there)), root((edge.source, here))
+        for target_feature, source_feature in _agreeing_features(
+            keys[edge.target].features, keys[edge.source].features, edge.target_from_source
+        ):
+            first, second = root((edge.target, target_feature)), root((edge.source, source_feature))
             parent[max(first, second)] = min(first, second)
     groups: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for item in sorted(parent):
@@ -88,14 +91,14 @@ def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[i
     return [group for group in groups.values() if len(group) > 1 and len({key for key, _ in group}) == len(group)]
 
 
-def _agreeing(target: Features, source: Features, target_from_source: np.ndarray) -> list[tuple[int, int]]:
+def _agreeing_features(target: Features, source: Features, target_from_source: np.ndarray) -> list[tuple[int, int]]:
     pairs = match_features(target, source)
     if not len(pairs):
         return []
     moved = apply(target_from_source, source.points[pairs[:, 1]].astype(float))
     points = target.points[pairs[:, 0]].astype(float)
-    near = np.linalg.norm(moved - points, axis=1) < 0.03 + 0.01 * points[:, 2] ** 2
-    return [(int(a), int(b)) for a, b in pairs[near]]
+    agreeing = np.linalg.norm(moved - points, axis=1) < 0.03 + 0.01 * points[:, 2] ** 2
+    return [(int(a), int(b)) for a, b in pairs[agreeing]]
 
 
 def _bundle(

@@ -27,11 +27,11 @@ def loop_closures(estimate: Estimate) -> tuple[LoopClosure, ...]:
     result = []
     for loop, weight in zip(estimate.loops, weights, strict=True):
         first, second = keys[loop.target], keys[loop.source]
-        error = way = None
+        error = travelled_length = None
         if first.part == second.part:
             by_odometry = between(first.part_from_key, second.part_from_key)
             error = distance_of(between(loop.alignment.target_from_source, by_odometry))
-            way = float(travelled[loop.source] - travelled[loop.target])
+            travelled_length = float(travelled[loop.source] - travelled[loop.target])
         result.append(
             LoopClosure(
                 first=first.frame,
@@ -40,7 +40,7 @@ def loop_closures(estimate: Estimate) -> tuple[LoopClosure, ...]:
                 weight=float(weight),
                 overlap=loop.alignment.overlap,
                 odometry_error=error,
-                path_length=way,
+                path_length=travelled_length,
             )
         )
     return tuple(result)

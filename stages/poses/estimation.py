@@ -18,6 +18,7 @@ from scenewright.stages.poses.places import Ferns
 from scenewright.stages.poses.tracking import Seen, Track, Tracker, TrackingLimits
 
 LEVELS = 3
+"""Levels of the image pyramids in which frames are aligned; by eye."""
 
 
 @dataclass(frozen=True)
@@ -127,17 +128,17 @@ def _close_loops(
         loop = verifier.by_appearance(target, later)
         if loop is not None:
             loops.append(loop)
-    seen, cameras = set(pairs), [source.camera] * len(track.keys)
+    pairs_tried, cameras = set(pairs), [source.camera] * len(track.keys)
     for _ in range(parameters.overlap_rounds):
         every = edges + [edge_of(loop.target, loop.source, loop.alignment, switchable=True) for loop in loops]
         solution = optimize(laid_out(poses, every), every)
         poses = solution.world_from_node
         parts = parts_of(len(poses), believed(every, solution))
-        fresh = overlap_candidates(track.keys, poses, cameras, seen, per_key=parameters.overlap_candidates)
+        fresh = overlap_candidates(track.keys, poses, cameras, pairs_tried, per_key=parameters.overlap_candidates)
         fresh = [(target, later) for target, later in fresh if parts[target] == parts[later]]
         if not fresh:
             break
-        seen |= set(fresh)
+        pairs_tried |= set(fresh)
         tried["overlap"] += len(fresh)
         for target, later in context.progress.track(fresh, total=len(fresh), description="overlaps"):
             loop = verifier.by_position(target, later, between(poses[target], poses[later]))

@@ -66,12 +66,12 @@ def find_features(color: np.ndarray | None, depth: np.ndarray, camera: Camera, m
     columns = np.clip(np.rint(pixels[:, 0]).astype(int), 0, depth.shape[1] - 1)
     rows = np.clip(np.rint(pixels[:, 1]).astype(int), 0, depth.shape[0] - 1)
     z = depth[rows, columns]
-    kept = (z > 0) & (z <= maximum_depth)
-    pixels, z = pixels[kept], z[kept]
+    has_depth = (z > 0) & (z <= maximum_depth)
+    pixels, z = pixels[has_depth], z[has_depth]
     points = np.column_stack(
         [(pixels[:, 0] - camera.cx) / camera.fx * z, (pixels[:, 1] - camera.cy) / camera.fy * z, z]
     )
-    return Features(pixels, points.astype(np.float32), descriptors[kept])
+    return Features(pixels, points.astype(np.float32), descriptors[has_depth])
 
 
 def match_features(target: Features, source: Features) -> np.ndarray:
@@ -108,21 +108,24 @@ def ransac_motion(target: Features, source: Features, random: np.random.Generato
     pairs = match_features(target, source)
     if len(pairs) < 6:
         return None
-    there = target.points[pairs[:, 0]].astype(float)
-    here = source.points[pairs[:, 1]].astype(float)
-    tolerance = 0.03 + 0.01 * np.maximum(there[:, 2], here[:, 2]) ** 2
+    target_points = target.points[pairs[:, 0]].astype(float)
+    source_points = source.points[pairs[:, 1]].astype(float)
+    tolerance = 0.03 + 0.01 * np.maximum(target_points[:, 2], source_points[:, 2]) ** 2
     triples = random.integers(0, len(pairs), (TRIALS, 3))
     triples = triples[(triples[:, [0, 1, 2]] != triples[:, [1, 2, 0]]).all(axis=1)]
-    motions = rigid_motions(there[triples], here[triples])
-    moved = np.einsum("bij,nj->bni", motions[:, :3, :3], here) + motions[:, None, :3, 3]
-    agreeing = np.linalg.norm(moved - there, axis=2) < tolerance
+    motions = rigid_motions(target_points[triples], source_points[triples])
+    moved = np.einsum("bij,nj->bni", motions[:, :3, :3], source_points) + motions[:, None, :3, 3]
+    agreeing = np.linalg.norm(moved - target_points, axis=2) < tolerance
     best = int(np.argmax(agreeing.sum(axis=1)))
     inliers, motion = agreeing[best], motions[best]
     for _ in range(3):
         if inliers.sum() < 6:
             return None
-        motion = rigid_motions(there[inliers][None], here[inliers][None])[0]
-        inliers = np.linalg.norm(apply(motion, here) - there, axis=1) < tolerance
-    if inliers.sum() < 6 or np.linalg.matrix_rank(here[inliers] - here[inliers].mean(axis=0), tol=0.1) < 2:
+        motion = rigid_motions(target_points[inliers][None], source_points[inliers][None])[0]
+        inliers = np.linalg.norm(apply(motion, source_points) - target_points, axis=1) < tolerance
+    if (
+        inliers.sum() < 6
+        or np.linalg.matrix_rank(source_points[inliers] - source_points[inliers].mean(axis=0), tol=0.1) < 2
+    ):
         return None
     return RigidMatch(transform_from(motion[:3, :3], motion[:3, 3]), int(inliers.sum()), pairs[inliers])

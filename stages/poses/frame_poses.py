@@ -43,7 +43,7 @@ def frame_poses(estimate: Estimate) -> list[FramePose]:
     A frame lies where its key frame and the next one of the same stretch put it: what optimisation changed between
     the two is spread over the frames between them, by their number.
     """
-    kept = largest_part(estimate)
+    main_part = largest_part(estimate)
     track, poses = estimate.track, estimate.world_from_key
     next_link = {link.target: link for link in track.links}
     own_link = {link.source: link.alignment for link in track.links}
@@ -51,7 +51,7 @@ def frame_poses(estimate: Estimate) -> list[FramePose]:
     result = []
     for tracked in track.frames:
         key = tracked.key
-        if key is None or estimate.parts[key] != kept:
+        if key is None or estimate.parts[key] != main_part:
             result.append(FramePose(tracked.frame, None, "unposed", tracked.fault or "not_joined"))
             continue
         alignment, link = tracked.alignment, next_link.get(key)

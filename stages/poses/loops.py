@@ -24,7 +24,9 @@ from scenewright.stages.poses.tracking import KeyFrame
 LEAST_FEATURES = 15
 """Feature matches that must agree before dense alignment is tried."""
 LEAST_WORDS = 0.02
+"""Least likeness by words of two key frames that may show one place; by eye."""
 LEAST_FERNS = 0.55
+"""Least share of ferns that agree between two key frames that may show one place; by eye."""
 LARGEST_CORRECTION = (0.4, math.radians(20.0))
 """A pair that was chosen for where it should be must not move farther than this."""
 PYRAMIDS = 24
@@ -104,20 +106,20 @@ class Verifier:
             match = ransac_motion(first, second, self._random)
             if match is None or match.inliers < LEAST_FEATURES:
                 return None
-            return self._verified(target, source, match.target_from_source, "place")
-        return self._verified(target, source, np.eye(4), "place")
+            return self._verify(target, source, match.target_from_source, "place")
+        return self._verify(target, source, np.eye(4), "place")
 
     def by_position(self, target: int, source: int, guess: np.ndarray) -> Loop | None:
         """Register two key frames that should see the same where they are now."""
-        loop = self._verified(target, source, guess, "overlap")
+        loop = self._verify(target, source, guess, "overlap")
         if loop is None:
             return None
         moved = between(guess, loop.alignment.target_from_source)
-        near = distance_of(moved) <= LARGEST_CORRECTION[0] and angle_of(moved) <= LARGEST_CORRECTION[1]
-        return loop if near else None
+        is_small = distance_of(moved) <= LARGEST_CORRECTION[0] and angle_of(moved) <= LARGEST_CORRECTION[1]
+        return loop if is_small else None
 
-    def _verified(self, target: int, source: int, guess: np.ndarray, found_by: FoundBy) -> Loop | None:
+    def _verify(self, target: int, source: int, guess: np.ndarray, found_by: FoundBy) -> Loop | None:
         first, second = self._pyramids(target), self._pyramids(source)
         coarsest = None if found_by == "place" else 1
-        there = agreed(first, second, guess, self._limits, use_color=self._use_color, coarsest=coarsest)
-        return None if there is None else Loop(target, source, there, found_by)
+        alignment = agreed(first, second, guess, self._limits, use_color=self._use_color, coarsest=coarsest)
+        return None if alignment is None else Loop(target, source, alignment, found_by)

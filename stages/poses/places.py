@@ -14,7 +14,9 @@ from collections import defaultdict
 import numpy as np
 
 TABLES, WORD_BITS = 12, 16
+"""Words of a descriptor, and bits of a word; by eye."""
 FERNS = 400
+"""Ferns of a depth image, each of three tests of one pixel; by eye."""
 FERN_SIZE = (30, 40)
 """Rows and columns to which the depth image is thinned out for the ferns."""
 
@@ -79,5 +81,5 @@ class Ferns:
 
 def fern_likeness(code: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the share (N,) of ferns that agree between `code` (F,) and others (N, F), where both have depth."""
-    both = (code >= 0) & (others >= 0)
-    return ((code == others) & both).sum(axis=1) / np.maximum(both.sum(axis=1), 0.25 * len(code))
+    both_have_depth = (code >= 0) & (others >= 0)
+    return ((code == others) & both_have_depth).sum(axis=1) / np.maximum(both_have_depth.sum(axis=1), 0.25 * len(code))

@@ -93,12 +93,16 @@ def _dense(
         with context.progress.step("bundle adjustment"):
             estimated = adjust(estimated, reader.cameras[camera_name], context.logger)
     loops = loop_closures(estimated)
-    kept = sum(loop.weight >= 0.5 for loop in loops)
-    counts = (("key_frames", len(estimated.track.keys)), ("loops", kept), ("loops_rejected", len(loops) - kept))
+    loops_kept = sum(loop.weight >= 0.5 for loop in loops)
+    counts = (
+        ("key_frames", len(estimated.track.keys)),
+        ("loops", loops_kept),
+        ("loops_rejected", len(loops) - loops_kept),
+    )
     for how, count in sorted(estimated.track.rescues.items()):
         context.logger.info("tracking was rescued %d times: %s", count, how)
-    parts = len(set(estimated.parts.tolist()))
-    return Result(frame_poses(estimated), loops, estimated.solution.variance_factor, parts, counts)
+    part_count = len(set(estimated.parts.tolist()))
+    return Result(frame_poses(estimated), loops, estimated.solution.variance_factor, part_count, counts)
 
 
 def _structure(
@@ -106,8 +110,8 @@ def _structure(
 ) -> Result:
     from scenewright.stages.poses.structure_from_motion import reconstruct
 
-    poses, parts = reconstruct(reader, frames, camera_name, parameters, context)
-    return Result(poses, parts=parts)
+    poses, part_count = reconstruct(reader, frames, camera_name, parameters, context)
+    return Result(poses, parts=part_count)
 
 
 @dataclass(frozen=True)
@@ -140,7 +144,7 @@ def _finish(
     placed = np.array(gravity.world_from_log) @ estimated
     times = reader.times
     write_tum(context.output / "trajectory.tum", times[indices], placed)
-    kept = set(indices)
+    placed_frames = set(indices)
     info = PosesFile(
         method=parameters.method,
         camera=camera_name,
@@ -150,10 +154,12 @@ def _finish(
             FrameEstimate(
                 frame=pose.frame,
                 time=float(times[pose.frame]),
-                status=pose.status if pose.frame in kept else "unposed",
-                fault=pose.fault or ("" if pose.frame in kept else "not_joined"),
-                confidence=round(pose.confidence, 4) if pose.frame in kept else 0.0,
-                uncertainty=round(pose.uncertainty, 6) if pose.frame in kept and pose.uncertainty is not None else None,
+                status=pose.status if pose.frame in placed_frames else "unposed",
+                fault=pose.fault or ("" if pose.frame in placed_frames else "not_joined"),
+                confidence=round(pose.confidence, 4) if pose.frame in placed_frames else 0.0,
+                uncertainty=round(pose.uncertainty, 6)
+                if pose.frame in placed_frames and pose.uncertainty is not None
+                else None,
             )
             for pose in result.poses
         ),

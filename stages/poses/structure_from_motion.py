@@ -68,15 +68,15 @@ def interpolated(
     start = inverse(registered[min(registered)][0])
     places = np.searchsorted(chosen, frames, side="right") - 1
     result = []
-    for frame, place in zip(frames, places.tolist(), strict=True):
-        before, after = chosen[place], chosen[min(place + 1, len(chosen) - 1)]
+    for frame, before_index in zip(frames, places.tolist(), strict=True):
+        before, after = chosen[before_index], chosen[min(before_index + 1, len(chosen) - 1)]
         if frame in registered:
             pose, confidence = registered[frame]
             result.append(FramePose(frame, start @ pose, "tracked", confidence=confidence))
         elif before in registered and after in registered:
             (first, sure), (second, also) = registered[before], registered[after]
-            way = fraction(between(first, second), (frame - before) / (after - before))
-            pose = start @ first @ way
+            motion = fraction(between(first, second), (frame - before) / (after - before))
+            pose = start @ first @ motion
             result.append(FramePose(frame, pose, "interpolated", confidence=0.5 * min(sure, also)))
         else:
             result.append(FramePose(frame, None, "unposed", "not_registered"))
@@ -154,11 +154,11 @@ def _scale(model: Any, names: dict[str, int], reader: FrameReader, maximum_depth
         if depth is None:
             continue
         camera_from_world = np.vstack([image.cam_from_world().matrix(), [0, 0, 0, 1]])
-        seen = [(p.xy, model.points3D[p.point3D_id].xyz) for p in image.points2D if p.has_point3D()]
-        if not seen:
+        observations = [(p.xy, model.points3D[p.point3D_id].xyz) for p in image.points2D if p.has_point3D()]
+        if not observations:
             continue
-        pixels = np.array([xy for xy, _ in seen]) - 0.5
-        modelled = np.array([xyz for _, xyz in seen]) @ camera_from_world[2, :3] + camera_from_world[2, 3]
+        pixels = np.array([xy for xy, _ in observations]) - 0.5
+        modelled = np.array([xyz for _, xyz in observations]) @ camera_from_world[2, :3] + camera_from_world[2, 3]
         rows = np.clip(np.rint(pixels[:, 1]).astype(int), 0, depth.shape[0] - 1)
         columns = np.clip(np.rint(pixels[:, 0]).astype(int), 0, depth.shape[1] - 1)
         measured = depth[rows, columns]

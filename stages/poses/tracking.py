@@ -189,10 +189,10 @@ class Tracker:
         """Make a key frame of the last frame that was tracked; frames without depth may have come after it."""
         previous = self._previous
         assert previous is not None
-        place = next(k for k in reversed(range(len(self.track.frames))) if self.track.frames[k].frame == previous.frame)
-        alignment = self.track.frames[place].alignment
+        index = next(k for k in reversed(range(len(self.track.frames))) if self.track.frames[k].frame == previous.frame)
+        alignment = self.track.frames[index].alignment
         assert alignment is not None
-        self.track.frames[place] = self._continue_part(previous, alignment)
+        self.track.frames[index] = self._continue_part(previous, alignment)
 
     def _begin_part(self, seen: Seen, fault: str) -> None:
         part = self.track.keys[-1].part + 1 if self.track.keys else 0

@@ -38,10 +38,10 @@ def choose_world(
     `frames` (N,) are their indices in the sequence. Raises BadInput when the world of the sequence was asked for and
     none of these frames has a pose there.
     """
-    given = _given_poses(reader, frames) if world in ("auto", "sequence") else {}
-    if given:
-        rows = [row for row, frame in enumerate(frames) if frame in given]
-        motion = laid_onto(poses[rows], np.array([given[frames[row]] for row in rows]))
+    given_poses = _given_poses(reader, frames) if world in ("auto", "sequence") else {}
+    if given_poses:
+        rows = [row for row, frame in enumerate(frames) if frame in given_poses]
+        motion = laid_onto(poses[rows], np.array([given_poses[frames[row]] for row in rows]))
         detail = f"laid onto the sequence's own poses of {len(rows)} frames"
         return "sequence", Gravity(method="given", world_from_log=as_transform(motion), detail=detail)
     if world == "sequence":

@@ -94,10 +94,10 @@ def segment_colors(segments: tuple[FrameSegment, ...]) -> tuple[dict[int, tuple[
 
     By class; where everything has one class (class-agnostic masks) by instance, and then there is no legend.
     """
-    classes = {s.category_id for s in segments if s.category_id > 0}
+    classes = {s.class_id for s in segments if s.class_id > 0}
     if len(classes) > 1:
         names = class_names()
-        return {s.id: entity_color(s.category_id, names.get(s.category_id)) for s in segments}, classes
+        return {s.id: entity_color(s.class_id, names.get(s.class_id)) for s in segments}, classes
     return {s.id: instance_color(s.instance) for s in segments}, set()
 
 

@@ -23,7 +23,8 @@ from scenewright.stages.segment.choice import Backend, BackendRequest, choose_ba
 from scenewright.stages.segment.one_frame import describe, segment_frame
 
 LEAST_FRAMES_EACH = 60
-"""Under these a process is not worth its start, which takes as long as some ten to twenty frames."""
+"""Least frames of a process: with fewer it is not worth its start, which takes as long as some ten to twenty
+frames."""
 MOST_WORKERS = 8
 """Each holds a few hundred megabytes."""
 AHEAD = 3
@@ -45,9 +46,9 @@ def worker_count(frames: int, apart: bool, device: str) -> int:
         return 1
     allowed = [len(os.sched_getaffinity(0)), frames // LEAST_FRAMES_EACH, MOST_WORKERS]
     for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"):
-        given = os.environ.get(name, "")
-        if given.isdigit():
-            allowed.append(int(given))
+        threads = os.environ.get(name, "")
+        if threads.isdigit():
+            allowed.append(int(threads))
     return max(1, min(allowed))
 
 
@@ -82,8 +83,8 @@ def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: 
             yield waiting.popleft().result()
     except BrokenProcessPool:
         # The pool ends those that it knew of when one died; one that was just being started it would wait for for ever.
-        for left in set(multiprocessing.active_children()) - others:
-            left.kill()
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.kill()
         raise MachineFailure(
             "a process that segments frames was killed", hint="memory may be short: OMP_NUM_THREADS=1 needs one process"
         ) from None

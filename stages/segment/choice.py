@@ -17,6 +17,7 @@ from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.registry import AUTO, BackendDeclaration, all_backends, automatic, backend_for
 
 STREAM_WORDS = {"color": "colour", "labels": "ground-truth labels"}
+"""What a missing stream of the sequence is called in messages."""
 
 Own = TypeVar("Own", bound=Parameters)
 
@@ -98,17 +99,19 @@ def choose_backend(request: BackendRequest) -> Backend:
 
 
 def _refuse_options_of_others(parameters: SegmentParameters, chosen: BackendDeclaration) -> None:
-    for other in all_backends():
-        for option in other.exclusive:
-            given = getattr(parameters, option) != type(parameters).model_fields[option].default
-            if given and other.name != chosen.name:
-                raise UsageError(f"--{option.replace('_', '-')} is for --backend {other.name} alone")
+    for declared in all_backends():
+        for option in declared.exclusive:
+            is_set = getattr(parameters, option) != type(parameters).model_fields[option].default
+            if is_set and declared.name != chosen.name:
+                raise UsageError(f"--{option.replace('_', '-')} is for --backend {declared.name} alone")
 
 
 def _require_streams(sequence: Sequence, chosen: BackendDeclaration) -> None:
     missing = sorted(chosen.needs - set(sequence.info.streams))
     if missing:
-        others = [other.name for other in all_backends() if missing[0] not in other.needs and not other.address]
+        others = [
+            declared.name for declared in all_backends() if missing[0] not in declared.needs and not declared.address
+        ]
         raise BadInput(
             f"this sequence has no {STREAM_WORDS[missing[0]]} for --backend {chosen.name}",
             hint=f"use another --backend: {', '.join(others)}",

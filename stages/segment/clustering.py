@@ -70,9 +70,9 @@ def largest_cluster(clouds: list[np.ndarray], sizes: list[int], *, distance: flo
         while front:
             current = front.pop()
             reached = [
-                other
-                for other in sorted(unvisited)
-                if possible[current, other] and clouds_touch(clouds[current], clouds[other], distance)
+                neighbour
+                for neighbour in sorted(unvisited)
+                if possible[current, neighbour] and clouds_touch(clouds[current], clouds[neighbour], distance)
             ]
             cluster.update(reached)
             front.extend(reached)

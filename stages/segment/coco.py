@@ -84,3 +84,4 @@ COCO_NAMES = (
     "hair drier",
     "toothbrush",
 )
+"""COCO's 80 classes, in the order of the networks' outputs."""

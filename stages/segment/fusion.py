@@ -18,6 +18,7 @@ from scenewright.stages.segment.overlaps import LabelPixels, overlap_table, pixe
 from scenewright.stages.segment.panoptic import PanopticFrame
 
 BACKGROUND = 0
+"""Owner of geometric segments that no mask claims."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class FusedSegment:
     """What a fused segment is; its number is its value in FusedFrame.ids."""
 
     id: int
-    category_id: int
+    class_id: int
     instance: int
     is_thing: bool
     score: float
@@ -142,12 +143,12 @@ def far_from_instance(
     if len(segments) < 2:
         return []
     flat = points.reshape(-1, 3)
-    kept = largest_cluster(
+    in_cluster = largest_cluster(
         [flat[pixels.of(label)[::step]] for label in segments],
         [len(pixels.of(label)) for label in segments],
         distance=distance,
     )
-    return [label for index, label in enumerate(segments) if index not in kept]
+    return [label for index, label in enumerate(segments) if index not in in_cluster]
 
 
 def describe(labels: np.ndarray, owner: np.ndarray, panoptic: PanopticFrame) -> FusedFrame:
@@ -166,5 +167,5 @@ def describe(labels: np.ndarray, owner: np.ndarray, panoptic: PanopticFrame) -> 
             continue
         mask = panoptic.masks[mask_id]
         instance = instances.setdefault(mask_id, len(instances) + 1)
-        segments.append(FusedSegment(label, mask.category_id, instance, mask.is_thing, mask.score, int(areas[label])))
+        segments.append(FusedSegment(label, mask.class_id, instance, mask.is_thing, mask.score, int(areas[label])))
     return FusedFrame(ids=ids, segments=tuple(segments))

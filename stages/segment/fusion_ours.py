@@ -22,11 +22,11 @@ from scenewright.stages.segment.overlaps import overlap_table, pixels_of_labels
 from scenewright.stages.segment.panoptic import PanopticFrame
 
 RIM = 2
-"""What a mask takes of a neighbour along its outline is this wide at most [pixels at 640 width]."""
+"""Largest width of what a mask takes of a neighbour along its outline [pixels at 640 width]."""
 REACH_PER_SIZE = 0.5
-"""Segments of an instance within this share of its size belong together, ..."""
+"""Segments of an instance within this share of its size belong together, but for `LONGEST_REACH`."""
 LONGEST_REACH = 0.2
-"""... up to this distance [m]: the foot of a lamp under its shade."""
+"""Largest distance of segments that belong together by `REACH_PER_SIZE` [m]: the foot of a lamp under its shade."""
 REACH_PER_DEPTH = 0.03
 """Segments of an instance within this share of their depth belong together. Sampled points lie a hundredth of
 the depth apart, and depth noise grows on top of that: at three metres 5 cm tear a desk into pieces."""
@@ -58,11 +58,13 @@ def fuse(
     labels = split_shared(labels, panoptic.ids, minimum_pixels=least_claimed, minimum_share=settings.majority_share)
     owner = majority_labels(labels, panoptic.ids, majority_share=settings.majority_share)
     pixels = pixels_of_labels(labels)
-    for parts in parts_of_things(owner, panoptic):
-        if len(parts) > 1:
-            own = np.concatenate([pixels.of(part) for part in parts])
-            distance = max(settings.cluster_distance, reach_of(points.reshape(-1, 3)[own]))
-            owner[far_from_instance(pixels, parts, points, distance=distance, step=settings.cluster_step)] = BACKGROUND
+    for of_instance in parts_of_things(owner, panoptic):
+        if len(of_instance) > 1:
+            instance_pixels = np.concatenate([pixels.of(part) for part in of_instance])
+            distance = max(settings.cluster_distance, reach_of(points.reshape(-1, 3)[instance_pixels]))
+            owner[far_from_instance(pixels, of_instance, points, distance=distance, step=settings.cluster_step)] = (
+                BACKGROUND
+            )
     return describe(labels, owner, panoptic)
 
 

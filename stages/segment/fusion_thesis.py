@@ -37,7 +37,9 @@ def fuse(
     )
     owner = majority_labels(labels, panoptic.ids, majority_share=settings.majority_share)
     pixels = pixels_of_labels(labels)
-    for parts in parts_of_things(owner, panoptic):
-        far = far_from_instance(pixels, parts, points, distance=settings.cluster_distance, step=settings.cluster_step)
+    for of_instance in parts_of_things(owner, panoptic):
+        far = far_from_instance(
+            pixels, of_instance, points, distance=settings.cluster_distance, step=settings.cluster_step
+        )
         owner[far] = BACKGROUND
     return describe(labels, owner, panoptic)

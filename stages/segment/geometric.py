@@ -282,9 +282,9 @@ def label_all_regions(
     small[0] = False
     _fill_edges(labels, points, normals, ratio)
     sole = _sole_neighbours(labels, small)
-    own = np.arange(small.size)
-    lookup = np.where(small, np.maximum(sole, 0), own).astype(np.int32)
-    return relabel(lookup[labels]), relabel(np.where(small, own, 0).astype(np.int32)[labels])
+    identity = np.arange(small.size)
+    lookup = np.where(small, np.maximum(sole, 0), identity).astype(np.int32)
+    return relabel(lookup[labels]), relabel(np.where(small, identity, 0).astype(np.int32)[labels])
 
 
 def pixels_at(count: int, shape: tuple[int, ...]) -> int:

@@ -45,7 +45,7 @@ def name_segments(
     the scores. Where a label is stuff and its class is a thing (COCO's `cabinet-merged`), each connected region
     (8 neighbours) of at least `minimum_pixels` is an instance.
     """
-    named = np.zeros(ids.shape, dtype=np.int32)
+    numbers = np.zeros(ids.shape, dtype=np.int32)
     masks: dict[int, PanopticMask] = {}
     stuff: dict[int, int] = {}
     for segment_id in sorted(segments):
@@ -58,13 +58,13 @@ def name_segments(
             number = stuff.setdefault(semantic.id, len(masks) + 1)
             best = max(segment.score, masks[number].score if number in masks else 0.0)
             masks[number] = PanopticMask(semantic.id, False, best)
-            named[pixels] = number
+            numbers[pixels] = number
             continue
         regions = _regions(pixels, minimum_pixels) if segment.label.kind == "stuff" else [pixels]
         for region in regions:
             masks[len(masks) + 1] = PanopticMask(semantic.id, True, segment.score)
-            named[region] = len(masks)
-    return PanopticFrame(named, masks)
+            numbers[region] = len(masks)
+    return PanopticFrame(numbers, masks)
 
 
 def name_instances(
@@ -76,20 +76,20 @@ def name_instances(
     the cup on the table is in front of it, whichever of the two the network is surer of. What keeps less than half of
     its mask, or less than `minimum_pixels`, is dropped.
     """
-    kept: list[InstanceMask] = []
+    distinct: list[InstanceMask] = []
     for instance in sorted(instances, key=lambda item: -item.score):
-        if instance.mask.any() and not any(_are_same(instance.mask, other.mask) for other in kept):
-            kept.append(instance)
+        if instance.mask.any() and not any(_are_same(instance.mask, other.mask) for other in distinct):
+            distinct.append(instance)
     ids = np.zeros(shape, dtype=np.int32)
-    sizes = [int(instance.mask.sum()) for instance in kept]
-    order = sorted(range(len(kept)), key=lambda k: (-sizes[k], k))
+    sizes = [int(instance.mask.sum()) for instance in distinct]
+    order = sorted(range(len(distinct)), key=lambda k: (-sizes[k], k))
     for number, k in enumerate(order, start=1):
-        ids[kept[k].mask] = number
-    left = np.bincount(ids.ravel(), minlength=len(order) + 1)
+        ids[distinct[k].mask] = number
+    visible = np.bincount(ids.ravel(), minlength=len(order) + 1)
     segments = {
-        number: NamedSegment(kept[k].label, kept[k].score)
+        number: NamedSegment(distinct[k].label, distinct[k].score)
         for number, k in enumerate(order, start=1)
-        if left[number] >= max(minimum_pixels, KEPT_SHARE * sizes[k])
+        if visible[number] >= max(minimum_pixels, KEPT_SHARE * sizes[k])
     }
     return name_segments(ids, segments, vocabulary, minimum_pixels=minimum_pixels)
 

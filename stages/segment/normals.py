@@ -32,11 +32,11 @@ def _steps_to(
         dy = np.float64(there_y[k] - here_y[k])
         dz = np.float64(there_z[k] - here_z[k])
         left_out = (dx * dx + dy * dy + dz * dz > reach[k]) | (there_z[k] <= np.float32(0.0))
-        taken = np.float64(0.0) if left_out else np.float64(1.0)
-        count[k] += taken
-        x[k] = taken * dx
-        y[k] = taken * dy
-        z[k] = taken * dz
+        weight = np.float64(0.0) if left_out else np.float64(1.0)
+        count[k] += weight
+        x[k] = weight * dx
+        y[k] = weight * dy
+        z[k] = weight * dz
 
 
 @njit(cache=True, error_model="numpy")
@@ -122,10 +122,10 @@ def _directions(
         length = np.sqrt(n)
         x, y, z = x / length, y / length, z / length
         away = x * px[k] + y * py[k] + z * pz[k] > 0.0
-        known = (scale[k] > 0.0) & (n > 0.0)
-        normals[k, 0] = np.float32((-x if away else x) if known else 0.0)
-        normals[k, 1] = np.float32((-y if away else y) if known else 0.0)
-        normals[k, 2] = np.float32((-z if away else z) if known else 0.0)
+        has_normal = (scale[k] > 0.0) & (n > 0.0)
+        normals[k, 0] = np.float32((-x if away else x) if has_normal else 0.0)
+        normals[k, 1] = np.float32((-y if away else y) if has_normal else 0.0)
+        normals[k, 2] = np.float32((-z if away else z) if has_normal else 0.0)
 
 
 @njit(cache=True)
@@ -151,8 +151,8 @@ def _row_of_normals(
         for du in range(-half, half + 1, step):
             a, b = max(0, -du), min(width, width - du)
             x, y, z = steps[0, a:b], steps[1, a:b], steps[2, a:b]
-            there = (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du])
-            _steps_to(there, (xs[v, a:b], ys[v, a:b], zs[v, a:b]), reach[a:b], count[a:b], x, y, z)
+            neighbours = (xs[row, a + du : b + du], ys[row, a + du : b + du], zs[row, a + du : b + du])
+            _steps_to(neighbours, (xs[v, a:b], ys[v, a:b], zs[v, a:b]), reach[a:b], count[a:b], x, y, z)
             _add(x, y, z, sums[0, a:b], sums[1, a:b], sums[2, a:b])
             _add_products(x, y, z, sums[3, a:b], sums[4, a:b], sums[5, a:b])
             _add_other_products(y, z, sums[6, a:b], sums[7, a:b], sums[8, a:b])

@@ -39,7 +39,7 @@ def describe(index: int, fused: FusedFrame) -> FrameSegments:
         segments=tuple(
             FrameSegment(
                 id=segment.id,
-                category_id=segment.category_id,
+                class_id=segment.class_id,
                 instance=segment.instance,
                 is_thing=segment.is_thing,
                 score=round(segment.score, 4),

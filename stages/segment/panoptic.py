@@ -11,7 +11,7 @@ import numpy as np
 class PanopticMask:
     """Class and score of one mask; its number is its value in PanopticFrame.ids."""
 
-    category_id: int
+    class_id: int
     is_thing: bool
     score: float = 1.0
 

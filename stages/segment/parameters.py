@@ -88,7 +88,7 @@ class CommonParameters(Parameters):
 
     @field_validator("backend")
     @classmethod
-    def _known_backend(cls, backend: str) -> str:
+    def _check_backend(cls, backend: str) -> str:
         try:
             return check_backend(backend)
         except ValueError as error:

@@ -90,8 +90,8 @@ def backend_for(backend: str) -> BackendDeclaration:
 def automatic(weights: Path | None) -> BackendDeclaration:
     """Return the backend that `auto` takes with these weights, or with none: a detector taught on photographs before
     our own network, which was taught in generated rooms."""
-    own = weights is None or weights.suffix == ".safetensors"
-    return backend_for(AUTO if own else "detector")
+    without_detector = weights is None or weights.suffix == ".safetensors"
+    return backend_for(AUTO if without_detector else "detector")
 
 
 def usual_detector(parameters: Any, given: Mapping[str, Any]) -> str:
@@ -114,13 +114,13 @@ def check_backend(backend: str) -> str:
 
 def backend_help() -> str:
     """Return the names and what stands behind each, for the help of `--backend`."""
-    named = [f"`{declared.name}`: {declared.summary}" for declared in all_backends() if not declared.address]
+    summaries = [f"`{declared.name}`: {declared.summary}" for declared in all_backends() if not declared.address]
     addresses = [f"or {declared.address}" for declared in all_backends() if declared.address]
     unasked = (
         f"`{AUTO}`: `detector` where --weights is an ONNX file or the cache of models has yolox_nano (`scenewright "
         f"models`), else what needs nothing: `{backend_for(AUTO).name}`"
     )
-    return "; ".join([*named, unasked, *addresses])
+    return "; ".join([*summaries, unasked, *addresses])
 
 
 def weights_help() -> str:
@@ -129,7 +129,7 @@ def weights_help() -> str:
     for declared in all_backends():
         if declared.weights:
             takers.setdefault(declared.weights, []).append(declared.name)
-    return "; ".join(f"{what} ({', '.join(names)})" for what, names in takers.items())
+    return "; ".join(f"{weights} ({', '.join(names)})" for weights, names in takers.items())
 
 
 def data_files(parameters: Any) -> tuple[str, ...]:
@@ -144,5 +144,5 @@ def versions(parameters: Any) -> dict[str, str]:
     """
     declared = backend_for(parameters.backend)
     further: dict[str, str] = declared.load(declared.versions).versions(parameters) if declared.versions else {}
-    taken = (declared, backend_for("detector")) if parameters.backend == AUTO else (declared,)
-    return {name: library_version(name) for backend in taken for name in backend.libraries} | further
+    backends = (declared, backend_for("detector")) if parameters.backend == AUTO else (declared,)
+    return {name: library_version(name) for backend in backends for name in backend.libraries} | further

@@ -37,7 +37,7 @@ def run(
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         with context.progress.step("prepare the backend"):
-            asked = BackendRequest(
+            unfitted_request = BackendRequest(
                 parameters,
                 weights,
                 mask_weights=mask_weights,
@@ -51,19 +51,19 @@ def run(
                 seed=context.seed,
                 ask_again=context.force,
             )
-            request = fitting(asked)
+            request = fitting(unfitted_request)
             backend = choose_backend(request)
         annotations: list[FrameSegments] = []
         streams = tuple(dict.fromkeys(("depth", *backend.streams)))
         workers = worker_count(len(reader), chosen_backend(request).apart, context.device)
 
         def images() -> Iterator[tuple[int, np.ndarray | bytes]]:
-            found = (
+            segmented = (
                 segmented_apart(request, streams, workers)
                 if workers > 1
                 else segmented_here(request, backend, streams, context.random)
             )
-            for index, image, record in context.progress.track(found, total=len(reader), description="segment"):
+            for index, image, record in context.progress.track(segmented, total=len(reader), description="segment"):
                 annotations.append(record)
                 yield index, image
 
@@ -80,21 +80,21 @@ def run(
         height=info.camera.height,
         frames=tuple(annotations),
     ).write(context.output / "segments.json")
-    named = sum(1 for frame in annotations for segment in frame.segments if segment.category_id)
+    named_count = sum(1 for frame in annotations for segment in frame.segments if segment.class_id)
     total = sum(len(frame.segments) for frame in annotations)
     summary = {
         "label": backend.label,
         "frames": len(annotations),
         "segments_per_frame": round(total / max(len(annotations), 1), 2),
-        "named_share": round(named / max(total, 1), 3),
+        "named_share": round(named_count / max(total, 1), 3),
     }
     if recognised is not None:
         summary["recognised_share"] = round(recognised, 3)
-    return Segments(context.output, outcome="ok" if named else "empty", summary=summary)
+    return Segments(context.output, outcome="ok" if named_count else "empty", summary=summary)
 
 
 def recognised_share(frames: Iterable[FrameSegments], unnamed: int) -> float | None:
     """Return the share of the area of things that has another class than `unnamed`; None where no thing was found."""
-    things = [segment for frame in frames for segment in frame.segments if segment.is_thing and segment.category_id]
+    things = [segment for frame in frames for segment in frame.segments if segment.is_thing and segment.class_id]
     total = sum(segment.area for segment in things)
-    return sum(s.area for s in things if s.category_id != unnamed) / total if total else None
+    return sum(s.area for s in things if s.class_id != unnamed) / total if total else None

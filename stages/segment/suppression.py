@@ -10,8 +10,8 @@ def overlap_of_boxes(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
     shared = np.clip(high - low, 0, None).prod(axis=1)
     area = np.clip(boxes[:, 2:] - boxes[:, :2], 0, None).prod(axis=1)
-    own = float(np.clip(box[2:] - box[:2], 0, None).prod())
-    return shared / np.maximum(own + area - shared, 1e-9)
+    box_area = float(np.clip(box[2:] - box[:2], 0, None).prod())
+    return shared / np.maximum(box_area + area - shared, 1e-9)
 
 
 def suppress(boxes: np.ndarray, scores: np.ndarray, classes: np.ndarray, overlap: float) -> np.ndarray:
@@ -20,9 +20,9 @@ def suppress(boxes: np.ndarray, scores: np.ndarray, classes: np.ndarray, overlap
     A box goes when its IoU with a better one of its class is over `overlap`.
     """
     order = np.lexsort((np.arange(len(scores)), -scores))
-    kept: list[int] = []
+    chosen: list[int] = []
     for index in order:
-        same = [other for other in kept if classes[other] == classes[index]]
+        same = [other for other in chosen if classes[other] == classes[index]]
         if not same or overlap_of_boxes(boxes[index], boxes[same]).max() <= overlap:
-            kept.append(int(index))
-    return np.array(kept, dtype=int)
+            chosen.append(int(index))
+    return np.array(chosen, dtype=int)

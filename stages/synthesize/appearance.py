@@ -25,9 +25,13 @@ GLOSS = {
     "desk": 0.10,
     "table": 0.10,
 }
+"""How much the surface of a class shines (0..1); by eye."""
 WOODEN = ("table", "desk", "shelf", "chair", "cabinet", "wall_cabinet")
+"""Classes with a grain of wood."""
 FABRIC = ("sofa", "bed")
+"""Classes with a weave."""
 AMBIENT = (0.10, 0.10, 0.11)
+"""Light that comes from everywhere (R, G, B of 0..1); by eye."""
 SKY = (1.6, 1.7, 1.9)
 """Comes in from above in rooms without a ceiling."""
 

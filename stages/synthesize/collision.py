@@ -97,12 +97,12 @@ class CollisionWorld:
                 continue
             if (other.whole_minimum > shape.whole_maximum + reach).any():
                 continue
-            near = np.all(
+            close_pairs = np.all(
                 (shape.minimum[:, None] - reach <= other.maximum[None])
                 & (other.minimum[None] <= shape.maximum[:, None] + reach),
                 axis=2,
             )
-            for i, j in np.argwhere(near):
+            for i, j in np.argwhere(close_pairs):
                 if piece_distance(shape.objects[i], other.objects[j]) <= reach:
                     return name
         return None

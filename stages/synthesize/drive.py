@@ -23,12 +23,13 @@ from scipy.sparse.csgraph import dijkstra
 
 Shape = Literal["line", "loop", "eight"]
 HEIGHTS = (1.5, 0.9)
-"""Of the camera, one round each [m]."""
+"""Heights of the camera, one round each [m]."""
 PITCH = -0.25
 """A robot's camera looks a little down [rad]."""
 WAYPOINTS = 16
+"""Points of a round; by eye."""
 REACH = 0.8
-"""Of the free floor's half extent."""
+"""Share of the free floor's half extent that a drive reaches."""
 
 
 def plan_drive(
@@ -39,8 +40,8 @@ def plan_drive(
 
     Raises BadInput when the camera would come closer than CLEARANCE to a surface.
     """
-    there = _floor_path(shape, space)
-    legs = [there, there[::-1] if shape == "line" else there][:rounds]
+    outbound = _floor_path(shape, space)
+    legs = [outbound, outbound[::-1] if shape == "line" else outbound][:rounds]
     heights = np.repeat(HEIGHTS[:rounds], [len(leg) for leg in legs])
     path = smooth_path(np.concatenate(legs), space)
     eye = np.column_stack([path, gaussian_filter1d(heights, 0.25 / STEP, mode="nearest")])

@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 CELL = 0.05
-"""[m]"""
+"""Edge of a cell of the floor [m]."""
 BODY_HEIGHTS = (0.12, 0.35, 0.6, 0.85, 1.1, 1.35, 1.6)
 """Heights at which the clearance is measured; its minimum counts [m]."""
 BODY_RADIUS = 0.36
@@ -88,11 +88,11 @@ def _grid_graph(free: np.ndarray, clearance: np.ndarray) -> tuple[coo_matrix, np
     for di, dj in ((1, 0), (0, 1), (1, 1), (1, -1)):
         a = (slice(0, free.shape[0] - di), slice(max(0, -dj), free.shape[1] - max(0, dj)))
         b = (slice(di, None), slice(max(0, dj), free.shape[1] + min(0, dj)))
-        both = free[a] & free[b]
+        both_free = free[a] & free[b]
         length = CELL * float(np.hypot(di, dj))
-        rows.append(node[a][both])
-        columns.append(node[b][both])
-        costs.append(length * (1.0 + 0.3 / np.minimum(clearance[a][both], clearance[b][both])))
+        rows.append(node[a][both_free])
+        columns.append(node[b][both_free])
+        costs.append(length * (1.0 + 0.3 / np.minimum(clearance[a][both_free], clearance[b][both_free])))
     row, column, cost = np.concatenate(rows), np.concatenate(columns), np.concatenate(costs)
     size = int(free.sum())
     graph = coo_matrix(

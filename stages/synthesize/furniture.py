@@ -23,6 +23,7 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.synthesize.collision import ConvexShape, convex_shape
 
 SWEEP_STEPS = 9
+"""Values of a joint at which its parts are looked at for what they pass through; by eye."""
 CONTACT_BAND = 1.5e-3
 """Vertices this close to the lowest one are what a thing stands on [m]."""
 
@@ -63,12 +64,12 @@ class Furnishing:
         """What the moving parts pass through over their whole range (model frame, scaled), None without joints."""
         if not self.model.joints:
             return None
-        parts = load_collision_parts(self.folder)
+        pieces_of_part = load_collision_parts(self.folder)
         pieces = []
         for joint in self.model.joints:
             for value in np.linspace(joint.lower, joint.upper, SWEEP_STEPS):
                 pose = part_transforms(self.model, {joint.name: float(value)})[joint.part]
-                for piece in parts.get(joint.part, []):
+                for piece in pieces_of_part.get(joint.part, []):
                     moved = piece.copy()
                     moved.apply_transform(pose)
                     moved.apply_scale(self.scale)
@@ -84,11 +85,13 @@ class Furnishing:
     @cached_property
     def planes(self) -> tuple[SurfacePlane, ...]:
         """Surface planes in the model frame, scaled: all of them when closed, those of the body when not."""
-        kept = list(self.model.states[0].planes)
+        lasting = list(self.model.states[0].planes)
         if any(abs(value) > 1e-9 for value in self.joints.values()):
             for state in self.model.states[1:]:
-                kept = [plane for plane in kept if any(same_plane(plane, other) for other in state.planes)]
-        return tuple(_scaled(plane, self.scale) for plane in kept)
+                lasting = [
+                    plane for plane in lasting if any(same_plane(plane, state_plane) for state_plane in state.planes)
+                ]
+        return tuple(_scaled_plane(plane, self.scale) for plane in lasting)
 
     @cached_property
     def drawer_floors(self) -> tuple[SurfacePlane, ...]:
@@ -103,10 +106,14 @@ class Furnishing:
             axis = np.asarray(joint.axis)
             travel = state.joints.get(joint.name, 0.0) * axis
             for plane in self.model.states[0].planes:
-                moved = _shifted(plane, travel)
-                went_along = any(same_plane(moved, other) for other in state.planes)
-                if plane.horizontal and went_along and not any(same_plane(plane, other) for other in state.planes):
-                    floors.append(_scaled(_shifted(plane, value * axis), self.scale))
+                moved = _shifted_plane(plane, travel)
+                went_along = any(same_plane(moved, state_plane) for state_plane in state.planes)
+                if (
+                    plane.horizontal
+                    and went_along
+                    and not any(same_plane(plane, state_plane) for state_plane in state.planes)
+                ):
+                    floors.append(_scaled_plane(_shifted_plane(plane, value * axis), self.scale))
         return tuple(floors)
 
     @property
@@ -115,7 +122,7 @@ class Furnishing:
         return (*self.planes, *self.drawer_floors)
 
 
-def _shifted(plane: SurfacePlane, shift: np.ndarray) -> SurfacePlane:
+def _shifted_plane(plane: SurfacePlane, shift: np.ndarray) -> SurfacePlane:
     return plane.model_copy(
         update={
             "offset": plane.offset - float(np.asarray(plane.normal) @ shift),
@@ -134,7 +141,7 @@ def same_plane(a: SurfacePlane, b: SurfacePlane) -> bool:
     )
 
 
-def _scaled(plane: SurfacePlane, scale: float) -> SurfacePlane:
+def _scaled_plane(plane: SurfacePlane, scale: float) -> SurfacePlane:
     if scale == 1.0:
         return plane
     return plane.model_copy(
@@ -167,8 +174,8 @@ def main_joint(model: CadModel) -> Joint:
     """Return the door that matters: the revolute joint whose part is called `door`, otherwise the first revolute
     joint, otherwise the first. Raises IndexError for a rigid model."""
     doors = [joint for joint in model.joints if joint.type == "revolute"] or list(model.joints)
-    named = [joint for joint in doors if joint.part == "door"]
-    return (named or doors)[0]
+    called_door = [joint for joint in doors if joint.part == "door"]
+    return (called_door or doors)[0]
 
 
 class Catalogue:

@@ -13,17 +13,17 @@ from scenewright.stages.synthesize.recipes import Place
 from scenewright.stages.synthesize.shell import Room
 
 CEILING_GAP = 1e-3
-"""Between a canopy and the ceiling [m]."""
+"""Gap between a canopy and the ceiling [m]."""
 LEANING_GAP = 1e-3
-"""Between the upper edge of what leans and what it leans on [m]."""
+"""Gap between the upper edge of what leans and what it leans on [m]."""
 STANDING_HEIGHT = 1.2
 """Free height below a lamp that hangs over nothing [m]."""
 OVER_TABLE = 0.6
-"""... and over the top of what it hangs above [m]."""
+"""Free height between a lamp and the top of what it hangs above [m]."""
 LEAST_PART = 0.12
 """Either of two carriers is under this share of what lies across them, at least."""
 LEAST_DIFFERENCE = 0.08
-"""One of two carriers carries more than the other by this share, so that the parent is no matter of taste."""
+"""Share by which one of two carriers carries more than the other, so that the parent is no matter of taste."""
 OVERHANG = 0.1
 """An end may stick out over its carrier by this much [m]."""
 SAME_PLACE = 0.02
@@ -140,8 +140,8 @@ def carried_share(carrier: PlacedObject, furnishing: Furnishing, world_from_mode
         return 0.0
     plane = plane_in_world(carrier.furnishing.planes[index], carrier.world_from_model)
     half = 0.5 * furnishing.closed_size[:2]
-    own = box_from_bounds((-half[0], -half[1], 0.0), (half[0], half[1], 0.01))
-    corners = np.column_stack([footprint(own), np.zeros(4)])
+    footprint_box = box_from_bounds((-half[0], -half[1], 0.0), (half[0], half[1], 0.01))
+    corners = np.column_stack([footprint(footprint_box), np.zeros(4)])
     foot = apply(world_from_model, corners)[:, :2]
     shared = clip_polygon(foot, convex_hull(np.asarray(plane.corners)[:, :2]))
     return float(polygon_area(shared) / polygon_area(foot))

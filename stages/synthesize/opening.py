@@ -16,9 +16,9 @@ from scenewright.stages.synthesize.placement import PlacedObject
 OPENED = (0.35, 1.0)
 """Share of its range by which a joint is opened."""
 KINDS = ("door", "drawer")
-"""What is opened: on lids things may stand."""
+"""Kinds of joints that are opened: on lids things may stand."""
 CLEAR = 0.01
-"""Between what was opened and everything else [m]."""
+"""Distance between what was opened and everything else [m]."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,13 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
     affordances = {entry.model: entry for entry in catalogue.library.info.affordances}
     solid = CollisionWorld()
     for thing in arrangement.objects:
-        solid.add(thing.name, thing.furnishing.shape.placed(_lifted(thing)))
+        solid.add(thing.name, thing.furnishing.shape.placed(_lifted_pose(thing)))
     shut: dict[str, PlacedObject] = {}
     opened: dict[str, PlacedObject] = {}
     renumbered: dict[str, dict[int, int]] = {}
     for k in random.permutation(len(arrangement.objects)):
         thing = arrangement.objects[int(k)]
-        names = _openable(thing, affordances.get(thing.furnishing.model.id))
+        names = _openable_joints(thing, affordances.get(thing.furnishing.model.id))
         if len(opened) == count or not names:
             continue
         model, scale = thing.furnishing.model, thing.furnishing.scale
@@ -53,12 +53,16 @@ def open_some(arrangement: Arrangement, catalogue: Catalogue, count: int, random
         joint = next(entry for entry in model.joints if entry.name == name)
         value = round(joint.lower + float(random.uniform(*OPENED)) * (joint.upper - joint.lower), 4)
         trial = replace(thing, furnishing=catalogue.furnishing(model, {name: value}, scale))
-        shape = trial.furnishing.shape.placed(_lifted(thing))
-        own = {thing.name, thing.parent, *(other.name for other in arrangement.objects if other.parent == thing.name)}
+        shape = trial.furnishing.shape.placed(_lifted_pose(thing))
+        may_touch = {
+            thing.name,
+            thing.parent,
+            *(other.name for other in arrangement.objects if other.parent == thing.name),
+        }
         inside = arrangement.room.holds(shape.minimum, shape.maximum)
         planes = planes_kept(thing, trial)
         carrying = {number for other in arrangement.objects for number in planes_under(other, thing.name)}
-        if not inside or not carrying <= set(planes) or solid.conflict(shape, CLEAR, without=own) is not None:
+        if not inside or not carrying <= set(planes) or solid.conflict(shape, CLEAR, without=may_touch) is not None:
             continue
         renumbered[thing.name] = planes
         solid.add(thing.name, shape)
@@ -83,18 +87,18 @@ def planes_kept(shut: PlacedObject, opened: PlacedObject) -> dict[int, int]:
     """Return index -> index: the surfaces of a thing that stands shut, among those that it has opened."""
     after = opened.furnishing.surfaces
     return {
-        k: other
+        k: opened_index
         for k, plane in enumerate(shut.furnishing.surfaces)
-        for other, candidate in enumerate(after)
+        for opened_index, candidate in enumerate(after)
         if same_plane(plane, candidate)
     }
 
 
 def planes_under(thing: PlacedObject, carrier: str) -> list[int]:
     """Return the indices of the carrier's surfaces that a thing stands on or touches."""
-    own = [thing.plane] if thing.parent == carrier else []
-    more = [entry.plane for entry in thing.further if entry.source == carrier]
-    return [plane for plane in (*own, *more) if plane is not None]
+    main_planes = [thing.plane] if thing.parent == carrier else []
+    further_planes = [entry.plane for entry in thing.further if entry.source == carrier]
+    return [plane for plane in (*main_planes, *further_planes) if plane is not None]
 
 
 def carried_as_numbered(thing: PlacedObject, numbers: Mapping[str, Mapping[int, int]]) -> PlacedObject:
@@ -107,7 +111,7 @@ def carried_as_numbered(thing: PlacedObject, numbers: Mapping[str, Mapping[int, 
     return replace(thing, plane=anew(thing.parent, thing.plane), further=further)
 
 
-def _openable(thing: PlacedObject, affordances: Affordances | None) -> list[str]:
+def _openable_joints(thing: PlacedObject, affordances: Affordances | None) -> list[str]:
     """Return the doors and drawers of a thing that stands shut and stays where it is."""
     furnishing = thing.furnishing
     if affordances is None or furnishing.model.movable or any(furnishing.joints.values()):
@@ -115,6 +119,6 @@ def _openable(thing: PlacedObject, affordances: Affordances | None) -> list[str]
     return [use.joint for use in affordances.joints if use.kind in KINDS and not use.behind]
 
 
-def _lifted(thing: PlacedObject) -> np.ndarray:
+def _lifted_pose(thing: PlacedObject) -> np.ndarray:
     """Return its pose a little over what it stands on, so that standing is no touch."""
     return transform_from(np.eye(3), np.array([0.0, 0.0, 2 * TOUCH])) @ thing.world_from_model

@@ -11,7 +11,9 @@ from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, UsageError, first_problem
 
 RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "recipes"
+"""What `--recipe` names lie here."""
 CLUTTER_FACTOR = {"none": 0.0, "low": 0.5, "medium": 1.0, "high": 2.0}
+"""By what `--clutter` multiplies the number of small things."""
 Range = tuple[float, float]
 Rgb = tuple[int, int, int]
 
@@ -109,8 +111,8 @@ def rescaled(recipe: Recipe, share: float) -> Recipe:
     if not share:
         return recipe
     places = [
-        place.model_copy(update={"scale": (place.scale[0] * (1.0 - share), place.scale[1] * (1.0 + share))})
-        for place in recipe.place
+        rule.model_copy(update={"scale": (rule.scale[0] * (1.0 - share), rule.scale[1] * (1.0 + share))})
+        for rule in recipe.place
     ]
     return recipe.model_copy(update={"place": tuple(places)})
 

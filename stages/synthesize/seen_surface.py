@@ -9,9 +9,11 @@ from numba import njit
 from scenewright.schemas.scene_parts import Camera
 
 GRID = 0.01
-"""[m]"""
+"""Edge of the cells, one point each [m]."""
 _BITS = 16
+"""Bits of a coordinate in the number of a cell."""
 _OFFSET = 1 << (_BITS - 1)
+"""Added to the coordinates of cells, so that none is negative."""
 
 
 class _Table(NamedTuple):

@@ -11,7 +11,7 @@ from scenewright.schemas.scene_parts import SurfacePlane
 from scenewright.stages.synthesize.recipes import Shell
 
 THICKNESS = 0.05
-"""Of every slab, outside the room [m]."""
+"""Thickness of every slab, outside the room [m]."""
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,9 @@ from scenewright.stages.synthesize.walk import Walk, frame_times, plan_walk
 from scipy.spatial.transform import Rotation
 
 CAMERAS = {CAMERA_FRAME: 0.0, "camera_left": 60.0, "camera_right": -60.0}
-"""By name: how far each is turned to the left of the one ahead, about the vertical [deg]."""
+"""Cameras by name: how far each is turned to the left of the one ahead, about the vertical [deg]."""
 VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM, PICTURE_STREAM, OPENED_STREAM = 1, 2, 3, 4, 5
+"""Numbers of the streams of random draws; what draws from one leaves the others as they are."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,11 @@ def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Conte
             walk = plan_walk(views, space, renderer, speed, tremor)
         else:
             walk = plan_drive(parameters.path, parameters.rounds, space, renderer, speed, tremor)
-    seen = SeenSurface(DepthCamera().minimum_range, DepthCamera().maximum_range)
+    seen_surface = SeenSurface(DepthCamera().minimum_range, DepthCamera().maximum_range)
     with context.progress.step("render"):
-        recording = _record(arrangement, renderers, walk, camera, seen, parameters, context)
+        recording = _record(arrangement, renderers, walk, camera, seen_surface, parameters, context)
     with context.progress.step("write truth"):
-        _write_truth(states, recording, camera, seen, parameters, context)
+        _write_truth(states, recording, camera, seen_surface, parameters, context)
     return GroundTruth(
         context.output,
         summary={
@@ -89,7 +90,7 @@ def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Conte
             "frames": parameters.frames,
             "seconds_walked": round(len(renderers) * walk.duration, 1),
             "depth_share": round(recording.depth_share, 3),
-            "seen_points": seen.count,
+            "seen_points": seen_surface.count,
         },
     )
 
@@ -125,7 +126,7 @@ def _record(
     renderers: Sequence[SceneRenderer],
     walk: Walk,
     camera: Camera,
-    seen: SeenSurface,
+    seen_surface: SeenSurface,
     parameters: SynthesizeParameters,
     context: Context,
 ) -> Recording:
@@ -153,24 +154,24 @@ def _record(
     ) as writer:
         for number, time in enumerate(context.progress.track(times, total=len(times), description="rendering")):
             name = names[number % len(names)]
-            again = len(renderers) > 1 and time * pace > walk.duration
-            pose = turned(walk.pose(2 * walk.duration - time * pace if again else time * pace), CAMERAS[name])
-            renderer = renderers[-1 if again else 0]
+            second_half = len(renderers) > 1 and time * pace > walk.duration
+            pose = turned(walk.pose(2 * walk.duration - time * pace if second_half else time * pace), CAMERAS[name])
+            renderer = renderers[-1 if second_half else 0]
             view = renderer.render(camera, pose)
             depth = view.depth
             if parameters.depth_noise:
                 reflectance = view.albedo.mean(axis=2)
                 depth = disturb_depth(depth, view.incidence, reflectance, gloss[view.instance], camera, noise)
-            if again or len(renderers) == 1:
-                seen.add(view.depth, view.instance, pose, camera)
+            if second_half or len(renderers) == 1:
+                seen_surface.add(view.depth, view.instance, pose, camera)
             visible += np.bincount(view.instance.reshape(-1), minlength=len(visible))
             valid += int(np.count_nonzero(depth))
             color, right = disturbed_picture(view.color, parameters.picture_noise, pictures), None
             if baseline > 0:
                 right = renderer.render(camera, pose @ left_from_right).color
                 right = disturbed_picture(right, parameters.picture_noise, pictures)
-            shown = depth if parameters.depth else None
-            writer.write(float(time), color, shown, pose, view.instance, right=right, camera_name=name)
+            shown_depth = depth if parameters.depth else None
+            writer.write(float(time), color, shown_depth, pose, view.instance, right=right, camera_name=name)
             poses.append(pose)
     return Recording(times, np.array(poses), visible, valid / (len(times) * camera.width * camera.height))
 
@@ -193,7 +194,7 @@ def _write_truth(
     states: TwoStates,
     recording: Recording,
     camera: Camera,
-    seen: SeenSurface,
+    seen_surface: SeenSurface,
     parameters: SynthesizeParameters,
     context: Context,
 ) -> None:
@@ -213,7 +214,7 @@ def _write_truth(
         depth_noise=parameters.depth_noise,
         objects=tuple(true_objects(arrangement, boxes, recording.visible_pixels, states.before)),
     ).write(out / "ground_truth.json")
-    points, instance = seen.result()
+    points, instance = seen_surface.result()
     np.savez(out / "visible.npz", points=points, instance=instance)
     true_mesh(arrangement).export(out / "mesh.ply")
     (out / "room").mkdir()

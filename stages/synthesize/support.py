@@ -35,7 +35,7 @@ def sample_stand(
     choices = [
         k
         for k, plane in enumerate(surfaces)
-        if (k >= first_drawer) == (place.surface == "drawer") and _allowed(plane, base, top, place)
+        if (k >= first_drawer) == (place.surface == "drawer") and _is_allowed(plane, base, top, place)
     ]
     if not choices:
         return None
@@ -57,22 +57,22 @@ def sample_stand(
     if height is None:
         return None
     local[2, 3] = height
-    if not _reachable(target.furnishing, item, local):
+    if not _is_reachable(target.furnishing, item, local):
         return None
     return target.world_from_model @ local, index, height < top - INSIDE_DEPTH
 
 
-def _allowed(plane: SurfacePlane, base: float, top: float, place: Place) -> bool:
+def _is_allowed(plane: SurfacePlane, base: float, top: float, rule: Place) -> bool:
     if not plane.horizontal or plane.hidden or len(plane.corners) != 4:
         return False
     level = -plane.offset / plane.normal[2]
     inside = level < top - INSIDE_DEPTH
-    if (place.surface == "inside" and not inside) or (place.surface == "top" and inside):
+    if (rule.surface == "inside" and not inside) or (rule.surface == "top" and inside):
         return False
-    return place.height is None or place.height[0] <= base + level <= place.height[1]
+    return rule.height is None or rule.height[0] <= base + level <= rule.height[1]
 
 
-def _reachable(target: Furnishing, item: Furnishing, target_from_item: np.ndarray) -> bool:
+def _is_reachable(target: Furnishing, item: Furnishing, target_from_item: np.ndarray) -> bool:
     """Whether rays from the item's middle leave the target upwards, or all three of them (left, middle, right)
     through its front (-y): nobody puts things behind closed doors."""
     size = item.closed_size

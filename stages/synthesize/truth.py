@@ -62,8 +62,12 @@ def object_box(vertices: np.ndarray, world_from_model: np.ndarray) -> Box:
     least = minimum_box(vertices)
     if world_from_model[2, 2] < UPRIGHT * np.linalg.norm(world_from_model[:3, 2]):
         return least
-    own = box_at_yaw(vertices, float(np.arctan2(world_from_model[1, 0], world_from_model[0, 0])))
-    return own if own.size[0] * own.size[1] <= (1.0 + AXES_TOLERANCE) * least.size[0] * least.size[1] else least
+    model_aligned = box_at_yaw(vertices, float(np.arctan2(world_from_model[1, 0], world_from_model[0, 0])))
+    return (
+        model_aligned
+        if model_aligned.size[0] * model_aligned.size[1] <= (1.0 + AXES_TOLERANCE) * least.size[0] * least.size[1]
+        else least
+    )
 
 
 def true_objects(
@@ -257,12 +261,12 @@ def scene_bodies(arrangement: Arrangement, boxes: dict[str, Box], graph: Contact
 
 def true_mesh(arrangement: Arrangement) -> trimesh.Trimesh:
     """Return the whole surface in the world frame with vertex colours and the vertex attribute `instance`."""
-    parts, labels = [], []
+    meshes, labels = [], []
     for instance, mesh in world_meshes(arrangement):
         visual: Any = mesh.visual
         colors = np.asarray(visual.to_color().vertex_colors if visual.kind == "texture" else visual.vertex_colors)
-        parts.append(trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=colors, process=False))
+        meshes.append(trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=colors, process=False))
         labels.append(np.full(len(mesh.vertices), instance, dtype=np.int32))
-    whole: Any = trimesh.util.concatenate(parts)
-    whole.vertex_attributes["instance"] = np.concatenate(labels)
-    return whole
+    room_mesh: Any = trimesh.util.concatenate(meshes)
+    room_mesh.vertex_attributes["instance"] = np.concatenate(labels)
+    return room_mesh

@@ -18,13 +18,15 @@ from scenewright.stages.synthesize.free_space import CELL, FreeSpace, find_free_
 from scenewright.stages.synthesize.placement import PlacedObject
 
 EYE_HEIGHT = 1.5
-"""[m]"""
+"""Height of the camera over the floor [m]."""
 CANDIDATES, SAMPLES = 260, 5000
+"""Views that are tried, and points of the room that they are judged by; by eye."""
 NEAR, FAR, STEEPEST = 0.6, 3.5, 0.25
 """A sample counts as seen between these depths [m] and with at least this cosine of incidence."""
 LEAST_FLOOR = 3.0
-"""[m^2]"""
+"""Least free floor of a room that is walked through [m^2]."""
 LAYOUT_WEIGHT = {"floor": 1.0, "wall": 0.3, "ceiling": 0.0}
+"""Weight of the room's own surfaces beside that of things (1); by eye."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +39,10 @@ class View:
     """(3,) [m]."""
 
 
-def _reachable(space: FreeSpace, wanted: np.ndarray, radius: float) -> np.ndarray | None:
+def _nearest_floor_point(space: FreeSpace, target: np.ndarray, radius: float) -> np.ndarray | None:
     """Return the walkable floor point nearest to a wanted one (2,), or None when it is further than `radius`."""
     cells = space.cells()
-    distance = np.linalg.norm(cells - wanted, axis=1)
+    distance = np.linalg.norm(cells - target, axis=1)
     best = int(np.argmin(distance))
     return cells[best] if distance[best] <= radius else None
 
@@ -88,7 +90,7 @@ def _into(thing: PlacedObject, space: FreeSpace) -> list[View]:
         (0.4, 1.2, 1.4, 0.55),
     ):
         local = np.array([reach * np.sin(angle), -size[1] / 2 - reach * np.cos(angle), 0.0])
-        spot = _reachable(space, apply(pose, local)[:2], 0.35)
+        spot = _nearest_floor_point(space, apply(pose, local)[:2], 0.35)
         if spot is not None:
             views.append(View(np.array([*spot, height]), apply(pose, np.array([0.0, 0.0, aim * size[2]]))))
     return views
@@ -104,7 +106,7 @@ def _closely_at(item: PlacedObject, container: PlacedObject, space: FreeSpace) -
     target = item.world_from_model[:3, 3] + np.array([0.0, 0.0, item.furnishing.closed_size[2] / 2])
     views = []
     for side in (-0.15, 0.15):
-        spot = _reachable(space, apply(pose, np.array([side, -size[1] / 2 - 0.65, 0.0]))[:2], 0.35)
+        spot = _nearest_floor_point(space, apply(pose, np.array([side, -size[1] / 2 - 0.65, 0.0]))[:2], 0.35)
         if spot is not None:
             views.append(View(np.array([*spot, np.clip(target[2] + 0.25, 0.8, EYE_HEIGHT)]), target))
     return views
@@ -116,7 +118,7 @@ def _up_at(thing: PlacedObject, space: FreeSpace) -> list[View]:
     views = []
     for angle in (0.3, 2.4):
         away = pose[:2, 3] + 1.8 * np.array([np.cos(angle), np.sin(angle)])
-        spot = _reachable(space, away, 0.6)
+        spot = _nearest_floor_point(space, away, 0.6)
         if spot is not None:
             views.append(View(np.array([*spot, EYE_HEIGHT - 0.2]), apply(pose, np.array([0.0, 0.0, 0.8 * size[2]]))))
     return views
@@ -128,7 +130,7 @@ def _onto(thing: PlacedObject, space: FreeSpace) -> list[View]:
     for angle in np.arange(6) * np.pi / 3:
         reach = 0.75 + 0.5 * np.hypot(size[0] * np.cos(angle), size[1] * np.sin(angle))
         local = np.array([reach * np.cos(angle), reach * np.sin(angle), 0.0])
-        spot = _reachable(space, apply(pose, local)[:2], 0.3)
+        spot = _nearest_floor_point(space, apply(pose, local)[:2], 0.3)
         if spot is not None:
             views.append(View(np.array([*spot, EYE_HEIGHT]), apply(pose, np.array([0.0, 0.0, size[2]]))))
     return views[:4] if len(views) <= 4 else views[:: max(1, len(views) // 4)]
@@ -142,8 +144,8 @@ def _surface_samples(
     soup = renderer.soup
     edges = np.cross(soup.corners[:, 1] - soup.corners[:, 0], soup.corners[:, 2] - soup.corners[:, 0])
     area = 0.5 * np.linalg.norm(edges, axis=1).astype(np.float64)
-    whole = np.bincount(soup.instance, weights=area)
-    share = area / np.sqrt(whole[soup.instance])
+    instance_area = np.bincount(soup.instance, weights=area)
+    share = area / np.sqrt(instance_area[soup.instance])
     pick = random.choice(len(area), SAMPLES, p=share / share.sum())
     u, v = np.sqrt(random.random(SAMPLES)), random.random(SAMPLES)
     corners = soup.corners[pick].astype(np.float64)
@@ -156,7 +158,9 @@ def _surface_samples(
     return points, soup.face_normals[pick].astype(np.float64), weight[soup.instance[pick]]
 
 
-def _seen(renderer: SceneRenderer, camera: Camera, view: View, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _is_seen(
+    renderer: SceneRenderer, camera: Camera, view: View, points: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
     """Return (N,) bool: which samples a view sees well."""
     world_from_camera = look_at(view.eye, view.target)
     pixels, depth = project(apply(inverse(world_from_camera), points), camera)
@@ -171,9 +175,9 @@ def _seen(renderer: SceneRenderer, camera: Camera, view: View, points: np.ndarra
     rows = np.flatnonzero(inside)
     lifted = points[rows] + 2e-3 * normals[rows]
     blocked = renderer.occluded(lifted, np.broadcast_to(view.eye, lifted.shape))
-    seen = np.zeros(len(points), dtype=bool)
-    seen[rows[~blocked]] = True
-    return seen
+    is_visible = np.zeros(len(points), dtype=bool)
+    is_visible[rows[~blocked]] = True
+    return is_visible
 
 
 def choose_views(
@@ -191,7 +195,7 @@ def choose_views(
     required = required_views(arrangement, space)
     missing = np.ones(len(points), dtype=bool)
     for view in required:
-        missing &= ~_seen(renderer, camera, view, points, normals)
+        missing &= ~_is_seen(renderer, camera, view, points, normals)
     cells = space.cells()
     candidates = []
     for _ in range(CANDIDATES):
@@ -203,15 +207,15 @@ def choose_views(
         # A sensor in the hand looks a little down, and never steeper than this.
         target[2] = np.clip(target[2], eye[2] - 1.2 * flat, eye[2] - 0.1 * flat)
         candidates.append(View(eye, target))
-    seen = np.array([_seen(renderer, camera, view, points, normals) for view in candidates])
-    overview = int(np.argmax(seen @ weight))
-    missing &= ~seen[overview]
+    visible = np.array([_is_seen(renderer, camera, view, points, normals) for view in candidates])
+    overview = int(np.argmax(visible @ weight))
+    missing &= ~visible[overview]
     chosen = [candidates[overview], *required]
     for _ in range(extra):
-        gain = (seen & missing) @ weight
+        gain = (visible & missing) @ weight
         best = int(np.argmax(gain))
         if gain[best] < 0.006 * weight.sum():
             break
         chosen.append(candidates[best])
-        missing &= ~seen[best]
+        missing &= ~visible[best]
     return chosen

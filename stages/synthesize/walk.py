@@ -96,11 +96,11 @@ def order_views(views: list[View], space: FreeSpace) -> list[View]:
     heading = np.array([np.arctan2(*(view.target - view.eye)[1::-1]) for view in views])
     turn = np.abs((heading[:, None] - heading[None] + np.pi) % (2 * np.pi) - np.pi)
     cost = cost + 0.5 * turn
-    tour, left = [0], set(range(1, len(views)))
-    while left:
-        following = min(left, key=lambda k: (cost[tour[-1], k], k))
+    tour, unvisited = [0], set(range(1, len(views)))
+    while unvisited:
+        following = min(unvisited, key=lambda k: (cost[tour[-1], k], k))
         tour.append(following)
-        left.remove(following)
+        unvisited.remove(following)
     return [views[k] for k in _two_opt(tour, cost)]
 
 
@@ -133,13 +133,13 @@ def resample(points: np.ndarray, marks: np.ndarray) -> tuple[np.ndarray, np.ndar
 def smooth_path(path: np.ndarray, space: FreeSpace) -> np.ndarray:
     """Round off a floor path (N, 2) as far as the clearance allows: every point takes the widest filter that keeps
     it clear."""
-    wanted = CLEARANCE + 0.01
+    least_clearance = CLEARANCE + 0.01
     result = path
     for sigma in (0.08, 0.15, 0.3, 0.45):
         candidate = gaussian_filter1d(path, sigma / STEP, axis=0, mode="nearest")
-        fine = (space.clearance_at(candidate) >= wanted).astype(float)
+        fine = (space.clearance_at(candidate) >= least_clearance).astype(float)
         # Blend with a smooth weight, so that switching filters makes no corner.
-        weight = gaussian_filter1d(np.where(_eroded(fine, int(0.5 / STEP)), 1.0, 0.0), 0.15 / STEP)[:, None]
+        weight = gaussian_filter1d(np.where(_erode(fine, int(0.5 / STEP)), 1.0, 0.0), 0.15 / STEP)[:, None]
         mixed = weight * candidate + (1 - weight) * result
         good = space.clearance_at(mixed) >= CLEARANCE
         if good.all():
@@ -147,7 +147,7 @@ def smooth_path(path: np.ndarray, space: FreeSpace) -> np.ndarray:
     return result
 
 
-def _eroded(flags: np.ndarray, reach: int) -> np.ndarray:
+def _erode(flags: np.ndarray, reach: int) -> np.ndarray:
     bad = np.convolve(1.0 - flags, np.ones(2 * reach + 1), mode="same")
     return bad < 0.5
 
@@ -203,8 +203,8 @@ def plan_walk(
 
 def _unique(rows: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return increasing rows and their first values, as np.interp wants them."""
-    kept, first = np.unique(rows, return_index=True)
-    return kept, values[first]
+    distinct_rows, first = np.unique(rows, return_index=True)
+    return distinct_rows, values[first]
 
 
 def frame_times(duration: float, frames: int, rate: float) -> np.ndarray:

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 SPACING = 0.01
 """Edge of the cubes of which each holds one point [m]."""
 LABEL_BITS = 16
+"""Bits of a label where it shares a number with its cube."""
 
 
 def seen_points(
@@ -37,11 +38,15 @@ def seen_points(
             if frame.depth is None or frame.world_from_camera is None:
                 continue
             valid = (frame.depth > 0) & (frame.depth <= maximum_depth)
-            seen = back_project(frame.depth, reader.cameras[frame.camera_name])[valid]
-            values = np.zeros(len(seen), np.int64) if frame.labels is None else frame.labels[valid].astype(np.int64)
-            thinned, kept = most_common_labels(apply(frame.world_from_camera, seen.astype(float)), values)
+            camera_points = back_project(frame.depth, reader.cameras[frame.camera_name])[valid]
+            values = (
+                np.zeros(len(camera_points), np.int64) if frame.labels is None else frame.labels[valid].astype(np.int64)
+            )
+            thinned, thinned_labels = most_common_labels(
+                apply(frame.world_from_camera, camera_points.astype(float)), values
+            )
             points.append(thinned)
-            labels.append(kept)
+            labels.append(thinned_labels)
     if not points or not sum(map(len, points)):
         raise BadInput(f"{sequence.root}: no frame has a pose and depth up to {maximum_depth:g} m")
     return most_common_labels(np.concatenate(points), np.concatenate(labels))
@@ -89,13 +94,13 @@ def instances_of(
     for k, node in enumerate(annotation.nodes, 1):
         if node.find.labels:
             owner[np.isin(labels, node.find.labels)] = k
-    named = {k: node.find.point for k, node in enumerate(annotation.nodes, 1) if node.find.point is not None}
-    if not named:
+    point_of_node = {k: node.find.point for k, node in enumerate(annotation.nodes, 1) if node.find.point is not None}
+    if not point_of_node:
         return points, owner
     if panoptic_map is None:
-        first = annotation.nodes[min(named) - 1].name
+        first = annotation.nodes[min(point_of_node) - 1].name
         raise BadInput(f"node {first} is found by a point, which takes a map", hint="give --panoptic-map")
-    surface, surface_owner = surface_at(panoptic_map, named, reach)
+    surface, surface_owner = surface_at(panoptic_map, point_of_node, reach)
     if not len(surface):
         return points, owner
     free = cKDTree(surface).query(points, distance_upper_bound=2 * SPACING)[0] > 2 * SPACING
@@ -121,8 +126,8 @@ def surface_at(
         meshes[entity.instance] = vertices
     surfaces, owners = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     for instance in np.unique(entity_at[entity_at >= 0]):
-        own = np.flatnonzero(entity_at == instance)
+        of_instance = np.flatnonzero(entity_at == instance)
         thinned, _ = most_common_labels(meshes[int(instance)], np.zeros(len(meshes[int(instance)]), np.int64))
         surfaces.append(thinned)
-        owners.append(np.array(keys)[own[cKDTree(places[own]).query(thinned)[1]]])
+        owners.append(np.array(keys)[of_instance[cKDTree(places[of_instance]).query(thinned)[1]]])
     return np.concatenate(surfaces), np.concatenate(owners)

@@ -45,11 +45,13 @@ def run(
     (instances,) = read_arrays(panoptic_map.path("mesh_labels.npz"), "instance", shapes=("V",), hint=HINT)
     graph = contact_graph.info if cad_scene is None else cad_scene.graph
     nodes = [node for node in graph.nodes if node.box is not None]
-    known = {entity.instance: entity.class_name for entity in panoptic_map.info.entities}
+    class_of_instance = {entity.instance: entity.class_name for entity in panoptic_map.info.entities}
     for node in nodes:
-        if known.get(node.instance, node.class_name) != node.class_name:
-            raise BadInput(f"{panoptic_map.root}: {node.id} is {known[node.instance]}_{node.instance} there", hint=HINT)
-    if not {node.instance for node in nodes} & known.keys():
+        if class_of_instance.get(node.instance, node.class_name) != node.class_name:
+            raise BadInput(
+                f"{panoptic_map.root}: {node.id} is {class_of_instance[node.instance]}_{node.instance} there", hint=HINT
+            )
+    if not {node.instance for node in nodes} & class_of_instance.keys():
         raise BadInput(f"{panoptic_map.root}: holds none of the things of the graph", hint=HINT)
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
     owner = np.where(np.isin(instances, [node.instance for node in nodes]), instances, 0)

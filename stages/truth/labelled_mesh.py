@@ -37,7 +37,7 @@ def read_labelled_mesh(path: Path) -> LabelledMesh:
     labels = np.asarray(columns["label"]).reshape(-1)
     if len(labels) != len(mesh.vertices):
         raise BadInput(f"{path}: {len(labels)} labels for {len(mesh.vertices)} vertices", hint=HINT)
-    whole = labels.astype(np.int64)
-    if (whole != labels).any() or (whole < 0).any():
+    integers = labels.astype(np.int64)
+    if (integers != labels).any() or (integers < 0).any():
         raise BadInput(f"{path}: labels that are no integers from 0 on", hint=HINT)
-    return LabelledMesh(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64), whole)
+    return LabelledMesh(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64), integers)

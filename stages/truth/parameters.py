@@ -13,7 +13,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 WORDS = "annotations/scenenn.toml"
-"""Which annotated words are which class (below data/)."""
+"""File below data/ that says which annotated words are which class."""
 
 
 class SceneNNParameters(Parameters):

@@ -145,7 +145,7 @@ def true_objects(
     """
     order = np.argsort(instances, kind="stable")
     numbers, starts = np.unique(instances[order], return_index=True)
-    parts = dict(zip(numbers.tolist(), np.split(order, starts[1:]), strict=True))
+    vertices_of = dict(zip(numbers.tolist(), np.split(order, starts[1:]), strict=True))
     counts = dict(zip(*(array.tolist() for array in np.unique(point_instances, return_counts=True)), strict=True))
     return tuple(
         TrueObject(
@@ -153,12 +153,12 @@ def true_objects(
             name=f"{name}_{instance}",
             class_name=name,
             world_from_model=as_transform(np.eye(4)),
-            box=minimum_box(vertices[parts[instance]]),
-            round=is_round(vertices[parts[instance], :2]),
+            box=minimum_box(vertices[vertices_of[instance]]),
+            round=is_round(vertices[vertices_of[instance], :2]),
             visible_pixels=counts.get(instance, 0),
         )
         for instance, name in sorted(classes.items())
-        if instance in parts
+        if instance in vertices_of
     )
 
 

@@ -19,7 +19,7 @@ from scenewright.schemas.hand_written import Point, UprightBox
 from scenewright.schemas.vocabulary import load_vocabulary
 
 LARGEST_FILE = 4 * 2**20
-"""Bytes. A scene has a few dozen things."""
+"""Most bytes of an annotation. A scene has a few dozen things."""
 HINT = 'docs/FORMATS.md, "Support annotations", shows one'
 
 
@@ -106,10 +106,10 @@ def read_support_annotation(path: Path) -> SupportAnnotation:
 def contradictions(annotation: SupportAnnotation) -> Iterator[str]:
     """Yield what an annotation says that cannot be, in words."""
     names = [node.name for node in annotation.nodes]
-    yield from (f"node {name} is there twice" for name in _repeated(names))
+    yield from (f"node {name} is there twice" for name in _repeated_values(names))
     yield from ("a node may not be called scene, the root is" for name in names if name == SCENE_NODE)
     labels = [label for node in annotation.nodes for label in node.find.labels]
-    yield from (f"label {label} is of two nodes" for label in _repeated(labels))
+    yield from (f"label {label} is of two nodes" for label in _repeated_values(labels))
     classes = {entry.name: entry for entry in load_vocabulary().classes}
     for node in annotation.nodes:
         if node.class_name not in classes:
@@ -118,7 +118,9 @@ def contradictions(annotation: SupportAnnotation) -> Iterator[str]:
             yield f"node {node.name}: find takes exactly one of labels, box and point"
     if labels and not all(node.find.labels for node in annotation.nodes):
         yield "some nodes are found by labels and some in the world; one file takes one way"
-    yield from (f"{name} is the child of two relations" for name in _repeated(r.child for r in annotation.relations))
+    yield from (
+        f"{name} is the child of two relations" for name in _repeated_values(r.child for r in annotation.relations)
+    )
     for relation in annotation.relations:
         others = (*relation.carriers(), *relation.leans_on, *relation.uncertain)
         for name in (relation.child, *others):
@@ -126,7 +128,7 @@ def contradictions(annotation: SupportAnnotation) -> Iterator[str]:
                 yield f"relation of {relation.child}: there is no node {name}"
         if relation.child in others:
             yield f"{relation.child} is said to carry itself"
-        yield from (f"relation of {relation.child}: {name} is named twice" for name in _repeated(others))
+        yield from (f"relation of {relation.child}: {name} is named twice" for name in _repeated_values(others))
     layout = {
         node.name for node in annotation.nodes if node.class_name in classes and classes[node.class_name].is_layout
     }
@@ -137,10 +139,10 @@ def contradictions(annotation: SupportAnnotation) -> Iterator[str]:
         yield f"{circle} carries itself by way of others"
 
 
-def _repeated(values: Iterable[str | int]) -> list[str | int]:
+def _repeated_values(values: Iterable[str | int]) -> list[str | int]:
     """Values that come a second time, in order."""
-    seen: set[str | int] = set()
-    return [value for value in values if value in seen or seen.add(value)]  # type: ignore[func-returns-value]
+    earlier: set[str | int] = set()
+    return [value for value in values if value in earlier or earlier.add(value)]  # type: ignore[func-returns-value]
 
 
 def _circle(carriers: dict[str, tuple[str, ...]]) -> str | None:

@@ -100,9 +100,9 @@ def annotated_objects(annotation: SupportAnnotation, points: np.ndarray, owner: 
     """
     result = []
     for k, node in enumerate(annotation.nodes, 1):
-        own = points[owner == k]
+        node_points = points[owner == k]
         where = node.find.box
-        box = upright_box(where) if where is not None else (minimum_box(own) if len(own) else NOT_SEEN)
+        box = upright_box(where) if where is not None else (minimum_box(node_points) if len(node_points) else NOT_SEEN)
         result.append(
             TrueObject(
                 instance=k,
@@ -110,8 +110,8 @@ def annotated_objects(annotation: SupportAnnotation, points: np.ndarray, owner: 
                 class_name=node.class_name,
                 world_from_model=as_transform(np.eye(4)),
                 box=box,
-                round=len(own) >= 3 and is_round(own[:, :2]),
-                visible_pixels=0 if node.optional else len(own),
+                round=len(node_points) >= 3 and is_round(node_points[:, :2]),
+                visible_pixels=0 if node.optional else len(node_points),
             )
         )
     return tuple(result)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 MOST_POINTS = 200_000_000
+"""Most points that may be laid on a surface; a guard against what does not fit into memory, by eye."""
 
 
 def surface_points(

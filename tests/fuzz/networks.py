@@ -39,7 +39,7 @@ def service_reply(data: bytes) -> None:
     with contextlib.suppress(BadInput):
         reply = parse_reply(data, "application/json", SHAPE, CATEGORIES)
         assert reply.ids.shape == SHAPE and set(np.unique(reply.ids)) - {0} == set(reply.segments)
-        assert all(s.category_id in CATEGORIES and 0 <= s.score <= 1 for s in reply.segments.values())
+        assert all(s.class_id in CATEGORIES and 0 <= s.score <= 1 for s in reply.segments.values())
 
 
 def _reply_seeds() -> dict[str, bytes]:

@@ -36,7 +36,7 @@ def shown_and_named(
             continue
         ids, counts = np.unique(masks.ids[own], return_counts=True)
         found[number] = any(
-            masks.masks[k].category_id == mask.category_id
+            masks.masks[k].class_id == mask.class_id
             and count >= overlap * (np.count_nonzero(masks.ids == k) + pixels - count)
             for k, count in zip(ids.tolist(), counts.tolist(), strict=True)
             if k in masks.masks

@@ -53,7 +53,7 @@ class Architecture:
 SMALL = Architecture(
     widths=(8, 24, 32), hidden=(32, 32, 8), scales=2, features=48, motion=(24, 32), head=32, mask=32, shared=True
 )
-"""Of the network that is trained here, on our own renderings."""
+"""Architecture of the network that is trained here, on our own renderings."""
 
 
 def architecture_of(shapes: Shapes, where: str) -> Architecture:

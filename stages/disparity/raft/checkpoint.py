@@ -14,7 +14,7 @@ from scenewright.stages.kit.formats.safetensors_file import read_safetensors, wr
 
 FORMAT = "RAFT-Stereo checkpoint"
 PREFIX = "module."
-"""Before every name in the authors' files, which were saved from several devices at once."""
+"""Prefix of every name in the authors' files, which were saved from several devices at once."""
 
 
 def load_network(path: Path) -> RaftStereo:
@@ -44,10 +44,10 @@ def read_tensors(path: Path) -> dict[str, np.ndarray]:
         raise BadInput(f"{path}: no checkpoint that can be read: {reason}", hint=OTHER_FILE) from None
     if isinstance(content, dict) and isinstance(content.get("state_dict"), dict):
         content = content["state_dict"]
-    whole = isinstance(content, dict) and all(
+    is_state = isinstance(content, dict) and all(
         isinstance(name, str) and isinstance(tensor, torch.Tensor) for name, tensor in content.items()
     )
-    if not whole:
+    if not is_state:
         raise BadInput(f"{path}: holds no table of tensors", hint=OTHER_FILE)
     return {name.removeprefix(PREFIX): tensor.detach().numpy() for name, tensor in content.items()}
 

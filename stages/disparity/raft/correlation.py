@@ -28,8 +28,8 @@ class RowCorrelation:
         around = torch.arange(-self.radius, self.radius + 1, dtype=column.dtype, device=column.device)
         levels = []
         for level, volume in enumerate(self.pyramid):
-            wanted = column.reshape(-1, 1) / 2**level + around
-            levels.append(sampled(volume[:, 0], wanted))
+            columns = column.reshape(-1, 1) / 2**level + around
+            levels.append(sampled(volume[:, 0], columns))
         return torch.cat(levels, dim=1).reshape(*self.size, -1).permute(0, 3, 1, 2)
 
 

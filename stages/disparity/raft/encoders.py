@@ -89,9 +89,9 @@ class ContextEncoder(Trunk):
         """(N, C, h, w) of the trunk -> (state, told) of the `count` finest scales."""
         heads = (self.outputs08, self.outputs16, self.outputs32)
         shrink = (self.layer4, self.layer5)
-        states, given = [], finest
+        states, features = [], finest
         for k in range(count):
-            given = shrink[k - 1](given) if k else given
-            state, context = (head(given) for head in heads[k])
+            features = shrink[k - 1](features) if k else features
+            state, context = (head(features) for head in heads[k])
             states.append((torch.tanh(state), torch.relu(context)))
         return states

@@ -93,9 +93,9 @@ def match(
     forward = estimated(network, left, moved, iterations, device)
     backward = estimated(network, mirrored(moved), mirrored(left), iterations, device)[:, ::-1]
     difference = left_right_difference(forward, backward)
-    kept = (difference <= agreement) & (forward + lowest > 0)
-    disparity = np.where(kept, forward + lowest, np.nan).astype(np.float32)
-    difference[~kept] = np.inf
+    is_valid = (difference <= agreement) & (forward + lowest > 0)
+    disparity = np.where(is_valid, forward + lowest, np.nan).astype(np.float32)
+    difference[~is_valid] = np.inf
     return DisparityMap(disparity, confidence_of(difference, disparity, gray_of(left)))
 
 

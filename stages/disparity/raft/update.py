@@ -43,9 +43,9 @@ class MotionEncoder(nn.Module):
 
     def forward(self, flow: torch.Tensor, correlation: torch.Tensor) -> torch.Tensor:
         """(N, 2, h, w), (N, planes, h, w) -> (N, outside, h, w), whose last two channels are the flow itself."""
-        seen = torch.relu(self.convc2(torch.relu(self.convc1(correlation))))
-        moved = torch.relu(self.convf2(torch.relu(self.convf1(flow))))
-        return torch.cat([torch.relu(self.conv(torch.cat([seen, moved], dim=1))), flow], dim=1)
+        correlation_features = torch.relu(self.convc2(torch.relu(self.convc1(correlation))))
+        flow_features = torch.relu(self.convf2(torch.relu(self.convf1(flow))))
+        return torch.cat([torch.relu(self.conv(torch.cat([correlation_features, flow_features], dim=1))), flow], dim=1)
 
 
 class FlowHead(nn.Module):

@@ -81,7 +81,7 @@ class SegmentRequest:
 class ReplySegment:
     """One entry of segments_info."""
 
-    category_id: int
+    class_id: int
     is_thing: bool
     score: float
 
@@ -207,7 +207,7 @@ def encode_reply(reply: Reply) -> bytes:
         {
             "protocol": PROTOCOL,
             "segments_info": [
-                {"id": i, "category_id": s.category_id, "isthing": int(s.is_thing), "score": s.score}
+                {"id": i, "category_id": s.class_id, "isthing": int(s.is_thing), "score": s.score}
                 for i, s in sorted(reply.segments.items())
             ],
             "panoptic_png": base64.b64encode(encode_panoptic_png(reply.ids)).decode(),
@@ -332,19 +332,19 @@ def _segments(rows: Any, categories: Mapping[int, Category]) -> dict[int, ReplyS
     for row in rows:
         if not isinstance(row, dict):
             _refuse("an entry of segments_info is no object")
-        segment_id, category_id, score = row.get("id"), row.get("category_id"), row.get("score", 1.0)
+        segment_id, class_id, score = row.get("id"), row.get("category_id"), row.get("score", 1.0)
         if not _is_integer(segment_id) or not 0 < segment_id <= LARGEST_ID:
             _refuse(f"segment id {segment_id!r:.40} is no integer in 1..{LARGEST_ID}")
         if segment_id in segments:
             _refuse(f"segment id {segment_id} comes twice")
-        if not _is_integer(category_id) or category_id not in categories:
-            _refuse(f"segment {segment_id} has category {category_id!r:.40}, which its description does not list")
+        if not _is_integer(class_id) or class_id not in categories:
+            _refuse(f"segment {segment_id} has category {class_id!r:.40}, which its description does not list")
         if isinstance(score, bool) or not isinstance(score, int | float) or not _in_unit(score):
             _refuse(f"segment {segment_id} has score {score!r:.40}, not one in 0..1")
-        is_thing = row.get("isthing", categories[category_id].isthing)
+        is_thing = row.get("isthing", categories[class_id].isthing)
         if is_thing not in (0, 1):
             _refuse(f"segment {segment_id} has isthing {is_thing!r:.40}, not 0 or 1")
-        segments[segment_id] = ReplySegment(category_id, bool(is_thing), float(score))
+        segments[segment_id] = ReplySegment(class_id, bool(is_thing), float(score))
     return segments
 
 

@@ -17,7 +17,7 @@ from scenewright.stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, p
 from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 MOST_TILT = 0.35
-"""What was put down stands when it is tilted by less [rad]."""
+"""Largest tilt of what was put down and stands [rad]."""
 
 
 class Place(PlanAction):
@@ -123,21 +123,21 @@ class Place(PlanAction):
     ) -> tuple[np.ndarray, np.ndarray]:
         """The place is tied to the target, at the height at which the target is seen there."""
         assert manipulation.item_pose is not None
-        place = manipulation.item_pose.copy()
-        place[:3, 3] += shift
-        bottom = place[2, 3] + model.foot(arguments[0])
-        place[2, 3] += nearest_level(model, arguments[1], place[:2, 3], bottom) - bottom + PUT_DOWN_HEIGHT
-        return manipulation.base + np.array([shift[0], shift[1], 0.0]), place
+        goal_pose = manipulation.item_pose.copy()
+        goal_pose[:3, 3] += shift
+        bottom = goal_pose[2, 3] + model.foot(arguments[0])
+        goal_pose[2, 3] += nearest_level(model, arguments[1], goal_pose[:2, 3], bottom) - bottom + PUT_DOWN_HEIGHT
+        return manipulation.base + np.array([shift[0], shift[1], 0.0]), goal_pose
 
     def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
         """It stands on its target as it was to stand."""
         item, target = arguments[:2]
-        here, there = conduct.matched(item), conduct.matched(target)
-        parent = carrier(conduct.physical.world, here)
+        item_body, target_body = conduct.matched(item), conduct.matched(target)
+        parent = carrier(conduct.physical.world, item_body)
         standing = conduct.model.standing(item)
         tilt = float(np.arccos(np.clip((conduct.pose_in_room(item) @ standing.T)[2, 2], -1.0, 1.0)))
         fell = tilt > MOST_TILT and abs(standing[2, 2]) > 0.5
-        if parent != there or fell:
+        if parent != target_body or fell:
             raise MotionFailed(
                 "condition_not_met",
                 f"{item} was let go over {target} and is now on {parent or 'nothing'}, {np.degrees(tilt):.0f} degrees "

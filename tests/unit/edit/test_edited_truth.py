@@ -60,7 +60,7 @@ def test_masks_of_a_map_are_those_of_its_things(room: Path) -> None:
             drawn = masks.read(frame.index)
             wrong += int((drawn != frame.labels).sum())
             total += drawn.size
-            assert {segment.id: segment.category_id for segment in record.segments} == {
+            assert {segment.id: segment.class_id for segment in record.segments} == {
                 k: classes[{3: "cup", 5: "cabinet"}.get(k, ROOM[k][0])] for k in np.unique(drawn).tolist() if k
             }
             assert sum(segment.area for segment in record.segments) == int((drawn > 0).sum())

@@ -302,8 +302,8 @@ def make_segments(root: Path, label: str = LABEL) -> Segments:
     image[:20, 10:50] = 2
     write_panoptic_zip(root / "panoptic.zip", ((k, image) for k in range(6)))
     segments = (
-        FrameSegment(id=1, category_id=1, instance=1, is_thing=False, score=1.0, area=int((image == 1).sum())),
-        FrameSegment(id=2, category_id=5, instance=2, is_thing=True, score=0.8, area=int((image == 2).sum())),
+        FrameSegment(id=1, class_id=1, instance=1, is_thing=False, score=1.0, area=int((image == 1).sum())),
+        FrameSegment(id=2, class_id=5, instance=2, is_thing=True, score=0.8, area=int((image == 2).sum())),
     )
     SegmentsFile(
         backend="ground-truth",

@@ -40,7 +40,7 @@ def segment(number: int, name: str | None, instance: int, score: float, ids: np.
     entry = CLASSES[name] if name else None
     return FrameSegment(
         id=number,
-        category_id=entry.id if entry else 0,
+        class_id=entry.id if entry else 0,
         instance=instance,
         is_thing=bool(entry and entry.kind == "thing"),
         score=score,
@@ -174,7 +174,7 @@ def test_masks_that_name_nothing_give_pictures_without_masks(sequence: Sequence,
     nameless = write_segments(tmp_path / "segments", frames=(0,))
     info = nameless.info
     (row,) = info.frames
-    bare = tuple(s.model_copy(update={"category_id": 0, "instance": 0, "is_thing": False}) for s in row.segments)
+    bare = tuple(s.model_copy(update={"class_id": 0, "instance": 0, "is_thing": False}) for s in row.segments)
     info.model_copy(update={"frames": (row.model_copy(update={"segments": bare}),)}).write(
         nameless.path("segments.json")
     )

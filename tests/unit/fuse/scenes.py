@@ -94,7 +94,7 @@ def frame_segments(
         result.append(
             FrameSegment(
                 id=number,
-                category_id=class_id(name) if known else 0,
+                class_id=class_id(name) if known else 0,
                 instance=number if known else 0,
                 is_thing=class_id(name) in THINGS and known,
                 score=1.0,

@@ -70,8 +70,8 @@ def test_a_camera_that_stands_still_fills_no_memory(monkeypatch: pytest.MonkeyPa
         rows, columns = random.integers(0, CAMERA.height - 12), random.integers(0, CAMERA.width - 12)
         ids[rows : rows + 12, columns : columns + 12] = 2
         listing = [
-            FrameSegment(id=1, category_id=0, instance=0, is_thing=False, score=0.0, area=1),
-            FrameSegment(id=2, category_id=chair, instance=1, is_thing=True, score=1.0, area=144),
+            FrameSegment(id=1, class_id=0, instance=0, is_thing=False, score=0.0, area=1),
+            FrameSegment(id=2, class_id=chair, instance=1, is_thing=True, score=1.0, area=144),
         ]
         mapper.add_frame(CAMERA, depth, None, np.eye(4), ids, listing)
     roots = mapper.labels.table()

@@ -7,15 +7,16 @@ from hypothesis import strategies as st
 from scenewright.schemas.segments import FrameSegment, FrameSegments, SegmentsFile
 from scenewright.stages.fuse.listings import Listings
 
-segment = st.builds(
-    FrameSegment,
-    id=st.integers(1, 2**24 - 1),
-    category_id=st.integers(0, 200),
-    instance=st.integers(0, 500),
-    is_thing=st.booleans(),
-    score=st.floats(0, 1),
-    area=st.integers(0, 10**7),
-)
+segment = st.fixed_dictionaries(
+    {
+        "id": st.integers(1, 2**24 - 1),
+        "class_id": st.integers(0, 200),
+        "instance": st.integers(0, 500),
+        "is_thing": st.booleans(),
+        "score": st.floats(0, 1),
+        "area": st.integers(0, 10**7),
+    }
+).map(lambda fields: FrameSegment(**fields))
 frames = st.dictionaries(st.integers(0, 5000), st.lists(segment, max_size=5), max_size=6)
 
 

@@ -193,7 +193,7 @@ def test_refusals(tmp_path: Path) -> None:
     refused("80x60, frames are 160x120", width=80, height=60)
     refused("frame 9 does not exist", frames=(*info.frames, FrameSegments(frame=9, segments=())))
     refused("lists frame 0 twice", frames=(*info.frames, info.frames[0]))
-    bad_class = info.frames[0].segments[0].model_copy(update={"category_id": 999})
+    bad_class = info.frames[0].segments[0].model_copy(update={"class_id": 999})
     refused("class id 999", frames=(FrameSegments(frame=0, segments=(bad_class,)),))
     double = FrameSegments(frame=0, segments=(info.frames[0].segments[0],) * 2)
     refused("ids of frame 0", frames=(double,))

@@ -197,9 +197,9 @@ class Tries(Conduct):
             raise MotionFailed("path_blocked", "something is in the way")
 
     def _recover(self, state):  # type: ignore[no-untyped-def]
-        return self._perceived(RobotState(state.base - 1.0, state.arm, state.holding))
+        return self._perceive(RobotState(state.base - 1.0, state.arm, state.holding))
 
-    def _perceived(self, state):  # type: ignore[no-untyped-def]
+    def _perceive(self, state):  # type: ignore[no-untyped-def]
         return state if self.physical.held else RobotState(state.base, state.arm)
 
     def _check_effect(self, name, arguments):  # type: ignore[no-untyped-def]
@@ -459,7 +459,7 @@ def test_what_was_to_be_put_down_and_is_still_in_the_hand_keeps_its_load(carryin
     model.set_down()
     world.set_pose("cup_5", transform_from_yaw(0.0, np.array([0.0, 0.02, 0.0])) @ world.pose("cup_5"))  # it slid
     world.step(1)
-    carrying._perceived(HOLDING)
+    carrying._perceive(HOLDING)
     assert model.laden("bottle_7") and model.checker.carried == "bottle_7"
     np.testing.assert_allclose(cup_over_bottle(model), [0.0, 0.02, 0.201], atol=1e-3)
 
@@ -468,7 +468,7 @@ def test_what_fell_off_is_no_load_any_more(carrying: Conduct) -> None:
     model, world = carrying.model, carrying.physical.world
     world.set_pose("cup_5", transform_from_yaw(0.0, np.array([0.5, 0.5, 0.001])))
     world.step(5)
-    carrying._perceived(HOLDING)
+    carrying._perceive(HOLDING)
     assert not model.laden("bottle_7") and model.records["cup_5"].parent == "floor_1"
     np.testing.assert_allclose(model.pose("cup_5"), world.pose("cup_5"), atol=1e-6)
 
@@ -491,10 +491,10 @@ class Looking(Conduct):
     def _execute(self, step: Step) -> None:
         self.driven.append(float(step.segments[-1].path[-1, 0]))
 
-    def _perceived(self, state: RobotState) -> RobotState:
+    def _perceive(self, state: RobotState) -> RobotState:
         return state
 
-    def _looked(self, step, before):  # type: ignore[no-untyped-def]
+    def _look_again(self, step, before):  # type: ignore[no-untyped-def]
         return None
 
 

@@ -206,7 +206,7 @@ def test_duplicates_are_merged_and_small_things_painted_on_top() -> None:
     frame = paint(
         layout, [Thing(cup, 0.4, small), Thing(table, 0.9, large)], {"floor": VOCABULARY.by_name("floor")}, (120, 160)
     )
-    names = {VOCABULARY.by_id(mask.category_id).name: number for number, mask in frame.masks.items()}
+    names = {VOCABULARY.by_id(mask.class_id).name: number for number, mask in frame.masks.items()}
     assert frame.ids[25, 25] == names["cup"] and frame.ids[5, 5] == names["table"]
     assert frame.ids[60, 20] == names["table"] and frame.ids[110, 150] == names["floor"] and frame.ids[10, 150] == 0
 

@@ -60,11 +60,11 @@ def test_misses() -> None:
 
 def test_flips_keep_kind_and_choose_another_class_evenly() -> None:
     frames = repeat(CorruptionRates(flip=0.3))
-    changed = [mask.category_id for frame in frames for number, mask in frame.masks.items() if number > 8]
+    changed = [mask.class_id for frame in frames for number, mask in frame.masks.items() if number > 8]
     wrong = [category for category in changed if category != 4]
     assert close(len(wrong), 60 * 40, 0.3)
     assert close(wrong.count(5), len(wrong), 0.5) and set(wrong) == {5, 17}
-    stuff = [mask.category_id for frame in frames for number, mask in frame.masks.items() if number <= 8]
+    stuff = [mask.class_id for frame in frames for number, mask in frame.masks.items() if number <= 8]
     assert set(stuff) == {1, 2} and close(stuff.count(2), len(stuff), 0.3)
 
 
@@ -87,7 +87,7 @@ def test_splits_make_two_of_one() -> None:
         for number in sorted(set(frame.masks) - set(range(1, 49))):
             half = frame.ids == number
             assert 0.25 * SIZE**2 < half.sum() < 0.75 * SIZE**2
-            assert frame.masks[number].category_id == 4
+            assert frame.masks[number].class_id == 4
 
 
 def test_boundaries_wander_by_the_stated_deviation() -> None:

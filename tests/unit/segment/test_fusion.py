@@ -26,9 +26,9 @@ from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
 HEIGHT, WIDTH = 480, 640
 SETTINGS = FusionSettings()
-THING = PanopticMask(category_id=17, is_thing=True, score=0.9)
-OTHER = PanopticMask(category_id=5, is_thing=True, score=0.8)
-STUFF = PanopticMask(category_id=1, is_thing=False)
+THING = PanopticMask(class_id=17, is_thing=True, score=0.9)
+OTHER = PanopticMask(class_id=5, is_thing=True, score=0.8)
+STUFF = PanopticMask(class_id=1, is_thing=False)
 
 
 def image(*rectangles: tuple[int, int, int, int, int]) -> np.ndarray:
@@ -50,7 +50,7 @@ def pixels_of(labels: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def by_category(fused, category: int) -> np.ndarray:
-    return np.isin(fused.ids, [segment.id for segment in fused.segments if segment.category_id == category])
+    return np.isin(fused.ids, [segment.id for segment in fused.segments if segment.class_id == category])
 
 
 def test_overlap_table_counts_pixels() -> None:
@@ -115,7 +115,7 @@ def test_far_background_leaves_the_instance() -> None:
     panoptic = PanopticFrame(image((1, 100, 100, 300, 300)), {1: THING})
     fused = fusion_thesis.fuse(geometric, panoptic, points(depth), SETTINGS)
     assert np.array_equal(by_category(fused, 17), geometric == 1)
-    background = [segment for segment in fused.segments if segment.category_id == 0]
+    background = [segment for segment in fused.segments if segment.class_id == 0]
     assert len(background) == 1 and background[0].instance == 0 and background[0].area == 100 * 100
     near = fusion_thesis.fuse(geometric, panoptic, points(np.where(geometric == 2, 1.04, 1.0)), SETTINGS)
     assert by_category(near, 17).sum() == 200 * 100 + 100 * 100

@@ -51,7 +51,7 @@ def segmenter_of(made: Any) -> Any:
 
 
 def names_of(frame: Any) -> list[str]:
-    return [VOCABULARY.by_id(mask.category_id).name for mask in frame.masks.values()]
+    return [VOCABULARY.by_id(mask.class_id).name for mask in frame.masks.values()]
 
 
 def test_torchvision_is_absent_or_fits() -> None:

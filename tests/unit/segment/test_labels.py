@@ -158,7 +158,7 @@ def test_segments_take_classes() -> None:
         minimum_pixels=2,
     )
     wall_id, cabinet_id = VOCABULARY.by_name("wall").id, VOCABULARY.by_name("cabinet").id
-    assert [(m.category_id, m.is_thing, m.score) for m in found.masks.values()] == [
+    assert [(m.class_id, m.is_thing, m.score) for m in found.masks.values()] == [
         (wall_id, False, 0.9),
         (cabinet_id, True, 0.7),
         (cabinet_id, True, 0.7),
@@ -185,7 +185,7 @@ def test_overlapping_instances() -> None:
         VOCABULARY,
         minimum_pixels=2,
     )
-    assert [(VOCABULARY.by_id(m.category_id).name, m.score) for m in found.masks.values()] == [
+    assert [(VOCABULARY.by_id(m.class_id).name, m.score) for m in found.masks.values()] == [
         ("table", 0.9),
         ("cup", 0.5),
     ]

@@ -53,9 +53,9 @@ def test_a_thing_that_is_missed_merged_cut_or_misnamed() -> None:
     halves = spoiled(replace(NONE, split=1.0))
     assert {1, 2, 5, 6} <= set(halves.masks) and halves.masks[5] == halves.masks[1]
     named = spoiled(replace(NONE, wrong_name=1.0))
-    assert named.masks[1].category_id == CLASSES["book"], "a cup is taken for what cups are taken for"
-    assert named.masks[2].category_id == CLASSES["book"], "a chair, of which nothing is known, for what others are"
-    assert named.masks[3].category_id == WALL
+    assert named.masks[1].class_id == CLASSES["book"], "a cup is taken for what cups are taken for"
+    assert named.masks[2].class_id == CLASSES["book"], "a chair, of which nothing is known, for what others are"
+    assert named.masks[3].class_id == WALL
 
 
 def test_false_masks_lie_on_the_wall_in_one_place() -> None:
@@ -63,7 +63,7 @@ def test_false_masks_lie_on_the_wall_in_one_place() -> None:
     first, second = (spoiled(rates, 3, frame=k) for k in range(2))
     false = set(first.masks) - {1, 2, 3}
     assert false and false == set(second.masks) - {1, 2, 3}
-    assert all(first.masks[k].category_id == CLASSES["chair"] for k in false)
+    assert all(first.masks[k].class_id == CLASSES["chair"] for k in false)
     again = [spoiled(rates, seed) for seed in range(60)]
     assert np.mean([len(set(found.masks) - {1, 2, 3}) for found in again]) == pytest.approx(2.0, abs=0.5)
 

@@ -194,7 +194,7 @@ def through_service(room: Written, out: Path, scores: bool = True) -> Segments:
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_folder_gives_what_the_service_gives(room: Written, tmp_path: Path, name: str) -> None:
     service = through_service(room, tmp_path / "service")
-    assert {s.score for frame in service.info.frames for s in frame.segments if s.category_id} - {1.0}
+    assert {s.score for frame in service.info.frames for s in frame.segments if s.class_id} - {1.0}
     folder = tmp_path / "masks"
     folder.mkdir()
     FORMATS[name](folder, truth(room))
@@ -232,10 +232,10 @@ def test_class_agnostic_masks_are_objects(room: Written, tmp_path: Path) -> None
         rows.append({"segmentation": encode_rle(image >= 0), "predicted_iou": 0.1, "stability_score": 1.0})
         (folder / f"frame_{k}.json").write_text(json.dumps(rows))
     made = segment(room, tmp_path / "out", folder)
-    classes = {s.category_id for frame in made.info.frames for s in frame.segments if s.category_id}
+    classes = {s.class_id for frame in made.info.frames for s in frame.segments if s.class_id}
     assert classes == {load_vocabulary().by_name("object").id}
     assert made.info.label == "masks of masks"
-    assert {s.score for frame in made.info.frames for s in frame.segments if s.category_id} == {0.97}
+    assert {s.score for frame in made.info.frames for s in frame.segments if s.class_id} == {0.97}
 
 
 def test_labels_of_ones_own_and_numbers_without_names(room: Written, tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_labels_of_ones_own_and_numbers_without_names(room: Written, tmp_path: P
     table.write_text(f"labels = [{', '.join(rows)}]")
     made = segment(room, tmp_path / "named", folder, labels=table)
     known = {load_vocabulary().by_name(name).id for name in NAMES.values()}
-    assert {s.category_id for frame in made.info.frames for s in frame.segments if s.category_id} <= known
+    assert {s.class_id for frame in made.info.frames for s in frame.segments if s.class_id} <= known
 
 
 def test_a_divisor_makes_classes_of_numbers(room: Written, tmp_path: Path) -> None:
@@ -307,7 +307,7 @@ def test_frames_without_masks_are_said(room: Written, tmp_path: Path, caplog: py
     coco_panoptic(folder, truth(room)[:1])
     made = segment(room, tmp_path / "out", folder)
     assert "2 of 3 frames have no masks, the first is 1" in caplog.text
-    assert [any(s.category_id for s in frame.segments) for frame in made.info.frames] == [True, False, False]
+    assert [any(s.class_id for s in frame.segments) for frame in made.info.frames] == [True, False, False]
 
 
 # ---- overlaps ------------------------------------------------------------------------------------------------------
@@ -435,7 +435,7 @@ def test_masks_without_classes_are_the_same_artifact_in_every_format_and_through
     with serving(FakeServer(answer, json.dumps({**info, "categories": category}).encode())) as address:
         service = segment(room, tmp_path / "service", None, address)
     model = service.info.label.removeprefix("masks of ")
-    assert {s.score for frame in service.info.frames for s in frame.segments if s.category_id} - {1.0}
+    assert {s.score for frame in service.info.frames for s in frame.segments if s.class_id} - {1.0}
     for kind in ("NPZ", "COCO, compressed", "COCO, uncompressed", "SAM", "COCO panoptic", "NPZ ids"):
         folder = tmp_path / kind
         folder.mkdir()
@@ -646,5 +646,5 @@ def test_the_script_of_the_page_writes_such_a_folder(room: Written, tmp_path: Pa
     assert done.returncode == 0, done.stderr
     made = segment(Written(Sequence(sequence), []), tmp_path / "segments", tmp_path / "outputs" / "room" / "masks")
     assert len(list((tmp_path / "outputs" / "room" / "masks").iterdir())) == FRAMES
-    names = {load_vocabulary().by_id(s.category_id).name for f in made.info.frames for s in f.segments if s.category_id}
+    names = {load_vocabulary().by_id(s.class_id).name for f in made.info.frames for s in f.segments if s.class_id}
     assert names <= {"wall", "table"} and names

@@ -11,7 +11,7 @@ import pytest
 from scenewright.schemas.errors import BadInput, MissingDependency
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.frames import Frame
-from scenewright.stages.segment.backends.onnx.decoding import _pasted
+from scenewright.stages.segment.backends.onnx.decoding import _paste_mask
 from scenewright.stages.segment.backends.onnx.network import fit
 from scenewright.stages.segment.backends.onnx.sidecar import Sidecar, find_layout, read_sidecar
 from scenewright.stages.segment.choice import BackendRequest, choose_backend
@@ -139,7 +139,7 @@ def found_by(weights: Path, color: np.ndarray | None = None, **inputs: Any) -> t
 
 
 def pixels_of(frame: Any, name: str) -> np.ndarray:
-    wanted = [k for k, mask in frame.masks.items() if VOCABULARY.by_id(mask.category_id).name == name]
+    wanted = [k for k, mask in frame.masks.items() if VOCABULARY.by_id(mask.class_id).name == name]
     return np.isin(frame.ids, wanted)
 
 
@@ -176,7 +176,7 @@ def test_panoptic_of_any_size_with_a_sidecar(tmp_path: Path) -> None:
 def test_yolo(tmp_path: Path) -> None:
     made, frame = found_by(yolo_network(tmp_path / "yolo.onnx"))
     assert made.label == "onnx yolo (yolo-seg, coco-80)"
-    names = sorted(VOCABULARY.by_id(mask.category_id).name for mask in frame.masks.values())
+    names = sorted(VOCABULARY.by_id(mask.class_id).name for mask in frame.masks.values())
     assert names == ["chair", "cup"]  # one cup, though it was boxed twice
     cup, chair = pixels_of(frame, "cup"), pixels_of(frame, "chair")
     expected = np.zeros((2, HEIGHT, WIDTH), dtype=bool)
@@ -189,7 +189,7 @@ def test_yolo(tmp_path: Path) -> None:
 def test_names_in_the_metadata_go_before_positions(tmp_path: Path) -> None:
     names = str({k: "bottle" if k == 41 else "sofa" if k == 56 else f"thing {k}" for k in range(80)})
     made, frame = found_by(yolo_network(tmp_path / "a.onnx", metadata={"names": names}))
-    found = sorted(VOCABULARY.by_id(mask.category_id).name for mask in frame.masks.values())
+    found = sorted(VOCABULARY.by_id(mask.class_id).name for mask in frame.masks.values())
     assert found == ["bottle", "sofa"] and "scenewright" in made.label
     for text in ("__import__('os')", "{", "[" * 5000, "3"):
         _, frame = found_by(yolo_network(tmp_path / "b.onnx", metadata={"names": text}))
@@ -206,12 +206,12 @@ def test_mask_rcnn(tmp_path: Path, whole: bool) -> None:
 
 
 def test_small_masks_fill_their_boxes() -> None:
-    mask = _pasted(np.ones((4, 4), np.float32), (-5.0, 2.0, 6.5, 30.0), (20, 30))
+    mask = _paste_mask(np.ones((4, 4), np.float32), (-5.0, 2.0, 6.5, 30.0), (20, 30))
     expected = np.zeros((20, 30), dtype=bool)
     expected[2:, :7] = True
     assert np.array_equal(mask, expected)
-    assert not _pasted(np.ones((4, 4), np.float32), (3.0, 3.0, 3.0, 9.0), (20, 30)).any()
-    assert not _pasted(np.ones((4, 4), np.float32), (40.0, 3.0, 50.0, 9.0), (20, 30)).any()
+    assert not _paste_mask(np.ones((4, 4), np.float32), (3.0, 3.0, 3.0, 9.0), (20, 30)).any()
+    assert not _paste_mask(np.ones((4, 4), np.float32), (40.0, 3.0, 50.0, 9.0), (20, 30)).any()
 
 
 def test_fitting() -> None:

@@ -182,7 +182,7 @@ def test_foreign_categories_are_mapped_by_name(room: Written, tmp_path: Path) ->
         context = Context(output=tmp_path / "other", seed=0, device="cpu", progress=SilentProgress())
         other = run(room.sequence, labels=table, parameters=SegmentParameters(backend=address, **FAST), context=context)
     for result, names in ((made, {"chair", "wall"}), (other, {"table", "door"})):
-        classes = {s.category_id for frame in result.info.frames for s in frame.segments if s.category_id}
+        classes = {s.class_id for frame in result.info.frames for s in frame.segments if s.class_id}
         assert classes == {vocabulary.by_name(name).id for name in names}
     assert {s.score for frame in made.info.frames for s in frame.segments if s.is_thing} == {0.75}
 
@@ -566,7 +566,7 @@ def judged(body: bytes) -> None:
         assert "\n" not in error.message
         return
     assert reply.ids.shape == (4, 6) and set(np.unique(reply.ids)) - {0} == set(reply.segments)
-    assert all(s.category_id in CATEGORIES and 0 <= s.score <= 1 for s in reply.segments.values())
+    assert all(s.class_id in CATEGORIES and 0 <= s.score <= 1 for s in reply.segments.values())
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

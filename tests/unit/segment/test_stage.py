@@ -85,7 +85,7 @@ def class_image(segments: Segments, frame: int) -> np.ndarray:
         ids = reader.read(frame)
     lookup = np.zeros(int(ids.max()) + 1, dtype=int)
     for entry in segments.info.frames[frame].segments:
-        lookup[entry.id] = entry.category_id
+        lookup[entry.id] = entry.class_id
     return lookup[ids]
 
 
@@ -113,9 +113,9 @@ def test_segments_agree_with_the_images(room: Written, tmp_path: Path) -> None:
             areas = np.bincount(ids.ravel())
             assert {s.id: s.area for s in entry.segments} == {i: int(areas[i]) for i in range(1, areas.size)}
             for s in entry.segments:
-                assert (s.category_id == 0) == (s.instance == 0)
-                if s.category_id:
-                    assert (VOCABULARY.by_id(s.category_id).kind == "thing") == s.is_thing
+                assert (s.class_id == 0) == (s.instance == 0)
+                if s.class_id:
+                    assert (VOCABULARY.by_id(s.class_id).kind == "thing") == s.is_thing
 
 
 def payload(segments: Segments) -> list[bytes]:
@@ -130,7 +130,7 @@ def test_same_seed_same_bytes(room: Written, tmp_path: Path) -> None:
 
 def test_geometric_backend_names_everything_object(room: Written, tmp_path: Path) -> None:
     made = segment(room.sequence, tmp_path / "out", backend="geometric")
-    kinds = {s.category_id for entry in made.info.frames for s in entry.segments}
+    kinds = {s.class_id for entry in made.info.frames for s in entry.segments}
     assert kinds == {VOCABULARY.by_name("object").id}
     assert made.info.backend == "geometric" and "class-agnostic" in made.info.label
     for entry in made.info.frames:
@@ -209,7 +209,7 @@ def test_detector_on_the_kitchen(tmp_path: Path) -> None:
         gravity=Gravity(method="floor_plane", world_from_log=as_transform(np.eye(4))),
     ).write(root / "sequence.json")
     made = segment(Sequence(root), tmp_path / "out", backend="detector", weights=weights)
-    instances = {(s.category_id, s.instance) for s in made.info.frames[0].segments if s.category_id}
+    instances = {(s.class_id, s.instance) for s in made.info.frames[0].segments if s.class_id}
     names = sorted(VOCABULARY.by_id(category).name for category, _ in instances)
     assert "floor" in names and names.count("table") == 1 and names.count("chair") >= 2 and "cup" in names
     assert made.info.label == "detector yolox_nano + geometric segments"
@@ -226,7 +226,7 @@ def test_recognised_share_is_that_of_the_area_of_things() -> None:
 
     def frame(*rows: tuple[int, bool, int]) -> FrameSegments:
         segments = tuple(
-            FrameSegment(id=k, category_id=c, instance=k, is_thing=thing, score=0.5, area=area)
+            FrameSegment(id=k, class_id=c, instance=k, is_thing=thing, score=0.5, area=area)
             for k, (c, thing, area) in enumerate(rows, 1)
         )
         return FrameSegments(frame=0, segments=segments)

@@ -86,8 +86,8 @@ def make_segments(run: Path) -> Path:
     ids[:, :40], ids[:, 50:] = 1, 2
     write_panoptic_zip(root / "panoptic.zip", [(k, ids) for k in range(5)])
     records = (
-        FrameSegment(id=1, category_id=1, instance=3, is_thing=True, score=1.0, area=2880),
-        FrameSegment(id=2, category_id=2, instance=9, is_thing=True, score=1.0, area=3312),
+        FrameSegment(id=1, class_id=1, instance=3, is_thing=True, score=1.0, area=2880),
+        FrameSegment(id=2, class_id=2, instance=9, is_thing=True, score=1.0, area=3312),
     )
     SegmentsFile(
         backend="ground-truth",

@@ -279,8 +279,8 @@ def test_segment_images_look_up_class_and_instance() -> None:
     from scenewright.schemas.segments import FrameSegment, FrameSegments
 
     records = (
-        FrameSegment(id=70000, category_id=5, instance=2, is_thing=True, score=1, area=1),
-        FrameSegment(id=3, category_id=6, instance=8, is_thing=True, score=1, area=1),
+        FrameSegment(id=70000, class_id=5, instance=2, is_thing=True, score=1, area=1),
+        FrameSegment(id=3, class_id=6, instance=8, is_thing=True, score=1, area=1),
     )
     images = segment_images(FrameSegments(frame=0, segments=records), np.array([[70000, 3], [0, 99]]))
     assert images["class"].tolist() == [[5, 6], [0, 0]]

@@ -70,7 +70,7 @@ class AskedSegmenter:
         except BadInput as error:
             raise BadInput(f"{self._connection.address}: reply: {error.message}", hint="mend the service") from None
         masks = [
-            Mask(self._words[segment.category_id], reply.ids == number)
+            Mask(self._words[segment.class_id], reply.ids == number)
             for number, segment in sorted(reply.segments.items())
             if segment.is_thing
         ]

@@ -9,11 +9,11 @@ import numpy as np
 from scenewright.schemas.vocabulary import SemanticClass
 
 CONFIRMING_SHARE = 0.3
-"""The witness confirms a detection when it gives this share of its mask a name of the same kind, ..."""
+"""The second network confirms a detection when it gives this share of its mask a name of the same kind."""
 CONTRADICTING_SHARE = 0.5
-"""... and contradicts it when it gives this share a name of another kind."""
+"""The second network contradicts a detection when it gives this share of its mask a name of another kind."""
 SAME_KIND = ({"chair", "sofa", "bench"}, {"table", "desk"}, {"monitor", "laptop"})
-"""What the networks call each other when they see a part of it."""
+"""Classes that the networks take for each other when they see a part of a thing."""
 SURE = 0.6
 """A detection of this score needs nobody's agreement."""
 LEAST_SHARE = 0.02
@@ -50,10 +50,10 @@ def witnessed(
     names = {entry.name for entry in known.values()}
     for thing in things:
         kind = next((kind for kind in SAME_KIND if thing.semantic.name in kind), {thing.semantic.name})
-        seen = np.bincount(classes[thing.mask], minlength=256)
-        pixels = int(seen.sum())
-        confirming = sum(int(seen[number]) for number, entry in known.items() if entry.name in kind)
-        contradicting = sum(int(seen[number]) for number, entry in known.items() if entry.name not in kind)
+        class_pixels = np.bincount(classes[thing.mask], minlength=256)
+        pixels = int(class_pixels.sum())
+        confirming = sum(int(class_pixels[number]) for number, entry in known.items() if entry.name in kind)
+        contradicting = sum(int(class_pixels[number]) for number, entry in known.items() if entry.name not in kind)
         witness = pixels >= LEAST_SHARE * classes.size
         if witness and confirming >= CONFIRMING_SHARE * pixels:
             yield replace(thing, score=max(thing.score, SURE))

@@ -23,12 +23,14 @@ from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 from scenewright.stages.segment.settings import geometric_settings
 
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
-"""A box around a part of these is still a detection of the whole: one face fills most of the box."""
+"""Classes of which a box around a part is still a detection of the whole: one face fills most of the box."""
 FLAT_TOPPED = frozenset({"table", "desk"})
+"""Classes whose upper side is a level top, over which nothing of them rises."""
 LARGEST_UNNAMED = 0.8
 """A detection of impossible size still points at some item when that is small; at furniture size it says nothing, and
 its votes would drown those of the frames in which the thing was recognised [m]."""
 SAMPLED_FRAMES = 25
+"""Frames, spread over the log, of whose surface the room is made; by eye."""
 DUPLICATE_OVERLAP = 0.5
 """Two masks of one class that share this much of the smaller one are the same thing."""
 
@@ -129,19 +131,19 @@ def merge_duplicates(things: list[Thing]) -> list[Thing]:
     boxed twice): it gets the union. Of two classes for nearly the same mask the better scored stays, but any class
     goes before `object`, which is what is left of a detection of impossible size.
     """
-    kept: list[Thing] = []
+    merged: list[Thing] = []
     for item in sorted(things, key=lambda thing: (thing.semantic.name == UNNAMED, -thing.score)):
-        for index, other in enumerate(kept):
-            shared = int((item.mask & other.mask).sum())
-            smaller, union = min(item.mask.sum(), other.mask.sum()), (item.mask | other.mask).sum()
-            if item.semantic.id == other.semantic.id and shared > DUPLICATE_OVERLAP * smaller:
-                kept[index] = Thing(other.semantic, other.score, other.mask | item.mask)
+        for index, larger in enumerate(merged):
+            shared = int((item.mask & larger.mask).sum())
+            smaller, union = min(item.mask.sum(), larger.mask.sum()), (item.mask | larger.mask).sum()
+            if item.semantic.id == larger.semantic.id and shared > DUPLICATE_OVERLAP * smaller:
+                merged[index] = Thing(larger.semantic, larger.score, larger.mask | item.mask)
                 break
             if shared > 0.6 * union:
                 break
         else:
-            kept.append(item)
-    return kept
+            merged.append(item)
+    return merged
 
 
 def paint(
@@ -174,13 +176,13 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
             hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
         )
     label = f"detector {request.weights.stem} + geometric segments"
-    witness, heard = None, parameters.score_threshold
+    witness, score_threshold = None, parameters.score_threshold
     if request.semantic_weights is not None:
-        witness, heard = SemanticSegmenter(request.semantic_weights), HEARD * parameters.score_threshold
+        witness, score_threshold = SemanticSegmenter(request.semantic_weights), HEARD * parameters.score_threshold
         label = f"detector {request.weights.stem}, witnessed by {request.semantic_weights.stem}, + geometric segments"
     detector = Detector(
         request.weights,
-        score_threshold=heard,
+        score_threshold=score_threshold,
         suppression_overlap=parameters.suppression_overlap,
         tile_side=min(reader.camera.width, reader.camera.height) if request.own(DetectorParameters).tiles else 0,
     )

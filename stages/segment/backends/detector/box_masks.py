@@ -17,7 +17,7 @@ SURFACE_SHARE = 0.35
 RING_FACTOR = 1.6
 """The support of a thing is measured in a ring around its box, up to this many times its size."""
 TOP_CLEARANCE = 0.03
-"""What rises this far [m] over a table's top is no part of the table."""
+"""Height over a table's top from which on nothing is part of the table [m]."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,13 @@ def box_mask(
     foreground = np.zeros(labels.shape, dtype=bool)
     for label in np.flatnonzero(inside):
         share = inside[label] / geometry.segment_pixels[label]
-        own = available & (labels == label)
+        of_label = available & (labels == label)
         if label and (
             share >= INSIDE_SHARE or (large_face and share >= SURFACE_SHARE and inside[label] > 0.2 * labels.size)
         ):
-            foreground |= own
+            foreground |= of_label
         elif inside[label] >= 0.03 * labels.size:
-            foreground |= own & _over_support(int(label), (x0, y0, x1, y1), geometry)
+            foreground |= of_label & _over_support(int(label), (x0, y0, x1, y1), geometry)
     if flat_topped and geometry.world_points is not None:
         foreground &= ~_not_of_table(foreground, window, geometry)
     if foreground.any():
@@ -108,7 +108,7 @@ def _over_support(label: int, box: tuple[int, int, int, int], geometry: FrameGeo
     if len(support) < 40:
         return nothing
     support = support[:: max(1, len(support) // 2000)]
-    center, normal, residual = _trimmed_plane(support)
+    center, normal, residual = _fit_trimmed_plane(support)
     depth = geometry.points[y0:y1, x0:x1, 2]
     noise = 0.008 + 0.004 * depth**2
     if residual > 0.01 + 0.004 * float(center[2]) ** 2:
@@ -118,7 +118,7 @@ def _over_support(label: int, box: tuple[int, int, int, int], geometry: FrameGeo
     return (geometry.points[y0:y1, x0:x1] - center) @ normal > noise
 
 
-def _trimmed_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _fit_trimmed_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Return centre, normal and root mean square residual [m] of a plane, after dropping the worst points twice."""
     for keep in (0.8, 0.8, 1.0):
         center = points.mean(axis=0)

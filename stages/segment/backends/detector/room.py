@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 HEIGHT_BIN = 0.02
+"""Width of the bins of heights in which floor and ceiling are sought [m]; by eye."""
 OFFSET_BIN = 0.04
+"""Width of the bins of a wall's distance from the origin [m]; by eye."""
 AZIMUTH_BIN = np.radians(3.0)
+"""Width of the bins of a wall's direction [rad]; by eye."""
 MINIMUM_WALL_HEIGHT = 1.0
+"""Least height of a plane's points, bottom to top, for a wall [m]; by eye."""
 MINIMUM_WALL_TOP = 1.25
 """A wall is seen up to here over the floor [m]: kitchen units and desks end below."""
 MINIMUM_HIGH_SHARE = 0.3
@@ -68,12 +72,12 @@ def find_room(samples: Iterable[SurfaceSample], *, floor_is_zero: bool) -> Room:
     or given); a lowest plane elsewhere than at z = 0 is then no floor, otherwise one less than 0.9 m below the
     cameras is none (a log that shows only a table has no floor).
     """
-    parts = list(samples)
-    if not parts:
+    sample_list = list(samples)
+    if not sample_list:
         return Room(None, None, ())
-    points = np.concatenate([part.points for part in parts])
-    normals = np.concatenate([part.normals for part in parts])
-    camera_height = float(np.median([part.camera_height for part in parts]))
+    points = np.concatenate([part.points for part in sample_list])
+    normals = np.concatenate([part.normals for part in sample_list])
+    camera_height = float(np.median([part.camera_height for part in sample_list]))
     floor = find_floor(points[:, 2], normals[:, 2])
     if floor is not None and (abs(floor) > 0.15 if floor_is_zero else camera_height - floor < 0.9):
         floor = None
@@ -112,8 +116,8 @@ def find_ceiling(heights: np.ndarray, upwardness: np.ndarray, *, lowest: float) 
         return None
     counts = np.bincount(((level - lowest) / HEIGHT_BIN).astype(int))
     height = lowest + (int(np.argmax(np.convolve(counts, np.ones(5), mode="same"))) + 0.5) * HEIGHT_BIN
-    near = level[np.abs(level - height) < 0.06]
-    return float(np.median(near)) if near.size else None
+    at_height = level[np.abs(level - height) < 0.06]
+    return float(np.median(at_height)) if at_height.size else None
 
 
 def find_walls(points: np.ndarray, normals: np.ndarray, floor: float, *, maximum: int = 12) -> tuple[WallPlane, ...]:

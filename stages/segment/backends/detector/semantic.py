@@ -33,7 +33,7 @@ VOC_NAMES = (
     "train",
     "tvmonitor",
 )
-"""In the order of the networks' outputs."""
+"""PASCAL VOC's classes and the background, in the order of the networks' outputs."""
 FROM_VOC = {
     "bottle": "bottle",
     "chair": "chair",
@@ -63,15 +63,15 @@ class SemanticSegmenter:
         try:
             self._interpreter: Any = runtime.Interpreter(str(weights), num_threads=1)
             self._interpreter.allocate_tensors()
-            (given,), (result,) = self._interpreter.get_input_details(), self._interpreter.get_output_details()
+            (input_tensor,), (result,) = self._interpreter.get_input_details(), self._interpreter.get_output_details()
         except (ValueError, RuntimeError) as error:
             reason = (str(error).splitlines() or [""])[0][:120]
             raise BadInput(f"{weights.name} is no TensorFlow Lite network: {reason}", hint=HINT) from None
-        shape, classes = tuple(given["shape"]), tuple(result["shape"])
-        pictures = len(shape) == 4 and shape[0] == 1 and shape[3] == 3 and given["dtype"] == np.uint8
+        shape, classes = tuple(input_tensor["shape"]), tuple(result["shape"])
+        pictures = len(shape) == 4 and shape[0] == 1 and shape[3] == 3 and input_tensor["dtype"] == np.uint8
         if not pictures or len(classes) != 3 or classes[0] != 1 or result["dtype"] not in (np.int64, np.int32):
             raise BadInput(f"{weights.name} does not take pictures (uint8) and give out classes", hint=HINT)
-        self._given, self._result = given["index"], result["index"]
+        self._input_index, self._output_index = input_tensor["index"], result["index"]
         self._size = (int(shape[2]), int(shape[1]))
 
     def classify(self, color: np.ndarray) -> np.ndarray:
@@ -83,9 +83,9 @@ class SemanticSegmenter:
         small = cv2.resize(
             color, self._size, interpolation=cv2.INTER_AREA if width > self._size[0] else cv2.INTER_LINEAR
         )
-        self._interpreter.set_tensor(self._given, small[None])
+        self._interpreter.set_tensor(self._input_index, small[None])
         self._interpreter.invoke()
-        classes = np.asarray(self._interpreter.get_tensor(self._result))[0]
+        classes = np.asarray(self._interpreter.get_tensor(self._output_index))[0]
         if classes.min() < 0 or classes.max() >= len(VOC_NAMES):
             raise BadInput("the semantic network gives out classes beyond PASCAL VOC's 21", hint=HINT)
         return cv2.resize(classes.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)

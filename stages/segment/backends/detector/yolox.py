@@ -12,7 +12,9 @@ from scenewright.stages.segment.coco import COCO_NAMES
 from scenewright.stages.segment.suppression import suppress
 
 STRIDES = (8, 16, 32)
+"""Input pixels per cell of each of the network's three grids (YOLOX, Ge et al. 2021)."""
 PAD_VALUE = 114
+"""Grey with which a picture is padded to a square, as YOLOX was trained (0..255)."""
 INPUT_SIZES = (416, 640)
 """Square inputs of the published YOLOX models (nano and tiny; small to extra large)."""
 
@@ -113,8 +115,8 @@ class Detector:
         if self.tile_side:
             windows += [self._detect_window(color, window) for window in tile_windows(width, height, self.tile_side)]
         boxes, scores, classes = (np.concatenate([part[k] for part in windows]) for k in range(3))
-        kept = suppress(boxes, scores, classes, self.suppression_overlap)
-        return Detections(boxes[kept], scores[kept], classes[kept])
+        unsuppressed = suppress(boxes, scores, classes, self.suppression_overlap)
+        return Detections(boxes[unsuppressed], scores[unsuppressed], classes[unsuppressed])
 
     def _detect_window(
         self, color: np.ndarray, window: tuple[int, int, int, int]

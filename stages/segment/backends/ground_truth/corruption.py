@@ -104,10 +104,10 @@ def _split(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, random
 
 def _flipped(mask: PanopticMask, classes: dict[bool, tuple[int, ...]], random: np.random.Generator) -> PanopticMask:
     """Return the mask with another class of its own kind (thing or stuff), uniformly drawn."""
-    others = [class_id for class_id in classes[mask.is_thing] if class_id != mask.category_id]
+    others = [class_id for class_id in classes[mask.is_thing] if class_id != mask.class_id]
     if not others:
         return mask
-    return replace(mask, category_id=others[int(random.integers(len(others)))])
+    return replace(mask, class_id=others[int(random.integers(len(others)))])
 
 
 def displace_boundaries(ids: np.ndarray, deviation: float, random: np.random.Generator) -> np.ndarray:

@@ -109,9 +109,9 @@ class LastingErrors:
             self._split(ids, masks, k, view)
         for k in struck("name", rates.wrong_name, rates.name_alike):
             key = rates.name_alike.key(self._luck, "name", k, regions[k], view.frame)
-            wrong = self._wrong_name(self._names[masks[k].category_id], self._luck.uniform("which", *key))
+            wrong = self._wrong_name(self._names[masks[k].class_id], self._luck.uniform("which", *key))
             for part in {k, self._free + k} & set(masks):
-                masks[part] = replace(masks[part], category_id=self._classes[wrong])
+                masks[part] = replace(masks[part], class_id=self._classes[wrong])
         self._false_masks(ids, masks, true, view)
         random = np.random.default_rng([int(self._luck.uniform("edges") * 2**32), view.frame])
         ids = displace_boundaries(ids, BOUNDARY * ids.shape[1] / 640, random)

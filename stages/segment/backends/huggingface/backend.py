@@ -119,11 +119,11 @@ def _open_vocabulary(weights: Path, settings: HuggingFaceSettings, vocabulary: V
         raise UsageError(
             f"{short_name(weights)} looks for words", hint='give either --words "cup, table" or a list: --labels FILE'
         )
-    wanted = labels.labels if labels else parse_words(settings.words.split(","), "--words")
+    names = labels.labels if labels else parse_words(settings.words.split(","), "--words")
     segmenter = OpenVocabularySegmenter(
         weights,
         mask_weights,
-        wanted,
+        names,
         score_threshold=settings.score_threshold,
         suppression_overlap=settings.suppression_overlap,
         device=settings.device,

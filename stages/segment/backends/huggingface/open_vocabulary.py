@@ -23,6 +23,7 @@ from scenewright.stages.segment.suppression import suppress
 MOST_TOKENS = 200
 """Tokens of one prompt; published models read 256. Longer lists of words are asked in several goes."""
 WORD_END = ". "
+"""What Grounding DINO separates the words of a prompt with."""
 
 
 @dataclass(frozen=True)
@@ -78,9 +79,9 @@ def word_scores(token_scores: np.ndarray, offsets: np.ndarray, prompt: Prompt) -
     """
     scores = np.zeros((len(token_scores), len(prompt.words)))
     for column, (begin, end) in enumerate(prompt.spans):
-        own = (offsets[:, 0] >= begin) & (offsets[:, 1] <= end) & (offsets[:, 1] > offsets[:, 0])
-        if own.any():
-            scores[:, column] = token_scores[:, own].max(axis=1)
+        of_word = (offsets[:, 0] >= begin) & (offsets[:, 1] <= end) & (offsets[:, 1] > offsets[:, 0])
+        if of_word.any():
+            scores[:, column] = token_scores[:, of_word].max(axis=1)
     return scores
 
 
@@ -124,7 +125,7 @@ class OpenVocabularySegmenter:
         """Return boxes over the threshold; of those that overlap more than `suppression_overlap` the best one."""
         height, width = color.shape[:2]
         images = self._images(images=color, return_tensors="pt").to(self._device)
-        parts = []
+        by_prompt = []
         for prompt in self._prompts:
             tokens = self._tokenizer(prompt.text, return_tensors="pt", return_offsets_mapping=True)
             offsets = tokens.pop("offset_mapping")[0].numpy()
@@ -137,10 +138,10 @@ class OpenVocabularySegmenter:
             keep = score >= self._threshold
             centre, size = np.split(outputs.pred_boxes[0].float().cpu().numpy()[keep], 2, axis=1)
             boxes = np.concatenate([centre - size / 2, centre + size / 2], axis=1) * [width, height, width, height]
-            parts.append((np.clip(boxes, 0, [width, height] * 2), score[keep], np.array(prompt.words)[best[keep]]))
-        boxes, scores, words = (np.concatenate([part[k] for part in parts]) for k in range(3))
-        kept = suppress(boxes, scores, np.zeros(len(words), dtype=int), self._overlap)
-        return WordBoxes(boxes[kept], scores[kept], words[kept].astype(int))
+            by_prompt.append((np.clip(boxes, 0, [width, height] * 2), score[keep], np.array(prompt.words)[best[keep]]))
+        boxes, scores, words = (np.concatenate([part[k] for part in by_prompt]) for k in range(3))
+        unsuppressed = suppress(boxes, scores, np.zeros(len(words), dtype=int), self._overlap)
+        return WordBoxes(boxes[unsuppressed], scores[unsuppressed], words[unsuppressed].astype(int))
 
     def _masks(self, color: np.ndarray, boxes: np.ndarray) -> np.ndarray:
         """Return a mask (N, H, W) bool for every box."""

@@ -21,6 +21,7 @@ from scenewright.stages.segment.naming import NamedSegment, name_segments
 from scenewright.stages.segment.panoptic import PanopticFrame
 
 UNCLASSED = Label(name=ANYTHING, class_name=ANYTHING)
+"""What masks without a class are: things that nobody named."""
 
 logger = logging.getLogger("scenewright")
 
@@ -45,14 +46,16 @@ class MasksBackend:
     def __init__(self, request: BackendRequest) -> None:
         _, reader = request.log()
         assert request.masks is not None  # segment.parameters.check
-        own = request.own(MasksParameters)
+        options = request.own(MasksParameters)
         self._root = request.masks
         listing = Listing(request.masks)
         form, self._source = open_folder(listing)
         times = reader.times
-        self._places, ways = match_pictures(self._source.pictures, times, own.masks_tolerance, self._root)
-        told = ", ".join(f"{ways[way]} by {way}" for way in WAYS)
-        logger.info("%s: %s, masks of %d of %d frames: %s", self._root, form.name, len(self._places), len(times), told)
+        self._places, match_counts = match_pictures(self._source.pictures, times, options.masks_tolerance, self._root)
+        matches_text = ", ".join(f"{match_counts[matching]} by {matching}" for matching in WAYS)
+        logger.info(
+            "%s: %s, masks of %d of %d frames: %s", self._root, form.name, len(self._places), len(times), matches_text
+        )
         if not self._places:
             raise BadInput(f"{self._root}: holds masks of no frame", hint=HINT)
         if len(self._places) < len(times):
@@ -67,39 +70,39 @@ class MasksBackend:
         if self._source.lacks:
             lost = " and ".join(self._source.lacks)
             logger.info("%s: holds no %s: what the network said of them is lost", self._root, lost)
-        given = read_label_file(request.labels) if request.labels else None
-        self._labels = _labels(self._source, given, str(self._root))
+        label_set = read_label_file(request.labels) if request.labels else None
+        self._labels = _labels(self._source, label_set, str(self._root))
         self._vocabulary = load_vocabulary()
         self._settings = request.parameters.score_threshold, request.parameters.small_object_pixels
         self._tally, self._last = Tally(), max(self._places)
-        self.label = f"masks of {own.masks_model or self._root.resolve().stem}"
+        self.label = f"masks of {options.masks_model or self._root.resolve().stem}"
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
         """Return the masks of a frame; a frame that the folder has none for has none. Raises BadInput."""
         height, width = geometric.labels.shape
-        place = self._places.get(frame.index)
-        if place is None:
+        picture_index = self._places.get(frame.index)
+        if picture_index is None:
             return PanopticFrame(np.zeros((height, width), dtype=np.int32))
         least = pixels_at(self._settings[1], (height, width))
         try:
-            given = self._source.read(place, (height, width), ReadSettings(self._settings[0], least))
-            named = {number: segment for number, segment in self._named(given)}
+            masks = self._source.read(picture_index, (height, width), ReadSettings(self._settings[0], least))
+            segments = {number: segment for number, segment in self._named_segments(masks)}
         except BadInput as error:
             raise BadInput(f"frame {frame.index}: {error.message}", hint=error.hint) from None
-        self._count(given)
+        self._count(masks)
         if frame.index == self._last:
             self._report()
         # Small numbers in the same order, as those of a service: tables over ids stay small.
-        numbers = sorted(set(np.unique(given.ids).tolist()) - {0})
-        ids = np.searchsorted(np.array([0, *numbers]), given.ids).astype(np.int32)
-        listed = {k: named[number] for k, number in enumerate(numbers, start=1) if number in named}
+        numbers = sorted(set(np.unique(masks.ids).tolist()) - {0})
+        ids = np.searchsorted(np.array([0, *numbers]), masks.ids).astype(np.int32)
+        listed = {k: segments[number] for k, number in enumerate(numbers, start=1) if number in segments}
         return name_segments(ids, listed, self._vocabulary, minimum_pixels=least)
 
-    def _named(self, given: GivenFrame) -> list[tuple[int, NamedSegment]]:
-        named = []
-        for number, mask in given.masks.items():
+    def _named_segments(self, frame_masks: GivenFrame) -> list[tuple[int, NamedSegment]]:
+        segments = []
+        for number, mask in frame_masks.masks.items():
             if mask.category is None:
-                named.append((number, NamedSegment(UNCLASSED, mask.score)))
+                segments.append((number, NamedSegment(UNCLASSED, mask.score)))
                 continue
             if mask.category not in self._source.categories and mask.category not in self._labels:
                 raise BadInput(
@@ -107,13 +110,13 @@ class MasksBackend:
                     hint="list it among the categories, in classes.json, or with its id in --labels FILE.toml",
                 )
             if mask.category in self._labels:
-                named.append((number, NamedSegment(self._labels[mask.category], mask.score)))
-        return named
+                segments.append((number, NamedSegment(self._labels[mask.category], mask.score)))
+        return segments
 
-    def _count(self, given: GivenFrame) -> None:
-        self._tally.overlapping += given.overlapping
-        self._tally.frames += given.overlapping > 0
-        self._tally.faint += given.faint
+    def _count(self, frame_masks: GivenFrame) -> None:
+        self._tally.overlapping += frame_masks.overlapping
+        self._tally.frames += frame_masks.overlapping > 0
+        self._tally.faint += frame_masks.faint
 
     def _report(self) -> None:
         if self._tally.overlapping:
@@ -140,16 +143,16 @@ def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
         source = form.open(listing)
         if source is not None:
             return form, source
-    known = "; ".join(f"{form.name} ({form.summary})" for form in formats)
-    raise BadInput(f"{listing.root}: holds no masks that are read here", hint=f"formats: {known}")
+    format_list = "; ".join(f"{form.name} ({form.summary})" for form in formats)
+    raise BadInput(f"{listing.root}: holds no masks that are read here", hint=f"formats: {format_list}")
 
 
-def _labels(source: MaskSource, given: LabelSet | None, where: str) -> dict[int, Label]:
+def _labels(source: MaskSource, label_set: LabelSet | None, where: str) -> dict[int, Label]:
     """Return number -> label. Where the folder names nothing, the ids of the given labels are its numbers."""
     if not source.categories:
-        return {label.id: label for label in given.labels if label.id is not None} if given else {}
+        return {label.id: label for label in label_set.labels if label.id is not None} if label_set else {}
     matched = match_labels(
-        {number: category.name for number, category in source.categories.items()}, given, where=where
+        {number: category.name for number, category in source.categories.items()}, label_set, where=where
     )
     if matched.unknown:
         logger.warning(

@@ -10,8 +10,10 @@ from scenewright.stages.segment.backends.masks.given import Category, entry
 from scenewright.stages.segment.backends.masks.listing import Listing
 
 LONGEST_NAME = 200
+"""Most letters of a class's name; a guard, by eye."""
 HINT = 'classes.json: {"1": "chair", "2": "wall"}, or classes.txt with a line `1 chair` for each'
 LARGEST_NUMBER = 2**31 - 1
+"""Largest number of a class: what fits into 32 bits."""
 
 
 def read_classes(listing: Listing) -> tuple[dict[int, Category], int]:

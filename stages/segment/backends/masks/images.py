@@ -12,12 +12,12 @@ from scenewright.stages.kit.formats.image_headers import image_size, may_be_deco
 from scenewright.stages.kit.formats.masks import decode_panoptic_png
 
 LARGEST_PNG = 512 * 2**20
-"""Bytes."""
+"""Most bytes of a PNG file."""
 
 
 def read_panoptic(path: Path, shape: tuple[int, int]) -> np.ndarray:
     """Return the ids (H, W) int32 of a COCO panoptic PNG for a frame of `shape`. Raises BadInput."""
-    data = _checked(path, shape)
+    data = _checked_content(path, shape)
     try:
         return decode_panoptic_png(data)
     except BadInput as error:
@@ -26,7 +26,7 @@ def read_panoptic(path: Path, shape: tuple[int, int]) -> np.ndarray:
 
 def read_instances(path: Path, shape: tuple[int, int]) -> np.ndarray:
     """Return the values (H, W) int32 of a PNG of one channel, 8 or 16 bits, for a frame of `shape`. Raises BadInput."""
-    data = _checked(path, shape)
+    data = _checked_content(path, shape)
     try:
         image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
@@ -39,7 +39,7 @@ def read_instances(path: Path, shape: tuple[int, int]) -> np.ndarray:
     return image.astype(np.int32)
 
 
-def _checked(path: Path, shape: tuple[int, int]) -> bytes:
+def _checked_content(path: Path, shape: tuple[int, int]) -> bytes:
     try:
         if path.stat().st_size > LARGEST_PNG:
             raise BadInput(f"{path}: larger than {LARGEST_PNG} bytes", hint="write it again")

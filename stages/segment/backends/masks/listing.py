@@ -10,9 +10,11 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_content
 
 LARGEST_JSON = 512 * 2**20
-"""Bytes."""
+"""Most bytes of a JSON file."""
 MOST_FILES = 200_000
+"""Most files of a folder of masks; a guard, by eye."""
 CLASS_FILES = ("classes.json", "classes.txt")
+"""Files that say which number is which class; no masks."""
 HINT = "docs/MASKS.md lists what is read"
 
 

@@ -17,7 +17,9 @@ SECONDS = re.compile(r"\d{1,10}\.\d+", re.ASCII)
 TICKS = re.compile(r"\d{13,19}", re.ASCII)
 """Milliseconds to nanoseconds since 1970, by their number of digits."""
 WAYS = ("name", "number", "time stamp")
+"""How a picture may be matched to a frame, in the order in which that is tried."""
 SHOWN = 3
+"""Pictures without a frame that an error names."""
 
 
 def match_pictures(
@@ -31,31 +33,31 @@ def match_pictures(
     belongs to no frame, or two to one.
     """
     varying = numbers_in_names([picture.name for picture in pictures])
-    found: dict[int, int] = {}
-    ways: Counter[str] = Counter()
+    picture_of_frame: dict[int, int] = {}
+    match_counts: Counter[str] = Counter()
     astray: list[str] = []
-    for place, picture in enumerate(pictures):
-        frame, way = _frame_of(picture, varying[place], times, tolerance)
+    for index, picture in enumerate(pictures):
+        frame, matching = _frame_of(picture, varying[index], times, tolerance)
         if frame is None:
-            astray.append(f"{picture.name or 'image'} ({way} {_told(picture, varying[place])})")
+            astray.append(f"{picture.name or 'image'} ({matching} {_stated_text(picture, varying[index])})")
             continue
-        if frame in found:
-            first = pictures[found[frame]].name
+        if frame in picture_of_frame:
+            first = pictures[picture_of_frame[frame]].name
             raise BadInput(
                 f"{where}: masks of {first!r} and {picture.name!r} are both of frame {frame}", hint="keep one of them"
             )
-        found[frame] = place
-        ways[way] += 1
+        picture_of_frame[frame] = index
+        match_counts[matching] += 1
     if astray:
-        shown = ", ".join(astray[:SHOWN]) + (", ..." if len(astray) > SHOWN else "")
+        astray_text = ", ".join(astray[:SHOWN]) + (", ..." if len(astray) > SHOWN else "")
         raise BadInput(
-            f"{where}: {len(astray)} of {len(pictures)} masks are of frames that are not there: {shown}",
+            f"{where}: {len(astray)} of {len(pictures)} masks are of frames that are not there: {astray_text}",
             hint=f"the sequence has frames 0 to {len(times) - 1} from {times[0]:.6f} to {times[-1]:.6f} s; "
             "name masks by these numbers or times"
             if len(times)
             else "the sequence is empty",
         )
-    return found, ways
+    return picture_of_frame, match_counts
 
 
 def numbers_in_names(names: Sequence[str]) -> list[int | None]:
@@ -77,11 +79,11 @@ def _frame_of(picture: Picture, number: int | None, times: np.ndarray, tolerance
         nearest = int(np.abs(times - stamp).argmin())
         return (nearest if abs(times[nearest] - stamp) <= tolerance + 1e-9 else None), WAYS[2]
     if NAME.fullmatch(picture.name):
-        frame, way = int(picture.name), WAYS[0]
+        frame, matching = int(picture.name), WAYS[0]
     else:
-        told = picture.number if number is None else number
-        frame, way = (-1 if told is None else told), WAYS[1]
-    return (frame if 0 <= frame < len(times) else None), way
+        stated = picture.number if number is None else number
+        frame, matching = (-1 if stated is None else stated), WAYS[1]
+    return (frame if 0 <= frame < len(times) else None), matching
 
 
 def _stamp(picture: Picture) -> float | None:
@@ -94,7 +96,7 @@ def _stamp(picture: Picture) -> float | None:
     return None
 
 
-def _told(picture: Picture, number: int | None) -> str:
+def _stated_text(picture: Picture, number: int | None) -> str:
     stamp = _stamp(picture)
-    told = number if number is not None else picture.number
-    return f"{stamp:.6f} s" if stamp is not None else "none" if told is None else str(told)
+    stated = number if number is not None else picture.number
+    return f"{stamp:.6f} s" if stamp is not None else "none" if stated is None else str(stated)

@@ -30,17 +30,17 @@ def flatten(
         for k in likely:
             ids[masks[k]] = k + 1
         return GivenFrame(ids, {k + 1: told[k] for k in likely if sizes[k]}, 0, faint)
-    kept: list[int] = []
+    distinct: list[int] = []
     for k in sorted((k for k in likely if sizes[k]), key=lambda k: (-told[k].score, k)):
-        if not any(_are_same(masks[k], masks[other], sizes[k], sizes[other]) for other in kept):
-            kept.append(k)
-    for k in sorted(kept, key=lambda k: (-sizes[k], k)):
+        if not any(_are_same(masks[k], masks[other], sizes[k], sizes[other]) for other in distinct):
+            distinct.append(k)
+    for k in sorted(distinct, key=lambda k: (-sizes[k], k)):
         ids[masks[k]] = k + 1
-    left = np.bincount(ids.ravel(), minlength=len(told) + 1)
-    whole = {k for k in kept if left[k + 1] >= max(settings.minimum_pixels, KEPT_SHARE * sizes[k])}
-    overlapping = sum(1 for k in likely if sizes[k] and (k not in whole or left[k + 1] < sizes[k]))
-    ids[~np.isin(ids, [k + 1 for k in whole])] = 0
-    return GivenFrame(ids, {k + 1: told[k] for k in sorted(whole)}, overlapping, faint)
+    visible = np.bincount(ids.ravel(), minlength=len(told) + 1)
+    large_enough = {k for k in distinct if visible[k + 1] >= max(settings.minimum_pixels, KEPT_SHARE * sizes[k])}
+    overlapping = sum(1 for k in likely if sizes[k] and (k not in large_enough or visible[k + 1] < sizes[k]))
+    ids[~np.isin(ids, [k + 1 for k in large_enough])] = 0
+    return GivenFrame(ids, {k + 1: told[k] for k in sorted(large_enough)}, overlapping, faint)
 
 
 def _are_same(first: np.ndarray, second: np.ndarray, size: int, other: int) -> bool:

@@ -82,9 +82,9 @@ def load_predictor(path: Path, vocabulary: Vocabulary, settings: GroupingSetting
     """Read a checkpoint for use. Raises BadInput as load_checkpoint does."""
     checkpoint = load_checkpoint(path, vocabulary)
     entries = [vocabulary.by_name(name) for name in checkpoint.classes]
-    named = tuple(Named(entry.id, entry.kind == "thing") for entry in entries)
+    classes = tuple(Named(entry.id, entry.kind == "thing") for entry in entries)
     unnamed = checkpoint.classes.index(UNNAMED) if UNNAMED in checkpoint.classes else None
-    return Predictor(checkpoint, named, settings or GroupingSettings(), unnamed)
+    return Predictor(checkpoint, classes, settings or GroupingSettings(), unnamed)
 
 
 class NetworkBackend:

@@ -40,9 +40,11 @@ CHANNELS = (
     "ray_right",
     "ray_down",
 )
+"""Names of the network's input channels, in order."""
 SMOOTHING_WINDOW, NORMAL_WINDOW, NORMAL_STEP = 5, 7, 2
+"""Edges of the windows that smooth depth and fit normals, and the step within the latter [px]; by eye."""
 LARGEST_INVERSE_DEPTH, LARGEST_HEIGHT = 4.0, 3.0
-"""Inputs are cut here [1/m], [m]."""
+"""Bounds at which inverse depth [1/m] and height [m] are cut."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ class GroupingSettings:
 class Named:
     """Class of a logit."""
 
-    category_id: int
+    class_id: int
     is_thing: bool
 
 
@@ -72,7 +72,7 @@ def group(
         if mask.sum() >= settings.minimum_pixels:
             number = len(masks) + 1
             ids[mask] = number
-            masks[number] = PanopticMask(classes[index].category_id, classes[index].is_thing, min(score, 1.0))
+            masks[number] = PanopticMask(classes[index].class_id, classes[index].is_thing, min(score, 1.0))
 
     for index in np.flatnonzero(~thing):
         mask = likeliest == index
@@ -100,11 +100,11 @@ def find_centres(heat: np.ndarray, allowed: np.ndarray, settings: GroupingSettin
     (h, w) bool): the centre of a ring lies beside it.
     """
     window = np.ones((settings.peak_window, settings.peak_window), np.uint8)
-    near = cv2.dilate(allowed.astype(np.uint8), window) > 0
-    peak = (heat >= cv2.dilate(heat, window)) & (heat > settings.centre_threshold) & near
-    found = np.argwhere(peak)
+    near_allowed = cv2.dilate(allowed.astype(np.uint8), window) > 0
+    peak = (heat >= cv2.dilate(heat, window)) & (heat > settings.centre_threshold) & near_allowed
+    peaks = np.argwhere(peak)
     order = np.argsort(-heat[peak], kind="stable")[: settings.largest_number]
-    return found[order]
+    return peaks[order]
 
 
 @njit(cache=True)
@@ -158,9 +158,9 @@ def raise_to_depth(coarse: np.ndarray, coarse_depth: np.ndarray, depth: np.ndarr
                 for du in range(2):
                     column = min(columns - 1, max(0, low_column + du))
                     cost = abs(row - y) + abs(column - x)
-                    there = coarse_depth[row, column]
-                    if z > 0 and there > 0:
-                        cost += min(4.0, abs(there - z) / (0.02 * z))
+                    coarse_z = coarse_depth[row, column]
+                    if z > 0 and coarse_z > 0:
+                        cost += min(4.0, abs(coarse_z - z) / (0.02 * z))
                     if cost < best:
                         best = cost
                         result[v, u] = coarse[row, column]

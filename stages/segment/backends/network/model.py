@@ -68,13 +68,13 @@ class PanopticNetwork(nn.Module):
         self.context = nn.Sequential(nn.Linear(encoder[-1], encoder[-1]), nn.ReLU(inplace=True))
         coarser = (*decoder[1:], encoder[-1])
         self.narrow = nn.ModuleList(
-            nn.Conv2d(above, own, 1, bias=False) for above, own in zip(coarser, decoder, strict=True)
+            nn.Conv2d(above, width, 1, bias=False) for above, width in zip(coarser, decoder, strict=True)
         )
         self.skips = nn.ModuleList(
-            nn.Conv2d(skip, own, 1, bias=False) for skip, own in zip(encoder[:-1], decoder, strict=True)
+            nn.Conv2d(skip, width, 1, bias=False) for skip, width in zip(encoder[:-1], decoder, strict=True)
         )
         self.merge = nn.ModuleList(
-            nn.Sequential(nn.BatchNorm2d(own), nn.ReLU(inplace=True), _convolution(own, own)) for own in decoder
+            nn.Sequential(nn.BatchNorm2d(width), nn.ReLU(inplace=True), _convolution(width, width)) for width in decoder
         )
         self.semantic = nn.Sequential(_convolution(decoder[0], decoder[0]), nn.Conv2d(decoder[0], classes, 1))
         self.instance = nn.Sequential(_convolution(decoder[0], decoder[0]), nn.Conv2d(decoder[0], 3, 1))

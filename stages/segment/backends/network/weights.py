@@ -16,8 +16,9 @@ from scenewright.stages.segment.backends.network.model import PanopticNetwork, W
 
 FORMAT = "scenewright panoptic network"
 VERSION = 1
+"""Of the layout of a checkpoint; others are refused."""
 BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "panoptic.safetensors"
-"""What comes with the project."""
+"""The checkpoint that comes with the project."""
 _OTHER = "give a checkpoint that `make train-network` wrote, or leave --weights out"
 
 
@@ -57,39 +58,39 @@ def load_checkpoint(path: Path, vocabulary: Vocabulary) -> Checkpoint:
         raise BadInput(
             f"{path}: checkpoint version {metadata.get('version')!r}, this code reads {VERSION}", hint=_OTHER
         )
-    if _listed(path, metadata, "channels") != list(CHANNELS) or metadata.get("input_width") != str(INPUT_WIDTH):
+    if _text_list(path, metadata, "channels") != list(CHANNELS) or metadata.get("input_width") != str(INPUT_WIDTH):
         raise BadInput(f"{path}: trained for other inputs than this code makes", hint=_OTHER)
-    classes = tuple(_listed(path, metadata, "classes"))
-    known = {entry.name for entry in vocabulary.classes}
-    unknown = [name for name in classes if name not in known]
+    classes = tuple(_text_list(path, metadata, "classes"))
+    class_names = {entry.name for entry in vocabulary.classes}
+    unknown = [name for name in classes if name not in class_names]
     if unknown or not classes or len(set(classes)) != len(classes):
-        what = (
+        reason = (
             f"class {unknown[0]!r} is not in the vocabulary" if unknown else "its list of classes is empty or repeats"
         )
-        raise BadInput(f"{path}: {what}", hint=_OTHER)
+        raise BadInput(f"{path}: {reason}", hint=_OTHER)
     network = PanopticNetwork(len(CHANNELS), len(classes), _widths(path, metadata))
     put_tensors(network, tensors, str(path), _OTHER)
     return Checkpoint(network, classes, metadata.get("description", ""))
 
 
-def _listed(path: Path, metadata: dict[str, str], key: str) -> list[str]:
+def _text_list(path: Path, metadata: dict[str, str], key: str) -> list[str]:
     try:
-        found: Any = json.loads(metadata.get(key, "null"))
+        value: Any = json.loads(metadata.get(key, "null"))
     except (ValueError, RecursionError):
-        found = None
-    if not isinstance(found, list) or not all(isinstance(entry, str) for entry in found):
+        value = None
+    if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
         raise BadInput(f"{path}: its metadata has no list of {key}", hint=_OTHER)
-    return found
+    return value
 
 
 def _widths(path: Path, metadata: dict[str, str]) -> Widths:
     """Return the network's widths, of which none may be absurd: a header must not ask for more memory than there is."""
     try:
-        found = json.loads(metadata.get("widths", "null"))
-        widths = Widths(tuple(found["encoder"]), tuple(found["decoder"]), found["blocks"])
+        value = json.loads(metadata.get("widths", "null"))
+        widths = Widths(tuple(value["encoder"]), tuple(value["decoder"]), value["blocks"])
         numbers = (*widths.encoder, *widths.decoder, widths.blocks)
-        whole = all(type(number) is int and 1 <= number <= 1024 for number in numbers) and widths.blocks <= 8
-        if len(widths.encoder) == 5 and len(widths.decoder) == 4 and whole:
+        in_range = all(type(number) is int and 1 <= number <= 1024 for number in numbers) and widths.blocks <= 8
+        if len(widths.encoder) == 5 and len(widths.decoder) == 4 and in_range:
             return widths
     except (ValueError, TypeError, KeyError, RecursionError):
         pass

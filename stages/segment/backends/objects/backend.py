@@ -31,7 +31,7 @@ SCORERS: dict[str, Callable[[], PairScorer]] = {
     "learned": lambda: by_trees(read_trees(BUNDLED, FEATURES)),
     "rules": lambda: BY_SET_RULES,
 }
-"""What `--grouping` chooses from. The trees raise BadInput when they cannot be read."""
+"""Scorers of pairs by the name that `--grouping` gives. The trees raise BadInput when they cannot be read."""
 
 
 class ObjectsBackend:
@@ -56,18 +56,20 @@ class ObjectsBackend:
         objects = segment_objects(color, frame.depth, self._camera, self._scorer)
         count = int(objects.labels.max(initial=0))
         rows, columns, starts = pixels_by_label(objects.labels[objects.patches.window], count)
-        kept = np.arange(count + 1, dtype=np.int32)
+        number_of = np.arange(count + 1, dtype=np.int32)
         for k in range(1, count + 1):
-            own = slice(starts[k], starts[k + 1])
-            low, high = np.quantile(objects.patches.points[rows[own], columns[own]], (0.02, 0.98), axis=0)
+            of_object = slice(starts[k], starts[k + 1])
+            low, high = np.quantile(objects.patches.points[rows[of_object], columns[of_object]], (0.02, 0.98), axis=0)
             if np.linalg.norm(high - low) > self._largest:
-                kept[k] = 0
-        ids = kept[objects.labels]
+                number_of[k] = 0
+        ids = number_of[objects.labels]
         return PanopticFrame(ids=ids, masks=dict.fromkeys(np.unique(ids[ids > 0]).tolist(), self._mask))
 
 
 def open_backend(request: BackendRequest) -> ObjectsBackend:
     """Return the backend that the request asks for. Raises UsageError without a log, BadInput as the class does."""
     _, reader = request.log()
-    own = request.own(ObjectsParameters)
-    return ObjectsBackend(load_vocabulary(), reader.camera, scorer=SCORERS[own.grouping](), largest=own.largest_object)
+    options = request.own(ObjectsParameters)
+    return ObjectsBackend(
+        load_vocabulary(), reader.camera, scorer=SCORERS[options.grouping](), largest=options.largest_object
+    )

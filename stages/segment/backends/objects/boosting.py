@@ -47,8 +47,8 @@ def read_trees(path: Path, features: tuple[str, ...]) -> Trees:
     inner = nodes.shape[1] if nodes.ndim == 2 else 0
     shapes = nodes.ndim == 2 and thresholds.shape == nodes.shape and values.shape == (len(nodes), inner + 1)
     types = nodes.dtype == np.int32 and thresholds.dtype == values.dtype == np.float32
-    whole = inner > 0 and (inner + 1) & inner == 0 and base.shape == (1,)
-    if not (shapes and types and whole) or nodes.min(initial=0) < 0 or nodes.max(initial=0) >= len(features):
+    complete = inner > 0 and (inner + 1) & inner == 0 and base.shape == (1,)
+    if not (shapes and types and complete) or nodes.min(initial=0) < 0 or nodes.max(initial=0) >= len(features):
         raise BadInput(f"{path}: the arrays are not those of balanced trees over {len(features)} features", hint=_OTHER)
     if np.isnan(thresholds).any() or not np.isfinite(values).all() or not np.isfinite(base).all():
         raise BadInput(f"{path}: the trees hold numbers that are none", hint=_OTHER)

@@ -36,7 +36,7 @@ class CutSettings:
 
 
 @njit(cache=True)
-def _unrolled(
+def _unroll_patch(
     rows: np.ndarray,
     columns: np.ndarray,
     points: np.ndarray,
@@ -85,25 +85,25 @@ def _line_support(color: np.ndarray, pixels: np.ndarray, step: float) -> np.ndar
                 filled += 1.0
         widest = max(widest, filled)
     for i in range(3, height - 3):
-        known = stepping = 0.0
+        measured = stepping = 0.0
         for j in range(width):
             best = 0.0
-            seen = False
+            has_pixels = False
             # The border may lie a cell higher or lower in a column.
             for k in range(i - 1, i + 2):
                 if pixels[k - 1, j] > 0 and pixels[k + 1, j] > 0:
-                    seen = True
+                    has_pixels = True
                     best = max(best, color_difference(color[k - 1, j], color[k + 1, j]))
                     if pixels[k, j] > 0 and pixels[k - 2, j] > 0 and pixels[k + 2, j] > 0:
                         # A shadow in the gap: darker than both sides.
                         darker = 0.5 * (min(color[k - 2, j, 0], color[k + 2, j, 0]) - color[k, j, 0])
                         best = max(best, darker)
-            if seen:
-                known += 1.0
+            if has_pixels:
+                measured += 1.0
                 if best > step:
                     stepping += 1.0
-        if known >= 4 and known >= 0.25 * widest:
-            support[i] = stepping / known
+        if measured >= 4 and measured >= 0.25 * widest:
+            support[i] = stepping / measured
     return support
 
 
@@ -127,20 +127,20 @@ def _directions(points: np.ndarray, normals: np.ndarray, up: np.ndarray) -> list
         result += [first, second]
     for turn in (angle, angle + math.pi / 2):
         direction = math.cos(turn) * first + math.sin(turn) * second
-        if all(abs(float(direction @ other)) < math.cos(math.radians(7)) for other in result):
+        if all(abs(float(direction @ chosen)) < math.cos(math.radians(7)) for chosen in result):
             result.append(direction)
     return result
 
 
 def _peaks(score: np.ndarray, least: float, apart: int, most: int) -> list[int]:
     """Positions of the highest values over `least`, at least `apart` from one another and from both ends."""
-    found: list[int] = []
+    positions: list[int] = []
     for i in np.argsort(-score, kind="stable"):
-        if score[i] < least or len(found) == most:
+        if score[i] < least or len(positions) == most:
             break
-        if apart <= i < len(score) - apart and all(abs(int(i) - other) >= apart for other in found):
-            found.append(int(i))
-    return found
+        if apart <= i < len(score) - apart and all(abs(int(i) - other) >= apart for other in positions):
+            positions.append(int(i))
+    return positions
 
 
 @njit(cache=True)
@@ -203,7 +203,7 @@ def cut_patches(
             view = some_points.mean(axis=0)
             seen_share = float(np.linalg.norm(np.cross(direction, view / np.linalg.norm(view))))
             size = cell / max(0.4, seen_share)
-            color, filled, low = _unrolled(rows, columns, points, lab, direction, across, size)
+            color, filled, low = _unroll_patch(rows, columns, points, lab, direction, across, size)
             support = _line_support(color, filled, settings.step)
             places = _peaks(support, settings.support, max(3, round(settings.margin / size)), settings.most)
             if not places:
@@ -217,7 +217,7 @@ def cut_patches(
         for piece in np.nonzero(pixels >= max(1, settings.minimum_pixels // 4))[0]:
             if piece == largest:
                 continue
-            here = code == piece
+            of_piece = code == piece
             patch_of.append(k)
-            result[rows[here], columns[here]] = len(patch_of) - 1
+            result[rows[of_piece], columns[of_piece]] = len(patch_of) - 1
     return result, np.array(patch_of)

@@ -48,8 +48,8 @@ class Agglomeration:
         """Return the best score and its pair, the first of several; -inf when there is none. `admitted` (N + 1, N + 1)
         bool: pairs that may be returned."""
         scores = self._scores if admitted is None else np.where(admitted, self._scores, -np.inf)
-        place = int(scores.argmax())
-        first, second = divmod(place, len(scores))
+        flat_index = int(scores.argmax())
+        first, second = divmod(flat_index, len(scores))
         return float(scores[first, second]), first, second
 
     def join(self, first: int, second: int) -> None:

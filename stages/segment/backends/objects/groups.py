@@ -16,9 +16,9 @@ from scenewright.stages.segment.backends.objects.regions import Regions
 
 LARGEST_GAP = 3.0
 """Groups that do not touch are a pair when their hulls' corners are closer than this times the root of the pixels of
-the smaller one ..."""
+the smaller one."""
 SMALLEST_APART = 250.0
-"""... and both have at least so many pixels."""
+"""Least pixels of both groups of a pair that does not touch."""
 
 
 class Groups:
@@ -109,10 +109,10 @@ def _candidate(a: int, b: int, sums: np.ndarray, borders: np.ndarray, boxes: np.
 @njit(cache=True)
 def _own_behind(hull: np.ndarray, k: int, sums: np.ndarray, groups: np.ndarray, inverse: np.ndarray) -> float:
     plane, residual = inverse_plane(sums[k])
-    own, hidden, missing, behind = hull_content(
+    covered, hidden, missing, behind = hull_content(
         hull, groups, inverse, k, k, plane, HIDING_MARGIN + 2 * residual, CONTENT_STEP
     )
-    return behind / max(1.0, own + hidden + missing + behind)
+    return behind / max(1.0, covered + hidden + missing + behind)
 
 
 @njit(cache=True)

@@ -69,7 +69,7 @@ def hull_content(
     `step`-th row and column is looked at; the numbers are scaled to all.
     """
     height, width = groups.shape
-    own = hidden = missing = behind = 0.0
+    covered = hidden = missing = behind = 0.0
     low, high = hull[:, 1].min(), hull[:, 1].max()
     row = int(np.ceil(low / step)) * step
     while row <= high:
@@ -80,7 +80,7 @@ def hull_content(
                 if 0 <= column < width:
                     group = groups[row, column]
                     if group in (a, b):
-                        own += 1.0
+                        covered += 1.0
                     elif inverse[row, column] <= 0.0:
                         missing += 1.0
                     elif group > 0 and inverse[row, column] > plane[0] + plane[1] * column + plane[2] * row + margin:
@@ -90,7 +90,7 @@ def hull_content(
                 column += step
         row += step
     scale = float(step * step)
-    return own * scale, hidden * scale, missing * scale, behind * scale
+    return covered * scale, hidden * scale, missing * scale, behind * scale
 
 
 @njit(cache=True)

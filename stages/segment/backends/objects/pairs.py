@@ -49,7 +49,9 @@ FEATURES = (
 )
 """Names of the features, in order."""
 COUNT = len(FEATURES)
+"""Number of features of a pair."""
 CONTENT_STEP = 3
+"""Every so many pixels across and down, the content of a hull is looked at [px]; by eye."""
 HIDING_MARGIN = 0.02
 """Nearer by this hides [1/m]: 2 cm at 1 m."""
 
@@ -143,13 +145,13 @@ def pair_features(
     corners[len(hull_a) :] = hull_b
     hull = convex_hull(corners)
     plane, residual = inverse_plane(joint)
-    own, hidden, missing, behind = hull_content(
+    covered, hidden, missing, behind = hull_content(
         hull, groups, inverse, a, b, plane, HIDING_MARGIN + 2 * residual, CONTENT_STEP
     )
-    whole = max(1.0, own + hidden + missing + behind)
-    f[16] = behind / whole
-    f[17] = behind / whole - (own_behind[a] * na + own_behind[b] * nb) / (na + nb)
-    f[18], f[19], f[20] = missing / whole, hidden / whole, own / whole
+    total = max(1.0, covered + hidden + missing + behind)
+    f[16] = behind / total
+    f[17] = behind / total - (own_behind[a] * na + own_behind[b] * nb) / (na + nb)
+    f[18], f[19], f[20] = missing / total, hidden / total, covered / total
 
     la = np.sqrt(sa[10] ** 2 + sa[11] ** 2 + sa[12] ** 2)
     lb = np.sqrt(sb[10] ** 2 + sb[11] ** 2 + sb[12] ** 2)

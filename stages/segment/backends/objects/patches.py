@@ -250,5 +250,5 @@ def _islands(mask: np.ndarray, risen: np.ndarray, smallest: int) -> np.ndarray:
     high = np.bincount(labels[mask & risen], minlength=count)
     keep &= high >= np.maximum(1, statistics[:, cv2.CC_STAT_AREA] / 3)
     keep[0] = False
-    kept: np.ndarray = keep[labels]
-    return kept
+    islands: np.ndarray = keep[labels]
+    return islands

@@ -10,8 +10,11 @@ from numba import njit
 from scenewright.stages.segment.backends.objects.hulls import convex_hull
 
 LIGHTNESS_BINS, CHROMA_BINS = 5, 6
+"""Bins of a patch's colours: of L, and of a and b each; by eye."""
 COLOR_BINS = LIGHTNESS_BINS * CHROMA_BINS * CHROMA_BINS
+"""Bins of a patch's colours in all."""
 HEIGHT_BINS = 80
+"""Bins of a patch's heights over its support surface; by eye."""
 HEIGHT_BIN = 0.005
 """Heights are counted in bins of this size [m]."""
 

@@ -17,8 +17,11 @@ from scenewright.stages.segment.backends.objects.pairs import FEATURES
 
 _AT = {name: k for k, name in enumerate(FEATURES)}
 CONNECTED, CONVEX, SHARE, BORDER_COLOR = _AT["connected"], _AT["convex"], _AT["border_share"], _AT["border_color"]
+"""Positions of the features that the broad terms are made of."""
 JOINED_BY_CUT, TOUCHES = _AT["cut"], _AT["touching"]
+"""Positions of the features that say of which kind a pair is."""
 PLAIN = len(FEATURES)
+"""Number of plain features; the broad terms follow them."""
 TERMS = (*FEATURES, "broad_convex", "broad_color")
 """What rules speak of: the features of pairs.py; convex share and colour step of the border, in proportion to the
 length of the border where that is under half of the smaller group's."""
@@ -26,6 +29,7 @@ length of the border where that is under half of the smaller group's."""
 CUT, TOUCHING, APART = 0, 1, 2
 """Kinds of pairs: pieces of one smooth patch, other neighbours, groups that do not touch."""
 OVER, UNDER = 1, -1
+"""Sides of its bound on which a feature counts."""
 
 
 class Rule(NamedTuple):
@@ -74,6 +78,7 @@ RULES = (
     Rule(APART, "top_difference", UNDER, 0.032, 45.9),
     Rule(APART, "behind_gain", OVER, 0.0, -30.0),  # by hand: only what something hides may be missing between two parts
 )
+"""The table; fitted by benchmarks/training/pair_rules.py but for what is marked "by hand"."""
 
 
 def rule_table(rules: tuple[Rule, ...], start: dict[int, float]) -> np.ndarray:

@@ -18,7 +18,7 @@ from scenewright.stages.segment.backends.objects.support import SupportSettings
 from scenewright.stages.segment.geometric import pixels_at, relabel
 
 UP_WITHOUT_SURFACE = np.array([0.0, -1.0, 0.0])
-"""Where no support surface is seen, the camera is taken to be upright."""
+"""Direction upwards in the camera frame where no support surface is seen: the camera is taken to be upright."""
 BY_SET_RULES = by_rules(rule_table(RULES, START))
 """The scorer that needs no training."""
 
@@ -106,7 +106,7 @@ def segment_objects(
 def _holes_closed(labels: np.ndarray, valid: np.ndarray, largest: int) -> np.ndarray:
     """Give pixels that one object surrounds to it: (H, W) int32 labels, where `valid`, holes up to `largest` pixels."""
     count, holes, statistics, _ = cv2.connectedComponentsWithStats((labels == 0).view(np.uint8), connectivity=4)
-    owner = _surrounding(labels, holes, count)
+    owner = _surrounding_labels(labels, holes, count)
     x, y = statistics[:, cv2.CC_STAT_LEFT], statistics[:, cv2.CC_STAT_TOP]
     outside = (x == 0) | (y == 0)
     outside |= x + statistics[:, cv2.CC_STAT_WIDTH] == labels.shape[1]
@@ -116,7 +116,7 @@ def _holes_closed(labels: np.ndarray, valid: np.ndarray, largest: int) -> np.nda
 
 
 @njit(cache=True)
-def _surrounding(labels: np.ndarray, holes: np.ndarray, count: int) -> np.ndarray:
+def _surrounding_labels(labels: np.ndarray, holes: np.ndarray, count: int) -> np.ndarray:
     """The one label that every hole 0..count-1 of `holes` (H, W) touches: 0 when none, -1 when several."""
     sole = np.zeros(count, dtype=np.int32)
     height, width = labels.shape

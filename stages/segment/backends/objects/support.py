@@ -16,7 +16,9 @@ from scenewright.schemas.scene_parts import Camera
 SAMPLE_STEP = 6
 """Every how many-th row and column takes part in the search and in the fit."""
 HYPOTHESES = 256
+"""Planes that are tried for one support surface (RANSAC); by eye."""
 REFITS = 4
+"""Times a plane is fitted to its inliers; by eye."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ def _weight_within(
     return result
 
 
-def _fitted(design: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+def _fit_coefficients(design: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     """Least-squares coefficients by the normal equations: slopes are of order one, so that they are well enough
     conditioned, and a tenth of the time of an orthogonal decomposition. Pixels in a line have the smallest solution."""
     coefficients: np.ndarray = np.linalg.lstsq(design.T @ design, design.T @ inverse, rcond=None)[0]
@@ -112,22 +114,24 @@ def find_supports(depth: np.ndarray, camera: Camera, settings: SupportSettings) 
     xs, ys = x[::SAMPLE_STEP][columns].astype(np.float64), y[::SAMPLE_STEP][rows].astype(np.float64)
     design = np.stack([np.ones_like(xs), xs, ys, xs * xs, xs * ys, ys * ys], axis=1)
     pixel_area = SAMPLE_STEP**2 / (camera.fx * camera.fy)
-    rest = np.ones(len(inverse), dtype=bool)
+    unexplained = np.ones(len(inverse), dtype=bool)
     surfaces: list[SupportSurface] = []
     for _ in range(settings.surfaces):
-        plane = _best_plane(design[rest], inverse[rest], settings.thickness, 1 / inverse[rest] ** 2)
+        plane = _best_plane(
+            design[unexplained], inverse[unexplained], settings.thickness, 1 / inverse[unexplained] ** 2
+        )
         if plane is None or np.linalg.norm(plane) < 1e-6:
             break
         coefficients = np.concatenate([plane, np.zeros(3)])
-        inside = rest & (np.abs(design @ coefficients - inverse) < settings.thickness)
+        inside = unexplained & (np.abs(design @ coefficients - inverse) < settings.thickness)
         for _ in range(REFITS):
             if np.count_nonzero(inside) < 30:
                 break
-            coefficients = _fitted(design[inside], inverse[inside])
-            inside = rest & (np.abs(design @ coefficients - inverse) < settings.thickness)
+            coefficients = _fit_coefficients(design[inside], inverse[inside])
+            inside = unexplained & (np.abs(design @ coefficients - inverse) < settings.thickness)
         if np.count_nonzero(inside) < 30:
             break
-        plane = _fitted(design[inside][:, :3], inverse[inside])
+        plane = _fit_coefficients(design[inside][:, :3], inverse[inside])
         # a + b x + c y = 1/z means (b, c, a) . p = 1; the camera is on the side where the form is below 1.
         length = float(np.linalg.norm(plane))
         normal = -np.array([plane[1], plane[2], plane[0]]) / length
@@ -136,8 +140,8 @@ def find_supports(depth: np.ndarray, camera: Camera, settings: SupportSettings) 
         if area < settings.area * (1.0 if surfaces else 0.25):
             break
         surfaces.append(SupportSurface(coefficients, normal, 1.0 / length, area))
-        rest &= design @ coefficients - inverse > -settings.clearance
-        rest &= ~inside
+        unexplained &= design @ coefficients - inverse > -settings.clearance
+        unexplained &= ~inside
     return sorted(surfaces, key=lambda surface: -surface.area)
 
 

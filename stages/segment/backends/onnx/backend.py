@@ -72,12 +72,12 @@ class OnnxBackend:
                 score_threshold=self._threshold,
                 stuff=self._labels.stuff(),
             )
-            named = {
+            named_segments = {
                 segment: NamedSegment(self._labels.labels[number], score)
                 for segment, (number, score) in segments.items()
                 if number in self._labels.labels
             }
-            return name_segments(ids, named, self._vocabulary, minimum_pixels=least)
+            return name_segments(ids, named_segments, self._vocabulary, minimum_pixels=least)
         if self._network.sidecar.layout == "yolo-seg":
             things = decoding.yolo_seg(
                 outputs["predictions"],
@@ -105,27 +105,27 @@ class OnnxBackend:
         return name_instances(masks, shape, self._vocabulary, minimum_pixels=least)
 
 
-def _label_map(network: Network, given: LabelSet | None) -> LabelMap:
+def _label_map(network: Network, label_set: LabelSet | None) -> LabelMap:
     """Return what the network's numbers stand for: by its metadata, its sidecar, or the number of its classes."""
     sidecar, name = network.sidecar, network.path.name
     if isinstance(sidecar.labels, tuple):
-        return _warned(match_labels(dict(enumerate(sidecar.labels)), given, where=name), name)
+        return _warn_of_unknown(match_labels(dict(enumerate(sidecar.labels)), label_set, where=name), name)
     if not sidecar.labels and (names := network.names()):
-        return _warned(match_labels(names, given, where=name), name)
+        return _warn_of_unknown(match_labels(names, label_set, where=name), name)
     count = class_count(network)
-    wanted = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
-    if not wanted:
+    set_name = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
+    if not set_name:
         raise BadInput(f"{name}: nothing says what its {count} classes are", hint=f"{HINT}: labels = [...]")
-    labels = load_label_set(wanted)
+    labels = load_label_set(set_name)
     if not sidecar.labels:
-        logger.info("%s: %d classes, taken for %s in its order", name, count, wanted)
+        logger.info("%s: %d classes, taken for %s in its order", name, count, set_name)
     if sidecar.numbering == "id":
         names = {label.id: label.name for label in labels.labels if label.id is not None}
     else:
         if count is not None and count != len(labels.labels):
-            raise BadInput(f"{name}: has {count} classes, {wanted} has {len(labels.labels)}", hint=HINT)
+            raise BadInput(f"{name}: has {count} classes, {set_name} has {len(labels.labels)}", hint=HINT)
         names = {number: label.name for number, label in enumerate(labels.labels)}
-    return _warned(match_labels(names, given or labels, where=name), name)
+    return _warn_of_unknown(match_labels(names, label_set or labels, where=name), name)
 
 
 def class_count(network: Network) -> int | None:
@@ -137,7 +137,7 @@ def class_count(network: Network) -> int | None:
     return None
 
 
-def _warned(matched: LabelMap, name: str) -> LabelMap:
+def _warn_of_unknown(matched: LabelMap, name: str) -> LabelMap:
     if matched.unknown:
         logger.warning(
             "%s: %d of its labels are in no table and stay void: %s",

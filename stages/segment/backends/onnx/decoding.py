@@ -13,6 +13,7 @@ from scenewright.stages.segment.suppression import suppress
 MOST_CANDIDATES = 300
 """Instances of one image that are looked at, the best scored."""
 MASK_THRESHOLD = 0.5
+"""Least probability of a mask's pixel; the published networks' own."""
 OVERLAP_SHARE = 0.8
 """A panoptic segment of which others leave less than this is dropped (Cheng et al. 2022)."""
 
@@ -49,14 +50,14 @@ def yolo_seg(
     order = np.flatnonzero(sound)[np.argsort(-best[sound], kind="stable")][:MOST_CANDIDATES]
     half = np.maximum(rows[order, 2:4], 0) / 2
     boxes = np.concatenate([rows[order, :2] - half, rows[order, :2] + half], axis=1)
-    kept = suppress(boxes, best[order], numbers[order], suppression_overlap)
+    unsuppressed = suppress(boxes, best[order], numbers[order], suppression_overlap)
     input_height, input_width = fitted.tensor.shape[-2:]
     things = []
-    for k in kept:
+    for k in unsuppressed:
         logits = np.tensordot(rows[order[k], -count:], prototypes[0].astype(np.float32), axes=1)
-        whole = cv2.resize(logits, (input_width, input_height), interpolation=cv2.INTER_LINEAR)
-        mask = _to_image(whole, fitted, shape) > 0
-        x0, y0, x1, y1 = _scaled(boxes[k], fitted)
+        input_logits = cv2.resize(logits, (input_width, input_height), interpolation=cv2.INTER_LINEAR)
+        mask = _to_image(input_logits, fitted, shape) > 0
+        x0, y0, x1, y1 = _scaled_box(boxes[k], fitted)
         things.append(Found(mask & _inside(x0, y0, x1, y1, shape), int(numbers[order[k]]), _unit(best[order[k]])))
     return things
 
@@ -87,7 +88,7 @@ def instances(
         if masks.shape[1:] == fitted.tensor.shape[-2:]:
             mask = _to_image(masks[k], fitted, shape) > MASK_THRESHOLD
         else:
-            mask = _pasted(masks[k], _scaled(boxes[k], fitted), shape)
+            mask = _paste_mask(masks[k], _scaled_box(boxes[k], fitted), shape)
         things.append(Found(mask, int(labels[k]), _unit(scores[k])))
     return things
 
@@ -111,26 +112,26 @@ def panoptic(
     probability = odds / odds.sum(axis=1, keepdims=True)
     numbers = probability.argmax(axis=1)
     scores = probability.max(axis=1)
-    kept = np.flatnonzero((numbers < probability.shape[1] - 1) & (scores >= score_threshold))
+    queries = np.flatnonzero((numbers < probability.shape[1] - 1) & (scores >= score_threshold))
     ids = np.zeros(shape, dtype=np.int32)
     segments: dict[int, tuple[int, float]] = {}
-    if not len(kept):
+    if not len(queries):
         return ids, segments
     height, width = fitted.tensor.shape[-2:]
-    whole = np.stack(
+    mask_probabilities = np.stack(
         [
             _sigmoid(
                 _to_image(cv2.resize(np.nan_to_num(masks[0, k].astype(np.float32)), (width, height)), fitted, shape)
             )
-            for k in kept
+            for k in queries
         ]
     )
-    winner = (whole * scores[kept, None, None]).argmax(axis=0)
+    winner = (mask_probabilities * scores[queries, None, None]).argmax(axis=0)
     fused: dict[int, int] = {}
-    for position, k in enumerate(kept):
-        own = whole[position] >= MASK_THRESHOLD
-        pixels = (winner == position) & own
-        if pixels.sum() <= OVERLAP_SHARE * own.sum():
+    for position, k in enumerate(queries):
+        of_query = mask_probabilities[position] >= MASK_THRESHOLD
+        pixels = (winner == position) & of_query
+        if pixels.sum() <= OVERLAP_SHARE * of_query.sum():
             continue
         number, score = int(numbers[k]), float(scores[k])
         target = fused.setdefault(number, len(segments) + 1) if number in stuff else len(segments) + 1
@@ -146,7 +147,7 @@ def _to_image(values: np.ndarray, fitted: Fitted, shape: tuple[int, int]) -> np.
     return inner if inner.shape == shape else cv2.resize(inner, (width, height), interpolation=cv2.INTER_LINEAR)
 
 
-def _scaled(box: np.ndarray, fitted: Fitted) -> tuple[float, float, float, float]:
+def _scaled_box(box: np.ndarray, fitted: Fitted) -> tuple[float, float, float, float]:
     x0, y0, x1, y1 = (float(value) for value in box)
     return x0 / fitted.scale_x, y0 / fitted.scale_y, x1 / fitted.scale_x, y1 / fitted.scale_y
 
@@ -156,7 +157,7 @@ def _inside(x0: float, y0: float, x1: float, y1: float, shape: tuple[int, int]) 
     return (rows >= y0) & (rows <= y1) & (columns >= x0) & (columns <= x1)
 
 
-def _pasted(small: np.ndarray, box: tuple[float, float, float, float], shape: tuple[int, int]) -> np.ndarray:
+def _paste_mask(small: np.ndarray, box: tuple[float, float, float, float], shape: tuple[int, int]) -> np.ndarray:
     """Return the mask (H, W) of a small one (h, w) 0..1 that fills a box; its pixels are sampled at their centres."""
     x0, y0, x1, y1 = box
     mask = np.zeros(shape, dtype=bool)

@@ -18,6 +18,7 @@ DEFAULT_SIZE = (640, 640)
 LONGEST_METADATA = 100_000
 """Characters."""
 PAD_VALUE = 114
+"""Grey with which a picture is padded, as YOLO networks were trained (0..255)."""
 HINT = "say what goes in and what comes out with --sidecar FILE.toml (docs/SEGMENTATION.md)"
 
 
@@ -80,8 +81,8 @@ class Network:
         }
         layout = sidecar or find_layout(shapes)
         if layout is None:
-            shown = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
-            raise BadInput(f"{self.path.name}: its outputs ({shown:.200}) are of no known layout", hint=HINT)
+            shapes_text = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+            raise BadInput(f"{self.path.name}: its outputs ({shapes_text:.200}) are of no known layout", hint=HINT)
         missing = [name for name in layout.outputs.values() if name not in shapes]
         if missing:
             raise BadInput(f"{self.path.name}: has no output {missing[0]!r:.60}", hint=f"it has: {', '.join(shapes)}")

@@ -13,7 +13,7 @@ from scenewright.schemas.outside import file_toml
 
 Layout = Literal["yolo-seg", "instances", "panoptic"]
 LARGEST_FILE = 2**20
-"""Bytes."""
+"""Most bytes of a sidecar."""
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "yolo-seg": ("predictions", "prototypes"),
     "instances": ("boxes", "labels", "scores", "masks"),
@@ -57,6 +57,7 @@ class Sidecar(Model):
 
 
 IMAGENET_MEAN, IMAGENET_DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Mean and standard deviation of ImageNet's pictures (R, G, B of 0..1), by which most networks were trained."""
 
 
 def read_sidecar(path: Path) -> Sidecar:

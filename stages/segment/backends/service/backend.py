@@ -42,12 +42,12 @@ class ServiceBackend:
 
     def __init__(self, request: BackendRequest) -> None:
         sequence, self._reader = request.log()
-        own, vocabulary = request.own(ServiceParameters), load_vocabulary()
+        options, vocabulary = request.own(ServiceParameters), load_vocabulary()
         labels = read_label_file(request.labels) if request.labels else None
-        connection = connected(request.parameters.backend, own)
+        connection = connected(request.parameters.backend, options)
         self._connection, self._vocabulary = connection, vocabulary
         self._seed, self._minimum_pixels = request.seed, request.parameters.small_object_pixels
-        expected = own.service_model
+        expected = options.service_model
         self.info = read_info(connection)
         if expected and self.info.identity != expected:
             raise BadInput(
@@ -78,7 +78,7 @@ class ServiceBackend:
         stored = self._reader.encoded(frame.index) if frame.color is not None else None
         request = SegmentRequest(frame, camera, self._seed)
         body, content_type = encode_request(request, self.info.streams, stored)
-        return self._named(self._ask(frame.index, body, content_type, (shape[0], shape[1])))
+        return self._panoptic_frame(self._ask(frame.index, body, content_type, (shape[0], shape[1])))
 
     def _ask(self, index: int, body: bytes, content_type: str, shape: tuple[int, int]) -> Reply:
         kept_reply = self._replies.find(body)
@@ -101,21 +101,19 @@ class ServiceBackend:
         self._replies.keep(body, answer.body)
         return reply
 
-    def _named(self, reply: Reply) -> PanopticFrame:
+    def _panoptic_frame(self, reply: Reply) -> PanopticFrame:
         # Small numbers in the same order: tables over ids stay small, and ties are broken as the service had them.
         numbers = sorted(reply.segments)
         ids = np.searchsorted(np.array([0, *numbers]), reply.ids).astype(np.int32)
         segments = {k + 1: reply.segments[number] for k, number in enumerate(numbers)}
         if self._speaks_ours:
-            return PanopticFrame(
-                ids, {k: PanopticMask(s.category_id, s.is_thing, s.score) for k, s in segments.items()}
-            )
-        named = {
-            k: NamedSegment(self._labels[s.category_id], s.score)
+            return PanopticFrame(ids, {k: PanopticMask(s.class_id, s.is_thing, s.score) for k, s in segments.items()})
+        named_segments = {
+            k: NamedSegment(self._labels[s.class_id], s.score)
             for k, s in segments.items()
-            if s.category_id in self._labels
+            if s.class_id in self._labels
         }
-        return name_segments(ids, named, self._vocabulary, minimum_pixels=self._minimum_pixels)
+        return name_segments(ids, named_segments, self._vocabulary, minimum_pixels=self._minimum_pixels)
 
 
 def connected(address: str, own: ServiceParameters) -> Connection:
@@ -128,9 +126,9 @@ def _is_vocabulary(categories: dict[int, Category], vocabulary: Vocabulary) -> b
     return {number: category.name for number, category in categories.items()} == ours
 
 
-def _labels(info: ServiceInfo, given: LabelSet | None, address: str) -> dict[int, Label]:
+def _labels(info: ServiceInfo, label_set: LabelSet | None, address: str) -> dict[int, Label]:
     names = {category.id: category.name for category in info.categories}
-    matched = match_labels(names, given, where=address)
+    matched = match_labels(names, label_set, where=address)
     if matched.unknown:
         logger.warning(
             "%s: %d of its categories are in no table and stay void: %s",

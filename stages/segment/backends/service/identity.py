@@ -8,7 +8,7 @@ from scenewright.stages.segment.backends.service.backend import connected
 from scenewright.stages.segment.parameters import SegmentParameters
 
 LABEL = "2"
-"""Of the words under which segments.json has a service's masks."""
+"""Version of the words under which segments.json has a service's masks."""
 
 
 def versions(parameters: SegmentParameters) -> dict[str, str]:

@@ -15,16 +15,16 @@ from pathlib import Path
 
 ENVIRONMENT = "SCENEWRIGHT_REPLIES"
 LARGEST_CACHE = 2**30
-"""Bytes; the oldest files go first."""
+"""Most bytes of the cache; the oldest files go first."""
 
 logger = logging.getLogger("scenewright")
 
 
 def cache_folder() -> Path:
     """Return the folder; it need not exist yet."""
-    given = os.environ.get(ENVIRONMENT)
-    if given:
-        return Path(given)
+    environment_value = os.environ.get(ENVIRONMENT)
+    if environment_value:
+        return Path(environment_value)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "scenewright" / "replies"
 
 

@@ -35,7 +35,7 @@ from scenewright.stages.segment.geometric import GeometricSettings, segment_dept
 MOST_WAITING = 16
 """Requests that may wait for the model; more are told to come back."""
 MOST_PIXELS = 10_000_000
-"""Of a frame: what a small file says it unpacks to takes a hundred bytes a pixel until it is segmented."""
+"""Most pixels of a frame: what a small file says it unpacks to takes a hundred bytes a pixel until it is segmented."""
 
 logger = logging.getLogger("scenewright")
 
@@ -97,7 +97,7 @@ def segment_request(request: SegmentRequest, backend: Backend, geometric: Geomet
     return Reply(
         panoptic.ids,
         {
-            number: ReplySegment(mask.category_id, mask.is_thing, float(mask.score))
+            number: ReplySegment(mask.class_id, mask.is_thing, float(mask.score))
             for number, mask in panoptic.masks.items()
         },
     )

@@ -46,7 +46,7 @@ def test_perfect_heads_give_back_every_instance() -> None:
         assert len(numbers) == 1 and numbers[0] > 0
         assert np.array_equal(found.ids == numbers[0], labels == label)
         mask, named = found.masks[int(numbers[0])], CLASSES[class_of_label[label]]
-        assert (mask.category_id, mask.is_thing) == (named.category_id, named.is_thing)
+        assert (mask.class_id, mask.is_thing) == (named.class_id, named.is_thing)
         assert mask.score > 0.99
 
 
@@ -64,7 +64,7 @@ def test_the_class_of_an_instance_is_that_of_most_of_its_pixels() -> None:
         logits[2, row, column], logits[3, row, column] = -8.0, 8.0
     found = group(logits, heat, offsets, CLASSES)
     numbers = np.unique(found.ids[labels == 5])
-    assert len(numbers) == 1 and found.masks[int(numbers[0])].category_id == 4
+    assert len(numbers) == 1 and found.masks[int(numbers[0])].class_id == 4
 
 
 def test_a_thing_that_is_not_recognised_becomes_the_unnamed_class_or_nothing() -> None:
@@ -78,7 +78,7 @@ def test_a_thing_that_is_not_recognised_becomes_the_unnamed_class_or_nothing() -
     found = group(logits, heat, offsets, classes, unnamed=6)
     number = int(found.ids[10, 10])
     assert np.array_equal(found.ids == number, logits[1] > 0)
-    assert found.masks[number].category_id == 40 and 0.15 < found.masks[number].score < 0.2
+    assert found.masks[number].class_id == 40 and 0.15 < found.masks[number].score < 0.2
     dropped = group(logits, heat, offsets, classes)
     assert not dropped.ids[10, 10] and len(dropped.masks) == 1
 

@@ -115,7 +115,7 @@ def test_the_backend_names_objects_and_drops_what_is_too_large() -> None:
         panoptic = backend(frame, None, np.random.default_rng(0))  # type: ignore[arg-type]
         assert len(panoptic.masks) == count
         assert set(np.unique(panoptic.ids)) - {0} == set(panoptic.masks)
-        assert all(mask.category_id == vocabulary.by_name("object").id for mask in panoptic.masks.values())
+        assert all(mask.class_id == vocabulary.by_name("object").id for mask in panoptic.masks.values())
 
 
 def test_trees_score_as_written_down_by_hand(tmp_path: Path) -> None:

@@ -41,17 +41,17 @@ def open_source(listing: Listing) -> MaskSource | None:
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
         rows = by_image[images[place]]
-        told = [
+        masks = [
             GivenMask(entry(row, "category_id", int), score_of(row.get("score"), f"{where}: image {images[place]}"))
             for row in rows
         ]
         return flatten_encoded(
-            [row.get("segmentation") for row in rows], told, settings, shape, f"{where}: image {images[place]}"
+            [row.get("segmentation") for row in rows], masks, settings, shape, f"{where}: image {images[place]}"
         )
 
     scored = any("score" in row for rows in by_image.values() for row in rows)
-    found = tuple(picture_of("", number, {}, pictures) for number in images)
-    return MaskSource(found, categories, read, () if scored else ("scores",))
+    picture_list = tuple(picture_of("", number, {}, pictures) for number in images)
+    return MaskSource(picture_list, categories, read, () if scored else ("scores",))
 
 
 def _rows(data: Any) -> list[Any] | None:

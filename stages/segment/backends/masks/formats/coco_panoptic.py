@@ -34,7 +34,9 @@ def open_source(listing: Listing) -> MaskSource | None:
     files: dict[str, list[Path]] = {}
     for file in listing.ending(".png"):
         files.setdefault(file.name, []).append(file)
-    told = [picture_of(entry(row, "file_name", str) or "", entry(row, "image_id", int), row, pictures) for row in rows]
+    picture_list = [
+        picture_of(entry(row, "file_name", str) or "", entry(row, "image_id", int), row, pictures) for row in rows
+    ]
     images: list[Path] = []
     for row in rows:
         name = (entry(row, "file_name", str) or "").replace("\\", "/")
@@ -57,7 +59,7 @@ def open_source(listing: Listing) -> MaskSource | None:
         return GivenFrame(ids, masks)
 
     scored = any("score" in segment for row in rows for segment in row["segments_info"] if isinstance(segment, dict))
-    return MaskSource(tuple(told), categories, read, ("overlaps",) if scored else ("scores", "overlaps"))
+    return MaskSource(tuple(picture_list), categories, read, ("overlaps",) if scored else ("scores", "overlaps"))
 
 
 def _is_panoptic(data: Any) -> bool:

@@ -33,20 +33,23 @@ def open_source(listing: Listing) -> MaskSource | None:
     if not files:
         return None
     beside = {file.with_suffix(""): file for file in listing.ending(".json")}
-    told = [_said(listing, beside[file.with_suffix("")]) if file.with_suffix("") in beside else None for file in files]
+    entries_by_file = [
+        _read_entries(listing, beside[file.with_suffix("")]) if file.with_suffix("") in beside else None
+        for file in files
+    ]
     classes, divisor = read_classes(listing)
-    words = sorted({word for said in told for word, _ in (said or {}).values() if word})
+    words = sorted({word for entries in entries_by_file for word, _ in (entries or {}).values() if word})
     numbers = {word: number for number, word in enumerate(words, start=1 + max(classes, default=0))}
     categories = {**classes, **{number: Category(word) for word, number in numbers.items()}}
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
         ids = read_instances(files[place], shape)
         values = [value for value in np.unique(ids).tolist() if value]
-        said = told[place]
-        if said is not None:
-            missing = [value for value in values if value not in said]
+        entries = entries_by_file[place]
+        if entries is not None:
+            missing = [value for value in values if value not in entries]
             source = beside[files[place].with_suffix("")].name
-            masks = {v: GivenMask(numbers.get(said[v][0]), said[v][1]) for v in values if v in said}
+            masks = {v: GivenMask(numbers.get(entries[v][0]), entries[v][1]) for v in values if v in entries}
         else:
             of = {value: value // divisor if divisor and value >= divisor else value for value in values}
             missing = [value for value in values if classes and of[value] not in classes]
@@ -54,13 +57,13 @@ def open_source(listing: Listing) -> MaskSource | None:
             masks = {value: GivenMask(of[value] if classes else None) for value in values if value not in missing}
         if missing:
             raise BadInput(
-                f"{files[place]}: id {missing[0]} is beyond {source}, which lists {_range(said or classes)} "
+                f"{files[place]}: id {missing[0]} is beyond {source}, which lists {_range(entries or classes)} "
                 f"({len(missing)} such ids)",
                 hint=HINT,
             )
         return GivenFrame(ids, masks)
 
-    scored = any(said is not None for said in told)
+    scored = any(entries is not None for entries in entries_by_file)
     return MaskSource(
         tuple(Picture(file.stem) for file in files),
         categories,
@@ -73,18 +76,18 @@ def _range(listed: Any) -> str:
     return f"{min(listed)}..{max(listed)}" if listed else "none"
 
 
-def _said(listing: Listing, path: Path) -> dict[int, tuple[str, float]]:
+def _read_entries(listing: Listing, path: Path) -> dict[int, tuple[str, float]]:
     """Return value -> (class name, empty: none; score) of one picture."""
     data = listing.json(path)
     if not isinstance(data, dict):
         raise BadInput(f"{path}: no object of values", hint=HINT)
-    said = {}
+    entries = {}
     for key, row in data.items():
         name = row if isinstance(row, str) else row.get("class", "") if isinstance(row, dict) else None
         if not (key.isascii() and key.isdigit() and len(key) < 6) or not isinstance(name, str):
             raise BadInput(f"{path}: {key[:20]!r}: {str(row):.40} says no class of a value", hint=HINT)
-        said[int(key)] = (name, score_of(row.get("score") if isinstance(row, dict) else None, f"{path}: {key}"))
-    return said
+        entries[int(key)] = (name, score_of(row.get("score") if isinstance(row, dict) else None, f"{path}: {key}"))
+    return entries
 
 
 FORMAT = MaskFormat(

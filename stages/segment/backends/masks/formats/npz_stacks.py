@@ -29,8 +29,9 @@ from scenewright.stages.segment.backends.masks.overlapping import flatten
 
 HINT = "np.savez(name, masks=..., classes=..., scores=...); docs/MASKS.md"
 NAMES = ("masks", "ids", "id", "classes", "scores")
+"""Arrays that are read; of `ids` and `id` either."""
 LARGEST_FILE = 2**30 + 2**16
-"""Bytes of the arrays of one picture, unpacked."""
+"""Most bytes of the arrays of one picture, unpacked."""
 
 
 def open_source(listing: Listing) -> MaskSource | None:
@@ -59,10 +60,10 @@ def open_source(listing: Listing) -> MaskSource | None:
 def _arrays(path: Path) -> set[str]:
     """Return the arrays of a file that are read here. Raises BadInput when they claim more than is held at a time."""
     with zip_errors(path, HINT), zipfile.ZipFile(path) as archive:
-        wanted = [row for row in archive.infolist() if row.filename.removesuffix(".npy") in NAMES]
-        if sum(row.file_size for row in wanted) > LARGEST_FILE:
+        rows = [row for row in archive.infolist() if row.filename.removesuffix(".npy") in NAMES]
+        if sum(row.file_size for row in rows) > LARGEST_FILE:
             raise BadInput(f"unpacks to more than {LARGEST_FILE} bytes", hint="write one file a picture")
-        have = {row.filename.removesuffix(".npy") for row in wanted}
+        have = {row.filename.removesuffix(".npy") for row in rows}
     if ("masks" in have) == ("ids" in have):
         raise BadInput(f"{path}: needs either `masks` (N, H, W) or `ids` (H, W)", hint=HINT)
     return have
@@ -83,7 +84,7 @@ def _read(
         )
     if "masks" in have:
         check_amount(len(image), shape, str(path))
-        return flatten(list(image != 0), _told(path, arrays, len(image), numbers), settings, shape)
+        return flatten(list(image != 0), _given_masks(path, arrays, len(image), numbers), settings, shape)
     if image.size and not 0 <= int(image.min()) <= int(image.max()) < 2**31:
         raise BadInput(f"{path}: ids that are not in 0..2^31", hint=HINT)
     ids = image.astype(np.int32)
@@ -98,11 +99,11 @@ def _read(
     missing = sorted(set(present) - set(listed.tolist()))
     if missing:
         raise BadInput(f"{path}: nothing says what id {missing[0]} is ({len(missing)} such ids)", hint=HINT)
-    told = _told(path, arrays, len(listed), numbers)
-    return GivenFrame(ids, dict(zip(listed.tolist(), told, strict=True)))
+    masks = _given_masks(path, arrays, len(listed), numbers)
+    return GivenFrame(ids, dict(zip(listed.tolist(), masks, strict=True)))
 
 
-def _told(path: Path, arrays: dict[str, np.ndarray], count: int, numbers: dict[str, int]) -> list[GivenMask]:
+def _given_masks(path: Path, arrays: dict[str, np.ndarray], count: int, numbers: dict[str, int]) -> list[GivenMask]:
     for name in ("classes", "scores"):
         if name in arrays and arrays[name].shape != (count,):
             raise BadInput(f"{path}: `{name}` is {arrays[name].shape} for {count} masks", hint=HINT)
@@ -111,15 +112,15 @@ def _told(path: Path, arrays: dict[str, np.ndarray], count: int, numbers: dict[s
         raise BadInput(f"{path}: `classes` is {classes.dtype}, not integers or text", hint=HINT)
     if scores is not None and scores.dtype.kind not in "uif":
         raise BadInput(f"{path}: `scores` is {scores.dtype}, not numbers", hint=HINT)
-    told = []
+    masks = []
     for k in range(count):
         category = (
             None if classes is None else numbers.get(str(classes[k])) if classes.dtype.kind == "U" else int(classes[k])
         )
         # The shortest number that rounds to the same 32 bits: 0.9 stays 0.9, as the other formats have it.
         score = 1.0 if scores is None else score_of(float(str(scores[k])), str(path))
-        told.append(GivenMask(category, score))
-    return told
+        masks.append(GivenMask(category, score))
+    return masks
 
 
 FORMAT = MaskFormat("NPZ stacks", "`masks` (N, H, W) or `ids` (H, W), a file a picture", 40, open_source)

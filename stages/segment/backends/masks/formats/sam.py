@@ -37,8 +37,8 @@ def open_source(listing: Listing) -> MaskSource | None:
         rows = _rows(read_json(files[place]))
         if rows is None or not all(isinstance(row, dict) for row in rows):
             raise BadInput(f"{where}: no list of masks", hint=HINT)
-        told = [GivenMask(None, _score(row, where)) for row in rows]
-        return flatten_encoded([row.get("segmentation") for row in rows], told, settings, shape, where)
+        masks = [GivenMask(None, _score(row, where)) for row in rows]
+        return flatten_encoded([row.get("segmentation") for row in rows], masks, settings, shape, where)
 
     return MaskSource(tuple(picture_of(file.name, None, {}, {}) for file in files), {}, read)
 
@@ -52,11 +52,11 @@ def _is_sam(row: Any) -> bool:
 
 
 def _score(row: dict[str, Any], where: str) -> float:
-    told = [row[key] for key in ("predicted_iou", "stability_score") if row.get(key) is not None]
-    if not all(isinstance(value, int | float) and not isinstance(value, bool) and value >= 0 for value in told):
+    scores = [row[key] for key in ("predicted_iou", "stability_score") if row.get(key) is not None]
+    if not all(isinstance(value, int | float) and not isinstance(value, bool) and value >= 0 for value in scores):
         raise BadInput(f"{where}: predicted_iou or stability_score is no number of 0 or more", hint=HINT)
     # The network's judgement of its own mask may pass 1 a little.
-    return float(min([1.0, *told]))
+    return float(min([1.0, *scores]))
 
 
 FORMAT = MaskFormat("SAM", "Segment Anything's automatic masks, a JSON a picture", 30, open_source)
