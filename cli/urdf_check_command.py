@@ -39,10 +39,10 @@ def urdf_check(
             for p in resting_penetrations(file, penetration)
         ]
     if json_output:
-        told = {"findings": problems, "advice": advised}
+        document = {"findings": problems, "advice": advised}
         rows = {
-            name: [{"kind": p.kind, "element": p.element, "message": p.message} for p in found]
-            for name, found in told.items()
+            name: [{"kind": p.kind, "element": p.element, "message": p.message} for p in problems_of_kind]
+            for name, problems_of_kind in document.items()
         }
         out(json.dumps({"file": str(file), "sound": not problems, **rows}))
     else:

@@ -15,7 +15,7 @@ def cleaned(text: str) -> str:
 
     JSON stays the same document.
     """
-    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return UNPRINTABLE.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def one_line(text: str) -> str:

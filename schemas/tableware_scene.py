@@ -37,14 +37,14 @@ def check_carriers(items: Iterable[TablewareItem]) -> None:
             raise ValueError(f"two items are called {item.name!r}")
         carrier[item.name] = item.on
     for name in carrier:
-        seen = {name}
+        passed = {name}
         below = carrier[name]
         while below is not None:
             if below not in carrier:
                 raise ValueError(f"{name!r} stands on {below!r}, which is not there")
-            if below in seen:
+            if below in passed:
                 raise ValueError(f"{name!r} stands on itself in the end")
-            seen.add(below)
+            passed.add(below)
             below = carrier[below]
 
 

@@ -32,13 +32,13 @@ def draw_language_map(language: LanguageMap, canvas: Canvas) -> None:
     if len(vectors.means):
         coarse = vectors.pieces[-1] if len(vectors.pieces) else np.zeros(len(vectors.means), int)
         canvas.points("pieces", vectors.means, _painted(coarse), 0.012)
-    seen = [(k, region) for k, region in enumerate(info.regions) if region.looks >= FEWEST_LOOKS]
-    seen = sorted(seen, key=lambda each: -max(each[1].box.size))[:MOST_BOXES]
+    looked_at = [(k, region) for k, region in enumerate(info.regions) if region.looks >= FEWEST_LOOKS]
+    looked_at = sorted(looked_at, key=lambda each: -max(each[1].box.size))[:MOST_BOXES]
     canvas.boxes(
         "places",
-        [region.box for _, region in seen],
-        [f"{region.class_name or 'piece'} {region.instance or k}" for k, region in seen],
-        [instance_color(k + 1) for k, _ in seen],
+        [region.box for _, region in looked_at],
+        [f"{region.class_name or 'piece'} {region.instance or k}" for k, region in looked_at],
+        [instance_color(k + 1) for k, _ in looked_at],
         show_labels=False,
     )
 

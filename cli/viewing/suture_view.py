@@ -54,13 +54,13 @@ def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
     """Draw poses in the left camera's frame over time, with the pictures."""
     file = needle.info
     rows = [f"{file.statement}", f"masks: {file.masks_from}; estimator {file.estimator}; filter {file.filter}"]
-    rows += [f"- frame {one.frame}: {one.estimate.abstained or 'known'}" for one in file.frames]
+    rows += [f"- frame {each.frame}: {each.estimate.abstained or 'known'}" for each in file.frames]
     canvas.document("needle", "\n\n".join(rows))
     _eyes(file.rig, canvas)
-    for one in file.frames:
-        canvas.time(one.time)
-        _pose("needle", one.estimate, file.needle_radius, canvas)
-        path = needle.path(f"pictures/{one.frame:06d}.png")
+    for each in file.frames:
+        canvas.time(each.time)
+        _pose("needle", each.estimate, file.needle_radius, canvas)
+        path = needle.path(f"pictures/{each.frame:06d}.png")
         if path.is_file():
             canvas.picture("eyes/needle", file_content(path, LARGEST_SHOWN))
     if file.filtered is not None:
@@ -70,15 +70,15 @@ def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
 def draw_suture_thread(thread: SutureThread, canvas: Canvas) -> None:
     """Draw the curves in the left camera's frame over time, with the pictures."""
     file = thread.info
-    rows = [f"- frame {one.frame}: {one.status}" for one in file.frames]
+    rows = [f"- frame {each.frame}: {each.status}" for each in file.frames]
     canvas.document("thread", "\n\n".join([file.statement, f"masks: {file.masks_from}", *rows]))
     _eyes(file.rig, canvas)
-    for one in file.frames:
-        canvas.time(one.time)
-        if one.points:
-            (points,) = read_arrays(thread.path("threads.npz"), f"points_{one.frame:06d}")
+    for each in file.frames:
+        canvas.time(each.time)
+        if each.points:
+            (points,) = read_arrays(thread.path("threads.npz"), f"points_{each.frame:06d}")
             canvas.line("thread", [points], [THREAD], radius=LINE)
-        path = thread.path(f"pictures/{one.frame:06d}.png")
+        path = thread.path(f"pictures/{each.frame:06d}.png")
         if path.is_file():
             canvas.picture("eyes/thread", file_content(path, LARGEST_SHOWN))
 
@@ -99,14 +99,14 @@ def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
         canvas.time(float(seconds[row]))
         _driver(int(arms[row]), tools[row], canvas)
         _needle(needles[row], canvas)
-    at, both, held, threads = read_arrays(
+    at, driver_poses, needle_poses, threads = read_arrays(
         trial.path("frames.npz"), "seconds", "world_from_tool", "world_from_needle", "thread"
     )
     for event, moment in enumerate(at):
         canvas.time(float(moment))
         for arm in (0, 1):
-            _driver(arm, both[event, arm], canvas)
-        _needle(held[event], canvas)
+            _driver(arm, driver_poses[event, arm], canvas)
+        _needle(needle_poses[event], canvas)
         canvas.line("thread", [threads[event]], [THREAD], radius=LINE)
 
 

@@ -35,15 +35,15 @@ def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
 
 def draw_tableware_detections(found: TablewareDetections, canvas: Canvas) -> None:
     """Show what was seen: the statement, the picture, and every item as a point at its lip, green by confidence."""
-    told = found.info
-    canvas.document("seen", "\n\n".join([told.statement, *told.notes]))
+    file = found.info
+    canvas.document("seen", "\n\n".join([file.statement, *file.notes]))
     canvas.picture("overlay", file_content(found.path("overlay.png"), LARGEST_SHOWN))
     _table(canvas)
-    for number, item in enumerate(told.items, start=1):
+    for number, item in enumerate(file.items, start=1):
         share = item.confidence if item.kind is not None else 0.0
         color = np.array([[round(255 * (1.0 - share)), round(200 * share), 40]], np.uint8)
-        place = np.array([[item.position[0], item.position[1], item.lip]])
-        canvas.points(f"items/{number}_{item.kind or 'unknown'}", place, color, radius=0.01)
+        center = np.array([[item.position[0], item.position[1], item.lip]])
+        canvas.points(f"items/{number}_{item.kind or 'unknown'}", center, color, radius=0.01)
 
 
 def draw_tableware_plan(plan: TablewarePlan, canvas: Canvas) -> None:

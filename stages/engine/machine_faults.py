@@ -23,8 +23,8 @@ OUT_OF_MEMORY = re.compile(
 
 def first_cause(error: OSError) -> tuple[int | None, str]:
     """Return number and words of what the system said; copying a folder gathers them as text."""
-    if error.errno is None and (found := re.search(r"\[Errno (\d+)\] ([^:\"']+)", str(error))):
-        return int(found[1]), found[2]
+    if error.errno is None and (match := re.search(r"\[Errno (\d+)\] ([^:\"']+)", str(error))):
+        return int(match[1]), match[2]
     return error.errno, error.strerror or str(error)
 
 
@@ -51,5 +51,9 @@ def _names(word: str, place: str) -> bool:
     value = word.partition("=")[2] if word.startswith("--") and "=" in word else word
     if not value or value.startswith("-") or "\0" in value:
         return False
-    given = os.path.abspath(value)
-    return given == place or place.startswith(given.rstrip("/") + "/") or given.startswith(place.rstrip("/") + "/")
+    absolute = os.path.abspath(value)
+    return (
+        absolute == place
+        or place.startswith(absolute.rstrip("/") + "/")
+        or absolute.startswith(place.rstrip("/") + "/")
+    )

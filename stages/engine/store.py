@@ -94,18 +94,18 @@ def exchange(first: Path, second: Path) -> bool:
 
 
 def _journalled_replace(partial: Path, target: Path) -> None:
-    journal, old = _beside(target, "journal"), _beside(target, f"old-{secrets.token_hex(4)}")
-    text = json.dumps({"partial": partial.name, "old": old.name})
+    journal, aside = _beside(target, "journal"), _beside(target, f"old-{secrets.token_hex(4)}")
+    text = json.dumps({"partial": partial.name, "old": aside.name})
     with journal.open("w") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
     sync_folder(target.parent)
-    os.rename(target, old)
+    os.rename(target, aside)
     os.rename(partial, target)
     sync_folder(target.parent)
     journal.unlink()
-    shutil.rmtree(old, ignore_errors=True)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def recover(target: Path) -> None:
@@ -118,15 +118,15 @@ def recover(target: Path) -> None:
         plan = json_of(text, str(journal))
         if not all(_ours(target).fullmatch(plan[role]) for role in ("partial", "old")):
             raise ValueError("names what is not ours")
-        partial, old = (target.with_name(plan[role]) for role in ("partial", "old"))
+        partial, aside = (target.with_name(plan[role]) for role in ("partial", "old"))
     except (BadInput, ValueError, TypeError, KeyError):
         journal.unlink()  # killed while writing it: nothing had been renamed yet
         return
     if not target.exists():
         if (partial / MANIFEST_NAME).exists():
             os.rename(partial, target)
-        elif old.exists():
-            os.rename(old, target)
+        elif aside.exists():
+            os.rename(aside, target)
     sync_folder(target.parent)
     journal.unlink()
 
@@ -177,11 +177,11 @@ def check_target(target: Path, kind: str) -> None:
         raise UsageError(f"{target}: a file stands there", hint="choose another --out")
     manifest = target / MANIFEST_NAME
     if manifest.exists():
-        found = _kind_on_disk(manifest)
-        if found is None and not (target / TIMINGS_NAME).exists():
+        kind_there = _kind_on_disk(manifest)
+        if kind_there is None and not (target / TIMINGS_NAME).exists():
             raise UsageError(f"{target}: its {MANIFEST_NAME} is not one that a step wrote", hint="choose another --out")
-        if found not in (None, kind):
-            raise UsageError(f"{target}: holds a {found!r} artifact, not {kind!r}", hint="choose another --out")
+        if kind_there not in (None, kind):
+            raise UsageError(f"{target}: holds a {kind_there!r} artifact, not {kind!r}", hint="choose another --out")
     elif any(target.iterdir()):
         raise UsageError(f"{target}: holds files that no step wrote", hint="choose another --out; nothing was changed")
 

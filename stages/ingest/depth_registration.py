@@ -34,8 +34,8 @@ def registered_depth(
     target = np.array([target_camera.fx, target_camera.fy, target_camera.cx, target_camera.cy])
     inverse_depth = np.zeros((target_camera.height, target_camera.width), np.float64)
     _draw(depth.astype(np.float64), intrinsics, target, np.asarray(target_from_depth, np.float64), inverse_depth)
-    seen = np.divide(1.0, inverse_depth, out=np.zeros_like(inverse_depth), where=inverse_depth > 0)
-    return depth_to_millimetres(seen)
+    depth_in_color = np.divide(1.0, inverse_depth, out=np.zeros_like(inverse_depth), where=inverse_depth > 0)
+    return depth_to_millimetres(depth_in_color)
 
 
 @njit(cache=True)

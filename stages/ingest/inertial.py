@@ -20,16 +20,16 @@ def measured_up(
     `samples` are stamps [ns] with proper accelerations (3,) [m/s^2] (+9.81 along up at rest, REP-145). What the device
     does in between averages out over a recording that begins and ends at similar speed.
     """
-    turned, seen = [], 0
+    turned, sample_count = [], 0
     for stamp, acceleration in samples:
-        seen += 1
+        sample_count += 1
         if not np.isfinite(acceleration).all():
             continue
         pose = world_from_imu(stamp)
         if pose is not None:
             turned.append(pose[:3, :3] @ acceleration)
     if len(turned) < FEWEST_SAMPLES:
-        return None, f"IMU not used for up: {len(turned)} of its {seen} samples looked at have a pose"
+        return None, f"IMU not used for up: {len(turned)} of its {sample_count} samples looked at have a pose"
     mean = np.mean(turned, axis=0)
     norm = float(np.linalg.norm(mean))
     if abs(norm - STANDARD_GRAVITY) > TOLERANCE * STANDARD_GRAVITY:

@@ -73,9 +73,9 @@ def grows_with(
     """Return the formula of a step whose output and memory grow with one of its inputs."""
 
     def formula(parameters: Any, inputs: Inputs) -> Estimate:
-        held = inputs[role].megabytes if role in inputs else 0.0
-        expected = megabytes + per_megabyte * held
-        return Estimate(expected, 0.02 * expected, mebibytes + mebibytes_per_megabyte * held)
+        input_megabytes = inputs[role].megabytes if role in inputs else 0.0
+        expected = megabytes + per_megabyte * input_megabytes
+        return Estimate(expected, 0.02 * expected, mebibytes + mebibytes_per_megabyte * input_megabytes)
 
     return formula
 

@@ -33,8 +33,11 @@ def joint_kind(joint: Joint, part: np.ndarray, model: np.ndarray) -> JointKind:
     middle = 0.5 * (part.min(axis=0) + part.max(axis=0))
     if joint.type == "prismatic":
         if abs(axis[2]) < UPRIGHT:
-            way = np.abs(axis[:2])
-            thin = size[:2] @ way[::-1] < SLIDING_DOOR * (size[:2] @ way) and size[2] > size[:2] @ way[::-1]
+            direction = np.abs(axis[:2])
+            thin = (
+                size[:2] @ direction[::-1] < SLIDING_DOOR * (size[:2] @ direction)
+                and size[2] > size[:2] @ direction[::-1]
+            )
             return "door" if thin else "drawer"
         above = middle[2] > 0.5 * (model[:, 2].min() + model[:, 2].max())
         return "lid" if axis[2] > 0 and above else "slide"

@@ -82,5 +82,5 @@ def _caption(title: str, conflicts: list[Penetration], models: int) -> str:
     if not conflicts:
         return f"{title}: none of {models} CAD models stands more than 5 mm in another, or in floor, walls or ceiling"
     pairs = [f"{pair.first} in {pair.second} ({1000 * pair.depth:.0f} mm)" for pair in conflicts[:NAMED_PAIRS]]
-    more = f" and {len(conflicts) - NAMED_PAIRS} more" if len(conflicts) > NAMED_PAIRS else ""
-    return f"{title}: {len(conflicts)} conflict{'s' if len(conflicts) > 1 else ''}, red: {', '.join(pairs)}{more}"
+    and_more = f" and {len(conflicts) - NAMED_PAIRS} more" if len(conflicts) > NAMED_PAIRS else ""
+    return f"{title}: {len(conflicts)} conflict{'s' if len(conflicts) > 1 else ''}, red: {', '.join(pairs)}{and_more}"

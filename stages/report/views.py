@@ -118,12 +118,12 @@ def best_azimuth(model: Model) -> float:
     Each thing counts with the square root of its area that faces the eye, so that many small things outweigh one
     large one; occlusion is not considered.
     """
-    things = model.things
-    if not things.any():
+    is_thing = model.things
+    if not is_thing.any():
         return 2.0 * np.pi * 0.5 / AZIMUTHS
-    corners = model.soup.corners[things]
+    corners = model.soup.corners[is_thing]
     area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    _, owner = np.unique(model.soup.instance[things], return_inverse=True)
+    _, owner = np.unique(model.soup.instance[is_thing], return_inverse=True)
     sign = model.inward_sign(model.centers.mean(axis=0))
     azimuths = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
     scores = [
@@ -168,7 +168,7 @@ def place_labels(
 ) -> list[Label]:
     """Put names on (H, W) instance images: in the middle of what is seen, large things first, none over another."""
     values, counts = np.unique(instance, return_counts=True)
-    taken: list[tuple[float, float, float, float]] = []
+    used_boxes: list[tuple[float, float, float, float]] = []
     labels: list[Label] = []
     for value, count in sorted(zip(values.tolist(), counts.tolist(), strict=True), key=lambda vc: (-vc[1], vc[0])):
         if value not in names or count < minimum_pixels:
@@ -179,8 +179,8 @@ def place_labels(
         half, high = 0.28 * font_size * len(names[value]) + 4, 0.68 * font_size
         x = int(np.clip(x, half, instance.shape[1] - half)) if instance.shape[1] > 2 * half else x
         box = (x - half, y - high, x + half, y + high)
-        if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken):
+        if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in used_boxes):
             continue
-        taken.append(box)
+        used_boxes.append(box)
         labels.append(Label(x, y, names[value], f"{names[value]}: {count} pixels in this view"))
     return labels

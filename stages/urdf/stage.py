@@ -38,9 +38,9 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
     cut = sum(bool(body.cut) for body in bodies)
     if cut:
         scene = write_scene_bundle(context.output, _written(bodies), graph)
-    held = _wedged(context)
-    if held:
-        bodies = _held(context.output, bodies, held)
+    wedged = _wedged(context)
+    if wedged:
+        bodies = _held(context.output, bodies, wedged)
         scene = write_scene_bundle(context.output, bodies, graph)
     rested = 0
     if parameters.rest:
@@ -57,7 +57,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         "joints": sum(len(body.joints) for body in scene.bodies),
         "cad_models": sum(body.model is not None for body in bodies),
         "rested": rested,
-        "held": len(held),
+        "held": len(wedged),
         "cut": cut,
     }
     outcome = "ok" if scene.bodies else "empty"
@@ -74,21 +74,23 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
 def _wedged(context: Context) -> dict[str, str]:
     """Return the furniture of the scene just written that cannot be free, and say so."""
     with context.progress.step("look for what is wedged"):
-        held = wedged_furniture(context.output)
-    for name, other in sorted(held.items()):
-        context.logger.warning("%s could be pushed but lies in %s: it stays", name, other)
-    return held
+        carrier_of = wedged_furniture(context.output)
+    for name, carrier in sorted(carrier_of.items()):
+        context.logger.warning("%s could be pushed but lies in %s: it stays", name, carrier)
+    return carrier_of
 
 
-def _held(root: Path, bodies: list[BundleBody], held: Collection[str]) -> list[BundleBody]:
+def _held(root: Path, bodies: list[BundleBody], wedged: Collection[str]) -> list[BundleBody]:
     """Return the bodies for another writing into `root`, some of them held; removes what only free ones have there."""
-    for name in held:
+    for name in wedged:
         (root / "bodies" / f"{name}.urdf").unlink()
         for pattern in ("collision_*.obj", "cut_*.obj"):
             for file in (root / "meshes" / name).glob(pattern):
                 file.unlink()
-    again = _written(bodies)
-    return [replace(body, movable=False, furniture=False, cut={}) if body.name in held else body for body in again]
+    rewritten = _written(bodies)
+    return [
+        replace(body, movable=False, furniture=False, cut={}) if body.name in wedged else body for body in rewritten
+    ]
 
 
 def _written(bodies: Sequence[BundleBody]) -> list[BundleBody]:

@@ -46,5 +46,5 @@ class GraphSubject(Subject[GraphState]):
     def _known(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
         link = self.state.graph.parent_link(node.id)
         stands = "" if link is None else f"{link.source} {link.relation.replace('_', ' ')} it"
-        said = [word for word in (stands, node.mark and f"marked {node.mark}", node.model_id) if word]
-        return {"box": written_box(thing.box).model_dump(), "says": "; ".join(said)}
+        words = [word for word in (stands, node.mark and f"marked {node.mark}", node.model_id) if word]
+        return {"box": written_box(thing.box).model_dump(), "says": "; ".join(words)}

@@ -29,9 +29,9 @@ class MapSubject(Subject[MapState]):
 
     def begun(self) -> MapState:
         """See Subject."""
-        seen = self._seen
-        seen.things()
-        return replace(seen, entities=dict(seen.entities), touched=set(seen.touched), _things=dict(seen._things))
+        state = self._seen
+        state.things()
+        return replace(state, entities=dict(state.entities), touched=set(state.touched), _things=dict(state._things))
 
     def anchor_of(self, thing: Thing) -> Anchor:
         """See Subject."""

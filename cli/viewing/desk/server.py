@@ -103,8 +103,8 @@ class _Handler(BoundedHandler):
         finally:
             self.done()
 
-    def _done(self, asked: Asked) -> dict[str, Any]:
-        desk, at = self.server.desk, {"artifact": asked.artifact, "revision": asked.revision}
-        if asked.remove is not None:
-            return desk.remove(asked.remove, **at)
-        return desk.append(asked.edit or {}, **at, by=asked.by, note=asked.note)
+    def _done(self, request: Asked) -> dict[str, Any]:
+        desk, at = self.server.desk, {"artifact": request.artifact, "revision": request.revision}
+        if request.remove is not None:
+            return desk.remove(request.remove, **at)
+        return desk.append(request.edit or {}, **at, by=request.by, note=request.note)

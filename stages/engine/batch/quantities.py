@@ -54,10 +54,10 @@ def format_seconds(seconds: float) -> str:
     """Return a duration [s] for people: `12.3 s`, `4 min 10 s`, `2 h 05 min`."""
     if seconds < 99.95:
         return f"{seconds:.1f} s"
-    whole = round(seconds)
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    whole_seconds = round(seconds)
+    if whole_seconds < 3600:
+        return f"{whole_seconds // 60} min {whole_seconds % 60:02d} s"
+    return f"{whole_seconds // 3600} h {whole_seconds % 3600 // 60:02d} min"
 
 
 def format_bytes(size: float) -> str:

@@ -77,8 +77,10 @@ class RayExecutor:
             self._connect()
         if not self.capacity():
             self.close()
-            wanted = ", ".join(f"{name} {amount:g}" for name, amount in self._wanted.items())
-            raise UsageError(f"no node of the cluster offers what a scene asks for: {wanted}", hint="lower [executor]")
+            requested = ", ".join(f"{name} {amount:g}" for name, amount in self._wanted.items())
+            raise UsageError(
+                f"no node of the cluster offers what a scene asks for: {requested}", hint="lower [executor]"
+            )
         self._task = self._ray.remote(run_on_worker).options(
             num_cpus=options.cpus,
             memory=memory,
@@ -117,8 +119,8 @@ class RayExecutor:
             return []
         ready, _ = self._ray.wait(list(self._jobs), num_returns=1, timeout=timeout)
         if ready:
-            more, _ = self._ray.wait(list(self._jobs), num_returns=len(self._jobs), timeout=0)
-            ready = list(dict.fromkeys([*ready, *more]))
+            ready_now, _ = self._ray.wait(list(self._jobs), num_returns=len(self._jobs), timeout=0)
+            ready = list(dict.fromkeys([*ready, *ready_now]))
         results = [self._take(reference) for reference in ready]
         return [result for result in results if result is not None]
 

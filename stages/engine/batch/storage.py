@@ -74,10 +74,10 @@ def stored_digest(url: str, step: str, timeout: float) -> str | None:
             manifest = Manifest.model_validate_json(
                 files.cat_file(f"{root}/{step}/{MANIFEST_NAME}", end=LARGEST_MANIFEST)
             )
-            whole = all(files.size(f"{root}/{step}/{file.path}") == file.bytes for file in manifest.files)
+            is_complete = all(files.size(f"{root}/{step}/{file.path}") == file.bytes for file in manifest.files)
         except (FileNotFoundError, NotADirectoryError, ValueError):
             return None
-        return manifest.content_digest if whole else None
+        return manifest.content_digest if is_complete else None
 
     return _asked(url, timeout, look)
 

@@ -48,9 +48,9 @@ class _Worker:
 
     def run(self, job: Job, cancelled: Callable[[], bool], host: str) -> SceneResult | None:
         """Run a scene, the storage left out. Raises _Died."""
-        own = job.model_copy(update={"storage": None})
+        local_job = job.model_copy(update={"storage": None})
         try:
-            self._requests.write(json.dumps({"job": own.model_dump(mode="json"), "host": host}).encode() + b"\n")
+            self._requests.write(json.dumps({"job": local_job.model_dump(mode="json"), "host": host}).encode() + b"\n")
             self._requests.flush()
             answer = self._answer(cancelled)
         except OSError:
@@ -68,10 +68,10 @@ class _Worker:
         waited, text = 0.0, b""
         while not text.endswith(b"\n"):
             if waiting.poll(1000 * SECONDS_BETWEEN_LOOKS):
-                more = os.read(self._answers.fileno(), 2**16)
-                if not more:
+                received = os.read(self._answers.fileno(), 2**16)
+                if not received:
                     raise _Died
-                text += more
+                text += received
                 continue
             waited += SECONDS_BETWEEN_LOOKS
             if cancelled():

@@ -80,12 +80,12 @@ def read_calibration(path: Path, camera_number: int = 0) -> FolderCalibration:
         raise BadInput(f"{path}: more than {LARGEST_FILE} bytes is no calibration")
     note = f"intrinsics read from {path.name}"
     if path.suffix in (".yaml", ".yml"):
-        found = _from_document(_read_yaml(path), path)
+        calibration = _from_document(_read_yaml(path), path)
     elif path.suffix == ".json":
-        found = _from_document(read_json(path), path)
+        calibration = _from_document(read_json(path), path)
     else:
-        found = _from_text(read_text(path), path, camera_number)
-    return replace(found, notes=(note, *found.notes))
+        calibration = _from_text(read_text(path), path, camera_number)
+    return replace(calibration, notes=(note, *calibration.notes))
 
 
 def _read_yaml(path: Path) -> Any:
@@ -194,14 +194,14 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
 
 
 def _kalibr(document: dict[Any, Any], path: Path) -> FolderCalibration:
-    left = _camera_of(document["cam0"], path)
-    other = document.get("cam1")
-    if not isinstance(other, dict):
-        return FolderCalibration(left)
-    right_from_left = _matrix(other.get("T_cn_cnm1"), 4, 4)
+    first = _camera_of(document["cam0"], path)
+    second = document.get("cam1")
+    if not isinstance(second, dict):
+        return FolderCalibration(first)
+    right_from_left = _matrix(second.get("T_cn_cnm1"), 4, 4)
     if right_from_left is None or not is_rigid(right_from_left):
         raise BadInput(f"{path}: cam1 has no rigid T_cn_cnm1")
-    return FolderCalibration(left, _camera_of(other, path), inverse(right_from_left))
+    return FolderCalibration(first, _camera_of(second, path), inverse(right_from_left))
 
 
 def _first(document: Any, *names: str) -> Any:
@@ -271,7 +271,7 @@ def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
 
 def _keyed(text: str) -> dict[str, str]:
     lines = (re.split(r"\s*[=:]\s*", line.strip(), maxsplit=1) for line in text.splitlines())
-    return {parts[0]: parts[1] for parts in lines if len(parts) == 2}
+    return {words[0]: words[1] for words in lines if len(words) == 2}
 
 
 def _typed(keyed: dict[str, str]) -> dict[str, Any]:

@@ -36,10 +36,10 @@ Pose = tuple[np.ndarray | None, str | None]
 
 def pose_file(root: Path) -> Path | None:
     """Return the file or folder of poses in a folder, None without any."""
-    named = [root / name for name in FILES if (root / name).is_file()]
-    named += [path for path in files_of(root, (".txt",)) if path.name.startswith("traj")]
-    named += [root / name for name in FOLDERS if (root / name).is_dir()]
-    return named[0] if named else None
+    candidates = [root / name for name in FILES if (root / name).is_file()]
+    candidates += [path for path in files_of(root, (".txt",)) if path.name.startswith("traj")]
+    candidates += [root / name for name in FOLDERS if (root / name).is_dir()]
+    return candidates[0] if candidates else None
 
 
 def columns_of(path: Path) -> int:
@@ -86,16 +86,16 @@ def _images(labels: list[str], names: list[str]) -> list[str | None]:
     A label is a name with or without folder and ending; where no label is one, labels that are whole numbers mean the
     images whose names end in these numbers, if they differ.
     """
-    known, found = set(names), []
+    image_names, images = set(names), []
     for label in labels:
         path = PurePosixPath(label)
         stem = path.name if WHOLE_NUMBER.fullmatch(path.suffix[1:]) else path.stem  # decimals are no file's ending
-        found.append(next((text for text in (path.name, stem) if text in known), None))
-    if any(image is not None for image in found) or not all(WHOLE_NUMBER.fullmatch(label) for label in labels):
-        return found
+        images.append(next((text for text in (path.name, stem) if text in image_names), None))
+    if any(image is not None for image in images) or not all(WHOLE_NUMBER.fullmatch(label) for label in labels):
+        return images
     by_number = {_last_number(name): name for name in names}
-    if None in by_number or len(by_number) < len(known):
-        return found
+    if None in by_number or len(by_number) < len(image_names):
+        return images
     return [by_number.get(int(label)) for label in labels]
 
 

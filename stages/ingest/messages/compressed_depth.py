@@ -84,8 +84,8 @@ def decode_rvl(body: bytes) -> np.ndarray:
     width, height = _RVL_SIZE.unpack_from(body)
     if not 0 < width * height <= LARGEST_IMAGE:
         raise Unusable("undecodable_depth", f"RVL image of {width}x{height}")
-    whole = (len(body) - _RVL_SIZE.size) // 4 * 4
-    words = np.frombuffer(body, "<u4", count=whole // 4, offset=_RVL_SIZE.size).astype(np.int64)
+    whole_bytes = (len(body) - _RVL_SIZE.size) // 4 * 4
+    words = np.frombuffer(body, "<u4", count=whole_bytes // 4, offset=_RVL_SIZE.size).astype(np.int64)
     pixels = np.zeros(height * width, np.uint16)
     fault = _unpack_rvl(words, pixels)
     if fault:
@@ -114,16 +114,16 @@ def _number(words: np.ndarray, nibble: int) -> tuple[int, int]:
 @njit(cache=True)
 def _unpack_rvl(words: np.ndarray, pixels: np.ndarray) -> int:
     """Fill `pixels` (N,) uint16, zeros so far, from RVL words (M,) int64. Return 0, or the fault."""
-    place, nibble, last = 0, 0, 0
-    while place < len(pixels):
+    position, nibble, last = 0, 0, 0
+    while position < len(pixels):
         zeros, nibble = _number(words, nibble)
         if zeros < 0:
             return zeros
-        place += zeros
+        position += zeros
         nonzeros, nibble = _number(words, nibble)
         if nonzeros < 0:
             return nonzeros
-        if place + nonzeros > len(pixels):
+        if position + nonzeros > len(pixels):
             return _OVERRUN
         for _ in range(nonzeros):
             folded, nibble = _number(words, nibble)
@@ -132,6 +132,6 @@ def _unpack_rvl(words: np.ndarray, pixels: np.ndarray) -> int:
             last += (folded >> 1) ^ -(folded & 1)
             if last <= 0 or last > 65535:
                 return _WRONG_VALUE
-            pixels[place] = last
-            place += 1
+            pixels[position] = last
+            position += 1
     return 0

@@ -36,14 +36,14 @@ def decoder_for(channel: Channel) -> Decoder | None:
 
     None: messages of a type that ingest has no use for, or that cannot be read; `why_unreadable` says which.
     """
-    found = _decoder(channel)
-    return None if isinstance(found, str) else found
+    decoder = _decoder(channel)
+    return None if isinstance(decoder, str) else decoder
 
 
 def why_unreadable(channel: Channel) -> str:
     """Return in words why there is no decoder for a channel; empty when there is one."""
-    found = _decoder(channel)
-    return found if isinstance(found, str) else ""
+    decoder_or_reason = _decoder(channel)
+    return decoder_or_reason if isinstance(decoder_or_reason, str) else ""
 
 
 @lru_cache(maxsize=256)
@@ -58,8 +58,8 @@ def _decoder(channel: Channel) -> Decoder | str:
         decoder = protobuf_decoder(name) if encoding == "protobuf" else json_decoder(name)
         return decoder or f"messages of type {_shown(name)} in {encoding} are not used"
     useful = short_name(name) in ros_messages.CONVERTERS or foxglove_messages.type_of(name) is not None
-    what = f"messages of type {_shown(name)} " if useful else "messages "
-    return f"{what}in encoding {_shown(channel.message_encoding)} are not read"
+    messages = f"messages of type {_shown(name)} " if useful else "messages "
+    return f"{messages}in encoding {_shown(channel.message_encoding)} are not read"
 
 
 def _ros(channel: Channel, encoding: str) -> Decoder | str:

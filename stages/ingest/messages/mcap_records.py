@@ -52,11 +52,11 @@ class _Fields:
 
     def texts(self) -> dict[str, str]:
         inside = _Fields(self.take(self.number(4)))
-        found = {}
+        text_of = {}
         while inside._place < len(inside._body):
             key = inside.text()
-            found[key] = inside.text()
-        return found
+            text_of[key] = inside.text()
+        return text_of
 
 
 def read_header(body: bytes) -> str:
@@ -154,9 +154,11 @@ def find_chunk(file: LogFile, start: int) -> int | None:
             return None
         places = np.flatnonzero(window[:last] == Opcode.CHUNK)
         plausible = (window[places + head] <= 4) & (window[places + head + 1] == 0) & (window[places + 8] == 0)
-        for place in places[plausible]:
-            if place < _WINDOW and _is_chunk(window[place : place + overlap].tobytes(), begin + int(place), file.size):
-                return begin + int(place)
+        for candidate in places[plausible]:
+            if candidate < _WINDOW and _is_chunk(
+                window[candidate : candidate + overlap].tobytes(), begin + int(candidate), file.size
+            ):
+                return begin + int(candidate)
     return None
 
 

@@ -133,8 +133,8 @@ def _role_of_compressed(record: ImageRecord, subject: str, words: list[str]) -> 
 def _color_or_picture(subject: str, words: list[str]) -> tuple[Role, str]:
     """Three channels of a topic about depth are made for people, and so are overlays on anything but colour."""
     values = DEPTH_WORDS | LABEL_WORDS | DISPARITY_WORDS
-    shown = PICTURE_WORDS.intersection(words) and values.intersection(words)
-    return ("other", PICTURE) if shown or subject in DEPTH_WORDS else ("color", "")
+    is_picture = PICTURE_WORDS.intersection(words) and values.intersection(words)
+    return ("other", PICTURE) if is_picture or subject in DEPTH_WORDS else ("color", "")
 
 
 def _telling_words(topic: str) -> list[str]:
@@ -144,8 +144,8 @@ def _telling_words(topic: str) -> list[str]:
     """
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", topic).lower()
     spaced = re.sub(r"(?:_to_|2)(?:color|colour|rgb|left|right|infra)|depth_?cam(?:era)?(?![a-z])", " ", spaced)
-    known = LABEL_WORDS | DEPTH_WORDS | COLOR_WORDS | INFRARED_WORDS | DISPARITY_WORDS | PICTURE_WORDS
-    return [word for word in re.findall(r"[a-z]+", spaced) if word in known]
+    telling = LABEL_WORDS | DEPTH_WORDS | COLOR_WORDS | INFRARED_WORDS | DISPARITY_WORDS | PICTURE_WORDS
+    return [word for word in re.findall(r"[a-z]+", spaced) if word in telling]
 
 
 # --- colour ----------------------------------------------------------------------------------------------------
@@ -324,32 +324,32 @@ def _check_whole(data: bytes, reason: str) -> None:
 
 def _jpeg_layout(data: bytes) -> tuple[int, int]:
     """Return where the compressed data of a JPEG begins, and how many channels it has; 0 where it does not say."""
-    place, channels = 2, 0
-    while place + 4 <= len(data) and data[place] == 0xFF:
-        marker = data[place + 1]
+    position, channels = 2, 0
+    while position + 4 <= len(data) and data[position] == 0xFF:
+        marker = data[position + 1]
         if marker == 0xFF:
-            place += 1
+            position += 1
         elif marker in JPEG_BARE_MARKERS:
-            place += 2
+            position += 2
         elif marker == 0xDA:
-            return place, channels
+            return position, channels
         else:
-            if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC) and place + 9 < len(data):
-                channels = data[place + 9]
-            place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
-    return place, channels
+            if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC) and position + 9 < len(data):
+                channels = data[position + 9]
+            position += 2 + int.from_bytes(data[position + 2 : position + 4], "big")
+    return position, channels
 
 
 def _check_png(data: bytes, reason: str) -> None:
-    place, view = len(PNG_START), memoryview(data)
-    while place + 12 <= len(data):
-        length = int.from_bytes(view[place : place + 4], "big")
-        end = place + 12 + length
+    position, view = len(PNG_START), memoryview(data)
+    while position + 12 <= len(data):
+        length = int.from_bytes(view[position : position + 4], "big")
+        end = position + 12 + length
         if end > len(data):
             break
-        if zlib.crc32(view[place + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
-            raise Unusable(reason, f"a PNG with a wrong checksum at byte {place}")
-        if view[place + 4 : place + 8] == b"IEND":
+        if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+            raise Unusable(reason, f"a PNG with a wrong checksum at byte {position}")
+        if view[position + 4 : position + 8] == b"IEND":
             return
-        place = end
+        position = end
     raise Unusable(reason, f"truncated: a PNG of {len(data)} bytes without an end")

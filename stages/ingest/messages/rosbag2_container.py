@@ -68,17 +68,19 @@ class Rosbag2Messages:
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield messages of the channels (None: all), part by part in the order in which they were stored."""
-        wanted = None if channel_ids is None else set(channel_ids)
+        wanted_ids = None if channel_ids is None else set(channel_ids)
         for index in self._readable:
-            inside = {own: number for (part, own), number in self._numbers.items() if part == index}
-            chosen = [own for own, number in inside.items() if wanted is None or number in wanted]
-            if wanted is not None and not chosen:
+            inside = {part_channel: number for (part, part_channel), number in self._numbers.items() if part == index}
+            chosen = [
+                part_channel for part_channel, number in inside.items() if wanted_ids is None or number in wanted_ids
+            ]
+            if wanted_ids is not None and not chosen:
                 continue
             part = self._part(index)
             self._in_use.append(index)
             faults: Counter[str] = Counter()
             try:
-                for message in part.messages(None if wanted is None else chosen):
+                for message in part.messages(None if wanted_ids is None else chosen):
                     try:
                         stored = self._stored(index, message)
                     except ValueError as error:
@@ -89,7 +91,7 @@ class Rosbag2Messages:
                 raise self._named(index, error) from None
             finally:
                 self._in_use.remove(index)
-            packed = [f"{number} times: {what}" for what, number in sorted(faults.items())]
+            packed = [f"{number} times: {reason}" for reason, number in sorted(faults.items())]
             if packed and not self._salvage:
                 raise BadInput(f"{self.path}: {self._name(index)}: {packed[0]}", hint=HINT)
             self._of_parts[index] = [*part.damage, *packed]
@@ -170,9 +172,9 @@ class Rosbag2Messages:
         stated = self._bag.message_count
         if stated is None or None in counts or any(self._of_parts.values()) or self._own:
             return
-        held = sum(count or 0 for count in counts)
-        if held < stated:
-            self._own.found(f"{NAME} counts {stated} messages, the parts hold {held}")
+        count_of_parts = sum(count or 0 for count in counts)
+        if count_of_parts < stated:
+            self._own.found(f"{NAME} counts {stated} messages, the parts hold {count_of_parts}")
 
     def _refresh(self) -> None:
         lines = list(self._own)
@@ -188,7 +190,7 @@ class Rosbag2Messages:
         """Return a part, opened; the one that was used longest ago is closed when many are open."""
         part = self._open.pop(index, None)
         if part is None:
-            idle = [other for other in self._open if other not in self._in_use]
+            idle = [part_index for part_index in self._open if part_index not in self._in_use]
             if len(self._open) >= MOST_OPEN and idle:
                 self._close_part(idle[0])
             part = self._opened(index)
@@ -213,8 +215,8 @@ class Rosbag2Messages:
                 return McapMessages(opened, salvage=self._salvage)
             if head.startswith(SQLITE_MAGIC):
                 return SqliteMessages(opened, salvage=self._salvage)
-            what = "is neither MCAP nor SQLite (wrong first bytes)" if head else "is empty"
-            raise BadInput(f"{path}: {what}", hint=HINT)
+            fault = "is neither MCAP nor SQLite (wrong first bytes)" if head else "is empty"
+            raise BadInput(f"{path}: {fault}", hint=HINT)
         except BadInput as error:
             error = self._named(index, error)
             self._close_part(index)

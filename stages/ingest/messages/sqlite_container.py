@@ -89,8 +89,8 @@ class SqliteMessages:
                 yield StoredMessage(self._topics[topic], time, data, number)
         if not self._counted:
             self._counted = channel_ids is None
-            for what, times in sorted(faults.items()):
-                self._lines.found(what, times)
+            for reason, times in sorted(faults.items()):
+                self._lines.found(reason, times)
 
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
@@ -115,8 +115,8 @@ class SqliteMessages:
         finally:
             file.close()
         if not head.startswith(MAGIC):
-            what = "is no SQLite file (wrong first bytes)" if head else "is empty"
-            raise BadInput(f"{self.path}: {what}", hint=HINT)
+            wrong_start = "is no SQLite file (wrong first bytes)" if head else "is empty"
+            raise BadInput(f"{self.path}: {wrong_start}", hint=HINT)
         return head, file.size
 
     def _check_size(self, head: bytes, size: int) -> None:
@@ -148,7 +148,7 @@ class SqliteMessages:
 
     def _journals(self) -> list[Path]:
         """Return the journals beside the file that hold what a recorder, cut short, had not moved into it."""
-        found = []
+        journals = []
         path = self.path.resolve()
         for suffix, magics in (("-wal", _WAL_MAGICS), ("-journal", (_JOURNAL_MAGIC,))):
             journal = path.with_name(path.name + suffix)
@@ -156,10 +156,10 @@ class SqliteMessages:
                 if journal.is_file():
                     with journal.open("rb") as file:
                         if file.read(len(_JOURNAL_MAGIC)).startswith(magics):
-                            found.append(journal)
+                            journals.append(journal)
             except OSError:
                 continue
-        return found
+        return journals
 
     def _take_in(self, journals: list[Path]) -> None:
         """Open a copy, into which SQLite takes the journals in; the file itself is never written."""
@@ -213,13 +213,13 @@ class SqliteMessages:
     def _check_structure(self) -> bool:
         """Have SQLite follow all pages once; return whether it finds nothing."""
         try:
-            found = [str(row[0]) for row in self._database.execute("PRAGMA quick_check(5)")]
+            complaints = [str(row[0]) for row in self._database.execute("PRAGMA quick_check(5)")]
         except _FAULTS as error:
-            found = [_reason(error)]
-        for line in found:
+            complaints = [_reason(error)]
+        for line in complaints:
             if line != "ok":
                 self._lines.found(f"structure is damaged: {_reason(line.removeprefix('*** in database main ***'))}")
-        return found == ["ok"]
+        return complaints == ["ok"]
 
     def _tables(self) -> set[str]:
         """Return the names of the true tables; views and virtual tables could compute anything."""
@@ -255,22 +255,22 @@ class SqliteMessages:
 
         Rows of other channels are stepped over here and not in SQL: pages that lead in a circle would keep it there.
         """
-        data, wanted = "data", tuple(channel_ids or ())
+        data, wanted_ids = "data", tuple(channel_ids or ())
         if channel_ids is not None:
-            data = f"CASE WHEN topic_id IN ({','.join('?' * len(wanted))}) THEN data END"
+            data = f"CASE WHEN topic_id IN ({','.join('?' * len(wanted_ids))}) THEN data END"
         query = _ROWS.format(data=data) + " ORDER BY rowid"
         last = -1
         while True:
             try:
-                for row in self._database.execute(query, (*wanted, last)):
+                for row in self._database.execute(query, (*wanted_ids, last)):
                     if row[0] <= last:
                         raise sqlite3.DatabaseError("its pages lead in a circle")
                     last = row[0]
-                    if channel_ids is None or row[1] in wanted:
+                    if channel_ids is None or row[1] in wanted_ids:
                         yield row
                 return
             except _FAULTS as error:
-                following = self._next_readable(query, wanted, last)
+                following = self._next_readable(query, wanted_ids, last)
                 if following is None:
                     self._lines.found(f"messages after number {last} cannot be read ({_reason(error)}): they are lost")
                     return
@@ -279,10 +279,10 @@ class SqliteMessages:
                     span = f"messages {last + 1} to {following[0] - 1}"
                     self._lines.found(f"{span} cannot be read ({_reason(error)}): up to {lost} are lost")
                 last = following[0]
-                if channel_ids is None or following[1] in wanted:
+                if channel_ids is None or following[1] in wanted_ids:
                     yield following
 
-    def _next_readable(self, query: str, wanted: tuple[int, ...], last: int) -> tuple[int, Any, Any, Any] | None:
+    def _next_readable(self, query: str, wanted_ids: tuple[int, ...], last: int) -> tuple[int, Any, Any, Any] | None:
         """Return the next row after `last` that can be read, found in steps that double, then halve; None: no more.
 
         sqlite3 reads one row ahead, so that the first may be the very next.
@@ -291,7 +291,7 @@ class SqliteMessages:
         def first(number: int) -> Any:
             """Return the first row from a number on, None at the end, False when it cannot be read."""
             try:
-                row = self._database.execute(query + " LIMIT 1", (*wanted, number - 1)).fetchone()
+                row = self._database.execute(query + " LIMIT 1", (*wanted_ids, number - 1)).fetchone()
             except _FAULTS:
                 return False
             return row if row is None or row[0] >= number else False

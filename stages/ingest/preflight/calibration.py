@@ -37,14 +37,14 @@ def calibration_report(camera: Camera) -> CalibrationReport:
 
 def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -> list[Finding]:
     """Return what is odd about the intrinsics."""
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str) -> None:
-        found.append(Finding(severity=severity, check="calibration", message=message, fix=fix, camera=name))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="calibration", message=message, fix=fix, camera=name))  # type: ignore[arg-type]
 
     give = "give --fx --fy --cx --cy"
     if max(map(abs, report.center_offset)) > CENTER_TOLERANCE:
-        place = (
+        intrinsics = (
             f"the principal point ({camera.cx:g}, {camera.cy:g}) is far from the middle of a "
             f"{camera.width}x{camera.height} image"
         )
@@ -53,11 +53,11 @@ def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -
             size = f"{camera.width / resize:.0f}x{camera.height / resize:.0f}"
             values = f"--fx {camera.fx * resize:.6g} --fy {camera.fy * resize:.6g} "
             values += f"--cx {(camera.cx + 0.5) * resize - 0.5:.6g} --cy {(camera.cy + 0.5) * resize - 0.5:.6g}"
-            add("wasted", f"{place}: the calibration is for {size}", f"give {values}")
+            add("wasted", f"{intrinsics}: the calibration is for {size}", f"give {values}")
         elif _centered(camera.cy, camera.width) and _centered(camera.cx, camera.height):
-            add("wasted", f"{place}: cx and cy are swapped", f"give --cx {camera.cy:g} --cy {camera.cx:g}")
+            add("wasted", f"{intrinsics}: cx and cy are swapped", f"give --cx {camera.cy:g} --cy {camera.cx:g}")
         else:
-            add("doubtful", place, f"{give}, unless the image was cropped")
+            add("doubtful", intrinsics, f"{give}, unless the image was cropped")
     low, high = FIELD_OF_VIEW
     if not low <= report.field_of_view[0] <= high:
         add(
@@ -68,7 +68,7 @@ def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -
         )
     if not ASPECT[0] <= report.focal_aspect <= ASPECT[1]:
         add("doubtful", f"pixels would not be square: fx / fy = {report.focal_aspect:.3g}", give)
-    return found
+    return findings
 
 
 def other_size(camera: Camera) -> float | None:

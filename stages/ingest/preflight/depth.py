@@ -97,10 +97,10 @@ def depth_findings(report: DepthReport, units: float, camera: str) -> list[Findi
 
     Whether it agrees with the poses is said with the poses.
     """
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str = "") -> None:
-        found.append(Finding(severity=severity, check="depth", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="depth", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
 
     if not report.plausible and report.factor_by != "poses":
         factors = plausible_factors(report.median)
@@ -128,4 +128,4 @@ def depth_findings(report: DepthReport, units: float, camera: str) -> list[Findi
             "8-bit once",
             "record 16-bit depth",
         )
-    return found
+    return findings

@@ -71,10 +71,10 @@ def shared(first: Look, second: Look, second_from_first: np.ndarray) -> float:
 
 def motion_findings(report: MotionReport, poses_agree: bool, camera: str) -> list[Finding]:
     """Return what is odd about the motion."""
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str = "") -> None:
-        found.append(Finding(severity=severity, check="poses", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="poses", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
 
     if report.jumps:
         places = ", ".join(f"{time:.3f}" for time in report.jump_times[:4])
@@ -92,4 +92,4 @@ def motion_findings(report: MotionReport, poses_agree: bool, camera: str) -> lis
         )
     if poses_agree and report.overlap is not None and report.overlap < LITTLE_OVERLAP:
         add("doubtful", f"neighbouring frames share only {100 * report.overlap:.0f} % of what they see")
-    return found
+    return findings

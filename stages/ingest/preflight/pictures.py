@@ -62,10 +62,10 @@ def picture_report(looks: Mapping[int, Look], runs: Sequence[Sequence[int]]) -> 
 
 def picture_findings(report: PictureReport, camera: str) -> list[Finding]:
     """Return what is odd about the pictures."""
-    found = []
+    findings = []
 
     def add(message: str, fix: str = "") -> None:
-        found.append(Finding(severity="doubtful", check="pictures", message=message, fix=fix, camera=camera))
+        findings.append(Finding(severity="doubtful", check="pictures", message=message, fix=fix, camera=camera))
 
     if report.blurred_share > 0.3:
         add(f"{100 * report.blurred_share:.0f} % of the pictures are blurred or show nothing", "use --every, or rescan")
@@ -77,4 +77,4 @@ def picture_findings(report: PictureReport, camera: str) -> list[Finding]:
         add(f"brightness flickers by {100 * report.flicker:.0f} % between neighbours")
     if report.repeated_share > 0.3:
         add(f"{100 * report.repeated_share:.0f} % of the pictures are the same as the one before")
-    return found
+    return findings

@@ -20,9 +20,9 @@ class ChunkCache:
         data = self._chunks.pop(index, None)
         if data is None:
             data = unpack(index)
-            kept = sum(map(len, self._chunks.values()))
-            while self._chunks and (len(self._chunks) >= MOST_CHUNKS or kept + len(data) > MOST_BYTES):
-                kept -= len(self._chunks.pop(next(iter(self._chunks))))
+            cached_bytes = sum(map(len, self._chunks.values()))
+            while self._chunks and (len(self._chunks) >= MOST_CHUNKS or cached_bytes + len(data) > MOST_BYTES):
+                cached_bytes -= len(self._chunks.pop(next(iter(self._chunks))))
         self._chunks[index] = data
         return data
 

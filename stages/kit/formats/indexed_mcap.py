@@ -119,6 +119,6 @@ class IndexedMcap:
             raise self._bad(error) from None
         return data
 
-    def _bad(self, what: Exception | str) -> BadInput:
-        detail = str(what) or type(what).__name__
+    def _bad(self, fault: Exception | str) -> BadInput:
+        detail = str(fault) or type(fault).__name__
         return BadInput(f"{self.path}: is no whole MCAP file of ours: {detail:.200}", hint=HINT)

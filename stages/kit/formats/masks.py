@@ -76,12 +76,12 @@ def write_panoptic_zip(path: Path, images: Iterable[tuple[int, np.ndarray | byte
     An image may be a PNG already (encode_panoptic_png).
     The same images in the same order give the same bytes. Raises ValueError when a frame comes twice.
     """
-    seen: set[int] = set()
+    written: set[int] = set()
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for frame_index, image in images:
-            if frame_index in seen:
+            if frame_index in written:
                 raise ValueError(f"frame {frame_index} comes twice")
-            seen.add(frame_index)
+            written.add(frame_index)
             entry = zipfile.ZipInfo(panoptic_name(frame_index), date_time=FIXED_TIMESTAMP)
             entry.external_attr = 0o644 << 16
             entry.create_system = 3

@@ -134,8 +134,8 @@ def _check_mesh(mesh: trimesh.Trimesh, path: str, *, may_be_empty: bool, hint: s
 def _parse(data: bytes, kind: str) -> trimesh.Trimesh | None:
     if len(data) > REMEMBERED_BYTES:
         return _parsed(data, kind)
-    found = _remembered(data, kind)
-    return found.copy() if found is not None else None
+    parsed = _remembered(data, kind)
+    return parsed.copy() if parsed is not None else None
 
 
 @lru_cache(maxsize=1024)
@@ -276,17 +276,17 @@ def _times_shown(tree: dict[str, Any]) -> list[int]:
             parents[child] = number
     depths: dict[int, int] = {}
     for number in range(len(nodes)):
-        way = []
+        path_of_nodes = []
         at: int | None = number
         while at is not None and at not in depths:
-            way.append(at)
-            if len(way) > DEEPEST_NODES:
+            path_of_nodes.append(at)
+            if len(path_of_nodes) > DEEPEST_NODES:
                 raise BadInput(f"nodes are nested deeper than {DEEPEST_NODES}, or in a circle")
             at = parents.get(at)
         depth = 0 if at is None else depths[at]
-        for place in reversed(way):
+        for passed_node in reversed(path_of_nodes):
             depth += 1
-            depths[place] = depth
+            depths[passed_node] = depth
         if depth > DEEPEST_NODES:
             raise BadInput(f"nodes are nested deeper than {DEEPEST_NODES}, or in a circle")
     return times if nodes else [1] * len(times)
@@ -301,9 +301,9 @@ def _glb_counts(data: bytes) -> tuple[int, int]:
         for mesh, times in zip(tree.get("meshes", ()), _times_shown(tree), strict=True):
             for primitive in mesh["primitives"]:
                 corners = counts[whole_number(primitive["attributes"]["POSITION"])]
-                named = counts[whole_number(primitive["indices"])] if "indices" in primitive else corners
+                index_count = counts[whole_number(primitive["indices"])] if "indices" in primitive else corners
                 strip = primitive.get("mode", 4) != 4
-                triangles += max(times, 1) * (named if strip else named // 3)
+                triangles += max(times, 1) * (index_count if strip else index_count // 3)
                 vertices += max(times, 1) * corners
     return triangles, vertices
 
@@ -333,13 +333,13 @@ def _pixels(data: bytes) -> int:
         size = image_size(picture) if may_be_decoded(picture) else None
         sizes.append(LARGEST_IMAGE if size is None else size[0] * size[1])
     times = _times_shown(tree)
-    shown = [0] * len(tree.get("materials", ()))
+    triangles_of_material = [0] * len(tree.get("materials", ()))
     for mesh, count in zip(tree.get("meshes", ()), times, strict=True):
         for primitive in mesh["primitives"]:
             if primitive.get("material") is not None:
-                shown[whole_number(primitive["material"])] += max(count, 1)
+                triangles_of_material[whole_number(primitive["material"])] += max(count, 1)
     pixels = sum(sizes)
-    for material, count in zip(tree.get("materials", ()), shown, strict=True):
+    for material, count in zip(tree.get("materials", ()), triangles_of_material, strict=True):
         for owner in (material, material.get("pbrMetallicRoughness", {})):
             for key, texture in owner.items():
                 if key.endswith("Texture"):

@@ -57,13 +57,13 @@ def write_model_folder(folder: Path, model: CadModel, parts: Sequence[PartGeomet
         (folder / name).mkdir(parents=True, exist_ok=True)
     links = []
     for part in parts:
-        shown: Sequence[Faceted] = part.visual or part.solids
+        shapes: Sequence[Faceted] = part.visual or part.solids
         colors = part.visual_colors if part.visual else part.colors
-        (folder / "visual" / f"{part.name}.glb").write_bytes(glb_bytes(colored_mesh(shown, colors)))
+        (folder / "visual" / f"{part.name}.glb").write_bytes(glb_bytes(colored_mesh(shapes, colors)))
         visuals, collisions = [], []
         palette = list(dict.fromkeys(colors))
         for k, color in enumerate(palette):
-            mesh = colored_mesh([s for s, c in zip(shown, colors, strict=True) if c == color], None)
+            mesh = colored_mesh([s for s, c in zip(shapes, colors, strict=True) if c == color], None)
             name = f"visual/{part.name}_{k}.obj"
             write_obj(folder / name, mesh.vertices, mesh.faces)
             visuals.append(Shape(mesh=name, color=(color[0] / 255, color[1] / 255, color[2] / 255, 1.0)))

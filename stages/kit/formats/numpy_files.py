@@ -71,8 +71,8 @@ def _check_shapes(names: tuple[str, ...], arrays: tuple[np.ndarray, ...], shapes
             )
         )
         if not fits:
-            wanted = ", ".join(f"{axis} = {sizes[axis]}" if axis in sizes else axis for axis in axes)
-            raise BadInput(f"{name}: shape {array.shape} of {array.dtype}, expected ({wanted}) numbers")
+            expected = ", ".join(f"{axis} = {sizes[axis]}" if axis in sizes else axis for axis in axes)
+            raise BadInput(f"{name}: shape {array.shape} of {array.dtype}, expected ({expected}) numbers")
 
 
 def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:

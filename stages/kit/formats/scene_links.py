@@ -60,9 +60,11 @@ class BodyLinks:
         ratio = mass / self.mass
         links = []
         for link in self.links:
-            old = link.inertial
-            new = None if old is None else MassProperties(old.mass * ratio, old.center, old.inertia * ratio)
-            links.append(replace(link, inertial=new))
+            before = link.inertial
+            after = (
+                None if before is None else MassProperties(before.mass * ratio, before.center, before.inertia * ratio)
+            )
+            links.append(replace(link, inertial=after))
         return replace(self, links=tuple(links))
 
     def with_friction(self, friction: float) -> BodyLinks:
@@ -225,7 +227,7 @@ def furniture_links(
     carries (`world_from_body`: where it was reconstructed), and a pad lies under each of these.
     """
     points = np.asarray(mesh.vertices, dtype=float)
-    whole = _hull(points, density)[1]
+    properties = _hull(points, density)[1]
     pieces = furniture_pieces(points, np.asarray(mesh.faces), rests_at)
     pieces = cut_below(pieces, world_from_body, carried)
     solids = [_hull(piece, density)[0] for piece in pieces]
@@ -234,7 +236,7 @@ def furniture_links(
         write_obj(root / "meshes" / name / f"collision_{number}.obj", solid.vertices, solid.faces)
         collisions.append(Shape(f"meshes/{name}/collision_{number}.obj"))
     links = BodyLinks((Link(name, mass_properties(solids, [density] * len(solids)), (visual,), tuple(collisions)),))
-    return links.with_mass(whole.mass)
+    return links.with_mass(properties.mass)
 
 
 def still_mesh_links(
@@ -274,8 +276,8 @@ def cut_links(root: Path, links: BodyLinks, cut: Mapping[int, Sequence[np.ndarra
             write_obj(root / file, solids[-1].vertices, solids[-1].faces)
             collisions.append(Shape(file))
         collisions += [] if number in cut else [shape]
-    whole = len(cut) == len(link.collisions)
-    inertial = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if whole else link.inertial
+    is_whole = len(cut) == len(link.collisions)
+    inertial = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if is_whole else link.inertial
     return replace(links, links=(replace(link, inertial=inertial, collisions=tuple(collisions)),)).with_mass(mass)
 
 

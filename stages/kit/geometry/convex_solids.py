@@ -23,7 +23,9 @@ class Solid:
     def shifted(self, offset: np.ndarray) -> Solid:
         """Return the solid moved by `offset` (3,) [m]; the shapes are shared."""
         places = [fcl.Transform(each.getTranslation() + offset) for each in self.objects]
-        moved = tuple(fcl.CollisionObject(shape, place) for shape, place in zip(self.shapes, places, strict=True))
+        moved = tuple(
+            fcl.CollisionObject(shape, transform) for shape, transform in zip(self.shapes, places, strict=True)
+        )
         return Solid(self.low + offset, self.high + offset, self.shapes, moved)
 
 

@@ -112,9 +112,9 @@ def _check_numbers(call: ActionCall, action: ActionType) -> Failure | None:
     missing = [name for name in action.numbers if name not in call.parameters]
     strange = [name for name in call.parameters if name not in action.numbers]
     if missing or strange:
-        wanted = ", ".join(action.numbers) or "no numbers"
+        expected = ", ".join(action.numbers) or "no numbers"
         which = f"{missing[0]} is missing" if missing else f"{quoted(strange[0])} is none of them"
-        return _failure("wrong_numbers", call, f"{action.name} takes {wanted}; {which}")
+        return _failure("wrong_numbers", call, f"{action.name} takes {expected}; {which}")
     for name, allowed in action.numbers.items():
         value = call.parameters[name]
         if not allowed.low <= value <= allowed.high:

@@ -39,8 +39,8 @@ def request_digest(messages: list[dict[str, Any]], schema: dict[str, Any], model
 
     Raises ValueError for what no JSON can hold.
     """
-    parts = {"messages": messages, "schema": schema, "model": model, "temperature": float(temperature)}
-    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+    content = {"messages": messages, "schema": schema, "model": model, "temperature": float(temperature)}
+    return hashlib.sha256(canonical_json(content).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

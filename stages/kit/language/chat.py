@@ -98,10 +98,10 @@ class Chat:
         )
 
     def _keep_to_budget(self) -> None:
-        settings, asked = self.settings, self.calls + self.re_prompts
-        if asked >= settings.call_budget:
-            numbers = {"asked": float(asked), "budget": float(settings.call_budget)}
-            message = f"{self.backend.label}: asked {asked} times, as often as --call-budget allows"
+        settings, asked_count = self.settings, self.calls + self.re_prompts
+        if asked_count >= settings.call_budget:
+            numbers = {"asked": float(asked_count), "budget": float(settings.call_budget)}
+            message = f"{self.backend.label}: asked {asked_count} times, as often as --call-budget allows"
             raise self._failed("call_budget", message, numbers, "raise --call-budget")
         if self.tokens >= settings.token_budget:
             numbers = {"tokens": float(self.tokens), "budget": float(settings.token_budget)}
@@ -141,17 +141,17 @@ def read_reply(raw: RawReply, schema: ReplySchema[T]) -> T:
     if raw.finish == "length":
         raise Unreadable(f"the reply was cut after {raw.usage.completion_tokens} tokens; be briefer")
     objects = objects_in(raw.text)
-    read: list[T] = []
+    values: list[T] = []
     for value in objects:
         try:
-            read.append(schema.read(value))
+            values.append(schema.read(value))
         except DoesNotFollow as error:
             reason = error
-    if len(read) > 1:
-        raise Unreadable(f"the reply holds {len(read)} objects that follow the schema; one is wanted")
-    if not read:
+    if len(values) > 1:
+        raise Unreadable(f"the reply holds {len(values)} objects that follow the schema; one is wanted")
+    if not values:
         raise reason
-    return read[0]
+    return values[0]
 
 
 def _asked_again(reason: str, schema: ReplySchema[Any]) -> Message:

@@ -166,8 +166,8 @@ def _text(content: Any) -> str:
     """Return the text of a message: a string, or a list of parts of which the text ones count."""
     if isinstance(content, str):
         return content
-    parts = content if isinstance(content, list) else []
-    texts = [part.get("text") for part in parts if isinstance(part, dict)]
+    pieces = content if isinstance(content, list) else []
+    texts = [part.get("text") for part in pieces if isinstance(part, dict)]
     return "".join(text for text in texts if isinstance(text, str))
 
 

@@ -57,12 +57,12 @@ class RecordingBackend:
         return raw
 
     def _answered(self, request: Request, digest: str, occurrence: int) -> RawReply:
-        kept = self._file.transcript.find(digest, occurrence)
-        if kept is not None:
-            return kept.raw
-        kept = self._earlier.find(digest, occurrence) if self._earlier is not None else None
-        raw = kept.raw if kept is not None else self._backend.ask(request)
-        self._file.append(kept if kept is not None else exchange_of(request, raw, self._backend.label))
+        exchange = self._file.transcript.find(digest, occurrence)
+        if exchange is not None:
+            return exchange.raw
+        exchange = self._earlier.find(digest, occurrence) if self._earlier is not None else None
+        raw = exchange.raw if exchange is not None else self._backend.ask(request)
+        self._file.append(exchange if exchange is not None else exchange_of(request, raw, self._backend.label))
         return raw
 
 
@@ -73,8 +73,8 @@ def _missing(transcript: Transcript, request: Request, occurrence: int) -> Langu
         message = f"{message}, asked for the {occurrence + 1}. time"
     same = [e for e in transcript if list(e.messages) == described(request.messages)]
     if same and not occurrence:
-        other = same[0]
-        message = f"{message}; it was recorded with {_differences(request, other.model, other.temperature)}"
+        recorded = same[0]
+        message = f"{message}; it was recorded with {_differences(request, recorded.model, recorded.temperature)}"
     return LanguageFailed(
         "not_recorded",
         message,

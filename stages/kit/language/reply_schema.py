@@ -79,13 +79,13 @@ def _all_required(document: Any) -> Any:
         return [_all_required(item) for item in document]
     if not isinstance(document, dict):
         return document
-    made = {key: _all_required(value) for key, value in document.items() if key != "default"}
-    if isinstance(made.get("properties"), dict):
+    completed = {key: _all_required(value) for key, value in document.items() if key != "default"}
+    if isinstance(completed.get("properties"), dict):
         # A property may itself be called `default`, so that this level is copied from the original names.
-        made["properties"] = {name: _all_required(value) for name, value in document["properties"].items()}
-        made["required"] = list(made["properties"])
-        made.setdefault("additionalProperties", False)
-    return made
+        completed["properties"] = {name: _all_required(value) for name, value in document["properties"].items()}
+        completed["required"] = list(completed["properties"])
+        completed.setdefault("additionalProperties", False)
+    return completed
 
 
 def _place(path: tuple[Any, ...]) -> str:
@@ -93,6 +93,6 @@ def _place(path: tuple[Any, ...]) -> str:
 
 
 def _joined(reasons: list[str]) -> str:
-    more = f" (and {len(reasons) - MOST_REASONS} more)" if len(reasons) > MOST_REASONS else ""
+    and_more = f" (and {len(reasons) - MOST_REASONS} more)" if len(reasons) > MOST_REASONS else ""
     text = " ".join("; ".join(reasons[:MOST_REASONS]).split())
-    return (text if len(text) <= LONGEST_REASON else text[: LONGEST_REASON - 3] + "...") + more
+    return (text if len(text) <= LONGEST_REASON else text[: LONGEST_REASON - 3] + "...") + and_more

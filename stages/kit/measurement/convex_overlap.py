@@ -137,6 +137,6 @@ def shared_volume(a: Sequence[ConvexPiece], b: Sequence[ConvexPiece], cells: int
 def _inside_any(pieces: Sequence[ConvexPiece], points: np.ndarray) -> np.ndarray:
     inside = np.zeros(len(points), dtype=bool)
     for piece in pieces:
-        near = np.nonzero(~inside & np.all((points >= piece.low) & (points <= piece.high), axis=1))[0]
-        inside[near] = np.all(points[near] @ piece.normals.T <= piece.offsets, axis=1)
+        in_box = np.nonzero(~inside & np.all((points >= piece.low) & (points <= piece.high), axis=1))[0]
+        inside[in_box] = np.all(points[in_box] @ piece.normals.T <= piece.offsets, axis=1)
     return inside

@@ -101,8 +101,10 @@ def plan_drive(
     try:
         return find_path(query, checker, random, samples=samples)
     except MotionFailed as failed:
-        what = failed.failure
-        raise MotionFailed(what.kind, f"driving: {what.message}", what.objects, dict(what.numbers)) from None
+        failure = failed.failure
+        raise MotionFailed(
+            failure.kind, f"driving: {failure.message}", failure.objects, dict(failure.numbers)
+        ) from None
 
 
 def base_query(start: np.ndarray, goal: np.ndarray, arm: np.ndarray, room: tuple[np.ndarray, np.ndarray]) -> Query:

@@ -32,7 +32,7 @@ class CompiledModel:
         self._pieces = link_pieces(mobile_robot_urdf(description))
         joints = len(self._chain.fixed)
         # Pedestal and arm base stand on frame 0, hand and fingers on the last.
-        frame_of = {name: max(0, place - 1) for place, name in enumerate(robot.chain)}
+        frame_of = {name: max(0, index - 1) for index, name in enumerate(robot.chain)}
         links = [name for name in robot.links if self._pieces.get(name)]
         self._frame_of = {name: frame_of.get(name, joints) for name in links}
         self.parts = [*links, CARRIED]
@@ -201,13 +201,13 @@ class CompiledModel:
             pair_distance=apart,
         )
 
-    def _pairs(self, parts: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    def _pairs(self, part_indices: list[int]) -> tuple[np.ndarray, np.ndarray]:
         """Return the pairs of pieces that must not meet (K, 2), and their distances: the mesh checker's rules."""
         hand = {self.robot.hand, *self.robot.fingers}
         pairs, apart = [], []
-        for i in range(len(parts)):
-            for j in range(i + 1, len(parts)):
-                first, second = self.parts[parts[i]], self.parts[parts[j]]
+        for i in range(len(part_indices)):
+            for j in range(i + 1, len(part_indices)):
+                first, second = self.parts[part_indices[i]], self.parts[part_indices[j]]
                 if first == second:
                     continue
                 if second == CARRIED:

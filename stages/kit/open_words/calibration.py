@@ -65,13 +65,13 @@ def recognised(regions: np.ndarray, extents: np.ndarray, encoder: Encoder) -> fl
     Pictures of another kind than the encoder learned from are near no name, however well they fit one rather than
     another.
     """
-    seen = (regions != 0).any(axis=1)
+    has_vector = (regions != 0).any(axis=1)
     names = [entry.name.replace("_", " ") for entry in load_vocabulary().classes]
-    known = [name for name in names if not encoder.unread(name)]
-    if not seen.any() or not known:
+    read_names = [name for name in names if not encoder.unread(name)]
+    if not has_vector.any() or not read_names:
         return 0.0
-    nearest = (regions[seen].astype(np.float32) @ encoder.texts(known).T).max(axis=1)
-    return float(np.average(nearest, weights=np.maximum(extents[seen], SHORTEST)))
+    nearest = (regions[has_vector].astype(np.float32) @ encoder.texts(read_names).T).max(axis=1)
+    return float(np.average(nearest, weights=np.maximum(extents[has_vector], SHORTEST)))
 
 
 UNFITTED = Calibration(0.0, 1.0, 0.0, 0.0, 0.0, fitted=False)
@@ -82,8 +82,8 @@ OF_PLACES = ("least_recognised", "strange")
 
 def log_odds(shares: np.ndarray) -> np.ndarray:
     """Return log(p / (1 - p)) of shares kept off 0 and 1."""
-    kept = np.clip(shares, CLOSEST, 1 - CLOSEST)
-    return np.log(kept / (1 - kept))
+    clipped = np.clip(shares, CLOSEST, 1 - CLOSEST)
+    return np.log(clipped / (1 - clipped))
 
 
 def fitted(weights: Sequence[float], least_recognised: float = -1.0, strange: float = 1.0) -> Calibration:

@@ -37,11 +37,11 @@ class ServiceEncoder:
 
     def pictures(self, crops: np.ndarray) -> np.ndarray:
         """Return (N, width) float32 unit vectors of crops (N, side, side, 3) uint8 RGB."""
-        found = [np.zeros((0, self.width), np.float32)]
+        batches = [np.zeros((0, self.width), np.float32)]
         for start in range(0, len(crops), BATCH):
             part = [base64.b64encode(_png(crop)).decode() for crop in crops[start : start + BATCH]]
-            found.append(self._asked({"pictures": part}, len(part)))
-        return np.concatenate(found)
+            batches.append(self._asked({"pictures": part}, len(part)))
+        return np.concatenate(batches)
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
         """Return (M, width) float32 unit vectors of texts."""
@@ -65,10 +65,10 @@ class ServiceEncoder:
         return unit(rows)
 
     def _document(self, data: bytes) -> dict[str, Any]:
-        found = json_of(data, self._connection.address, hint=_HINT)
-        if not isinstance(found, dict):
+        document = json_of(data, self._connection.address, hint=_HINT)
+        if not isinstance(document, dict):
             raise BadInput(f"{self._connection.address}: no JSON object", hint=_HINT)
-        return found
+        return document
 
 
 def _png(picture: np.ndarray) -> bytes:

@@ -40,9 +40,9 @@ def tokens(texts: Sequence[str]) -> torch.Tensor:
     """Return (M, MOST_WORDS, MOST_PARTS) int64: buckets of the first words of each text, 0 where there is nothing."""
     table = torch.zeros((len(texts), MOST_WORDS, MOST_PARTS), dtype=torch.int64)
     for row, text in enumerate(texts):
-        for place, word in enumerate(words_of(text)[:MOST_WORDS]):
-            parts = parts_of(word)
-            table[row, place, : len(parts)] = torch.tensor(parts)
+        for position, word in enumerate(words_of(text)[:MOST_WORDS]):
+            pieces_of_word = parts_of(word)
+            table[row, position, : len(pieces_of_word)] = torch.tensor(pieces_of_word)
     return table
 
 
@@ -82,8 +82,8 @@ class PictureTower(nn.Module):
 
     def forward(self, crops: torch.Tensor) -> torch.Tensor:
         """Return unit vectors."""
-        found = self.head(self.body(4.0 * (crops - 0.5)).flatten(1))
-        return nn.functional.normalize(found, dim=1)
+        features = self.head(self.body(4.0 * (crops - 0.5)).flatten(1))
+        return nn.functional.normalize(features, dim=1)
 
 
 class WordTower(nn.Module):
@@ -107,8 +107,8 @@ class WordTower(nn.Module):
         x = 4.0 * x + self.places
         for layer in self.layers:
             x = layer(x, src_key_padding_mask=missing)
-        kept = (~missing).unsqueeze(2).to(x.dtype)
-        return nn.functional.normalize(self.out((x * kept).sum(1) / kept.sum(1)), dim=1)
+        has_word = (~missing).unsqueeze(2).to(x.dtype)
+        return nn.functional.normalize(self.out((x * has_word).sum(1) / has_word.sum(1)), dim=1)
 
 
 class TwoTowers(nn.Module):

@@ -147,14 +147,14 @@ def _accumulate(
                         k += 2
                     sums[PLANES] += 1
                     sums[PLANE_SQUARES] += distance * distance
-            own = source_brightness[v, u]
-            if not use_color or own < 0:
+            source_value = source_brightness[v, u]
+            if not use_color or source_value < 0:
                 continue
-            left, top = int(np.floor(column)), int(np.floor(line))
-            a, b = column - left, line - top
+            left_column, top = int(np.floor(column)), int(np.floor(line))
+            a, b = column - left_column, line - top
             value, along_u, along_v, measured = 0.0, 0.0, 0.0, True
             for k in range(4):
-                i, j = top + k // 2, left + k % 2
+                i, j = top + k // 2, left_column + k % 2
                 measured = measured and target_brightness[i, j] >= 0
                 share = (b if k // 2 else 1.0 - b) * (a if k % 2 else 1.0 - a)
                 value += share * target_brightness[i, j]
@@ -162,7 +162,7 @@ def _accumulate(
                 along_v += share * target_gradient[i, j, 1]
             if not measured:
                 continue
-            difference = value - gain * own - bias
+            difference = value - gain * source_value - bias
             sums[COLORS] += 1
             sums[COLOR_SQUARES] += min(difference * difference, BRIGHTNESS_GATE * BRIGHTNESS_GATE)
             if abs(difference) > BRIGHTNESS_GATE:
@@ -172,7 +172,7 @@ def _accumulate(
             g0, g1 = along_u * fx / q2, along_v * fy / q2
             g2 = -(g0 * q0 + g1 * q1) / q2
             row[0], row[1], row[2] = q1 * g2 - q2 * g1, q2 * g0 - q0 * g2, q0 * g1 - q1 * g0
-            row[3], row[4], row[5], row[6], row[7] = g0, g1, g2, -own, -1.0
+            row[3], row[4], row[5], row[6], row[7] = g0, g1, g2, -source_value, -1.0
             k = 0
             for i in range(PARAMETERS):
                 right[i] -= weight * row[i] * difference

@@ -165,12 +165,12 @@ class SceneRenderer:
         missed = hits.primitive == shading.MISS
         if missed.any():
             # The background passes through the tone curve: give what comes out as the wanted colour.
-            wanted = np.where(
+            exposed = np.where(
                 self.background <= 0.04045, self.background / 12.92, ((self.background + 0.055) / 1.055) ** 2.4
             )
-            over = np.maximum(wanted - 0.6, 0.0) / 0.4
+            over = np.maximum(exposed - 0.6, 0.0) / 0.4
             result[missed] = (
-                np.where(wanted > 0.6, 0.6 - 0.4 * np.log(np.maximum(1.0 - over, 1e-3)), wanted) / self.exposure
+                np.where(exposed > 0.6, 0.6 - 0.4 * np.log(np.maximum(1.0 - over, 1e-3)), exposed) / self.exposure
             )
         return albedo, result
 

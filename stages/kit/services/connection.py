@@ -134,9 +134,9 @@ class Connection:
                 raise
             except TryAgain as error:
                 self.close()
-                reason, asked, status = str(error), error.wait, error.status
+                reason, asked_wait, status = str(error), error.wait, error.status
             if attempt < self._retries:
-                wait = min(self._longest_wait, max(asked, self._retry_wait * 2**attempt))
+                wait = min(self._longest_wait, max(asked_wait, self._retry_wait * 2**attempt))
                 logger.warning(
                     "%s: %s; asked again in %g s (%d of %d)", self.address, reason, wait, attempt + 1, self._retries
                 )

@@ -179,12 +179,12 @@ class _TimedStream(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
-        left = self._deadline - time.monotonic()
-        if left <= 0:
+        remaining = self._deadline - time.monotonic()
+        if remaining <= 0:
             raise TimeoutError
         if self._room <= 0:
             raise _HeadTooLarge
-        self._connection.settimeout(left)
+        self._connection.settimeout(remaining)
         size = self._connection.recv_into(buffer)
         self._room -= size
         self.begun = self.begun or size > 0
@@ -251,8 +251,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
         elif self.own_pages_only and not self._own_page_asks(hosts):
             self._refuse_unread(403, "pages of other origins may not ask here")
         elif (methods := self.routes.get(self.path)) is None:
-            there = f"; there are {', '.join(self.routes)}" if self.tells_routes else ""
-            self._refuse_unread(404, f"no {self.path:.80}{there}")
+            routes_there = f"; there are {', '.join(self.routes)}" if self.tells_routes else ""
+            self._refuse_unread(404, f"no {self.path:.80}{routes_there}")
         elif self.command not in methods:
             allowed = ", ".join(methods)
             self._refuse_unread(405, f"{self.path} takes {allowed}", {"Allow": allowed})
@@ -300,23 +300,23 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self.end_headers()
         self._stream.allow(BODY_SECONDS, self.largest_body + 1)
         self._stream.begun = True
-        parts: list[bytes] = []
+        pieces: list[bytes] = []
         received = 0
         try:
             while received < length:
-                wanted = min(PIECE, length - received)
-                if not self.server.hold(wanted):
+                piece_size = min(PIECE, length - received)
+                if not self.server.hold(piece_size):
                     self._refuse_unread(503, "too many bytes are waiting", {"Retry-After": "1"})
                     return None
-                received += wanted  # counted before it is there, as it is given back by what was counted
-                part = self.rfile.read(wanted)
-                parts.append(part)
-                if len(part) < wanted:
+                received += piece_size  # counted before it is there, as it is given back by what was counted
+                part = self.rfile.read(piece_size)
+                pieces.append(part)
+                if len(part) < piece_size:
                     self.close_connection = True
                     return None  # the client is gone
-            kept, received = received, 0
-            self._kept = kept
-            return b"".join(parts)
+            held_bytes, received = received, 0
+            self._kept = held_bytes
+            return b"".join(pieces)
         finally:
             self.server.hold(-received)
 
@@ -361,8 +361,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
         with suppress(OSError):
             self.connection.shutdown(socket.SHUT_WR)
             deadline = time.monotonic() + LINGER_SECONDS
-            while (left := deadline - time.monotonic()) > 0:
-                self.connection.settimeout(left)
+            while (remaining := deadline - time.monotonic()) > 0:
+                self.connection.settimeout(remaining)
                 if not self.connection.recv(1 << 16):
                     break
 

@@ -123,22 +123,22 @@ def _whole_mjcf(folder: SourceFolder, path: Path) -> bool:
         return False
 
 
-def _tried(folder: SourceFolder, path: Path, read: Callable[[], SourceModel]) -> SourceModel | Unread:
+def _tried(folder: SourceFolder, path: Path, read_models: Callable[[], SourceModel]) -> SourceModel | Unread:
     try:
         with told_refusals(folder.relative(path)):
-            return read()
+            return read_models()
     except BadInput as error:
         return Unread(folder.relative(path), str(error))
 
 
 def _several(
-    folder: SourceFolder, path: Path, read: Callable[[], Iterator[SourceModel]]
+    folder: SourceFolder, path: Path, read_models: Callable[[], Iterator[SourceModel]]
 ) -> Iterator[SourceModel | Unread]:
     models: Iterator[SourceModel] | None = None
     while True:
         try:
             with told_refusals(folder.relative(path)):
-                models = read() if models is None else models
+                models = read_models() if models is None else models
                 model = next(models, None)
         except BadInput as error:
             yield Unread(folder.relative(path), str(error))

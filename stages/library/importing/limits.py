@@ -74,8 +74,8 @@ class Allowance:
         for k, count in enumerate((triangles, vertices, shapes)):
             self._left[k] -= count
             if self._left[k] < 0:
-                what = ("triangles", "vertices", "shapes")[k]
-                raise BadInput(f"{self._where}: more than {self._bounds[k]} {what} in all", hint=SIMPLIFY)
+                counted = ("triangles", "vertices", "shapes")[k]
+                raise BadInput(f"{self._where}: more than {self._bounds[k]} {counted} in all", hint=SIMPLIFY)
 
 
 def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:

@@ -42,21 +42,21 @@ class Pictures:
         return sum(picture.size for picture in self._held.values() if picture is not None)
 
     def _read(self, name: str) -> np.ndarray | None:
-        shown = f"{self._path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60}"
-        found = self._folder.find(name, self._path.parent)
+        label = f"{self._path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60}"
+        file = self._folder.find(name, self._path.parent)
         picture = None
-        if found is not None and found.stat().st_size <= LARGEST_PICTURE:
-            data = self._folder.read(found, LARGEST_PICTURE)
+        if file is not None and file.stat().st_size <= LARGEST_PICTURE:
+            data = self._folder.read(file, LARGEST_PICTURE)
             size = image_size(data)
             if size is not None and may_be_decoded(data):
                 self._left -= size[0] * size[1]
                 if self._left < 0:
-                    self._findings.append(f"{shown} is left out: more than {MOST_PIXELS} pixels in all")
+                    self._findings.append(f"{label} is left out: more than {MOST_PIXELS} pixels in all")
                     return None
                 with suppress(cv2.error):  # a decoder that gives up
                     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         if picture is None:
-            self._findings.append(f"{shown} is not there")
+            self._findings.append(f"{label} is not there")
             return None
         return np.ascontiguousarray(picture[:, :, ::-1])
 
@@ -82,11 +82,11 @@ def few_colors(colors: np.ndarray, areas: np.ndarray, count: int = PALETTE) -> n
     cells, member = np.unique(colors >> 3, axis=0, return_inverse=True)
     member = member.reshape(-1)
     weight = np.bincount(member, weights=areas + 1e-12, minlength=len(cells))
-    kept = np.lexsort((np.arange(len(cells)), -weight))[:count]
-    gaps = ((cells[:, None].astype(int) - cells[None, kept].astype(int)) ** 2).sum(axis=2)
+    chosen = np.lexsort((np.arange(len(cells)), -weight))[:count]
+    gaps = ((cells[:, None].astype(int) - cells[None, chosen].astype(int)) ** 2).sum(axis=2)
     group = np.argmin(gaps, axis=1)[member]
     result = np.empty_like(colors)
-    for number in range(len(kept)):
+    for number in range(len(chosen)):
         inside = group == number
         if inside.any():
             mean = np.average(colors[inside].astype(float), axis=0, weights=areas[inside] + 1e-12)

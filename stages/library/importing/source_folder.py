@@ -46,8 +46,8 @@ class SourceFolder:
 
     def files(self) -> list[Path]:
         """Return the files, sorted by path; hidden ones and links out of the folder are left out. Raises BadInput."""
-        found = [path for path in self._listed() if path.is_file() and self._inside(path)]
-        return sorted(found, key=lambda p: p.relative_to(self.root).as_posix())
+        real_files = [path for path in self._listed() if path.is_file() and self._inside(path)]
+        return sorted(real_files, key=lambda p: p.relative_to(self.root).as_posix())
 
     def _listed(self) -> Iterator[Path]:
         waiting, folders, files = [str(self.root)], 0, 0
@@ -105,15 +105,18 @@ class SourceFolder:
         plain = SCHEME.sub("", name.strip().replace("\\", "/"))
         if not plain:
             return None
-        parts = [part for part in PurePosixPath(plain).parts if part not in ("/", ".", "..")]
-        if not 0 < len(parts) <= MOST_NAME_PARTS:
+        names = [part for part in PurePosixPath(plain).parts if part not in ("/", ".", "..")]
+        if not 0 < len(names) <= MOST_NAME_PARTS:
             return None
         places: list[Path] = []
         for base in bases:
             places += [base, *(above for above in base.parents if above.is_relative_to(self.root))]
         places = list(dict.fromkeys(places))
         exact = [base / plain for base in bases] if not PurePosixPath(plain).is_absolute() else []
-        for candidate in [*exact, *(place.joinpath(*parts[k:]) for k in range(len(parts)) for place in places)]:
+        for candidate in [
+            *exact,
+            *(place_of_search.joinpath(*names[k:]) for k in range(len(names)) for place_of_search in places),
+        ]:
             if candidate.is_file() and self._inside(candidate):
                 return candidate.resolve()
         return None

@@ -45,11 +45,11 @@ def write_scene_glb(
         children.setdefault(joint.parent, []).append(joint)
     numbers = {link.name: k for k, link in enumerate(urdf.links)}
     nodes: list[dict[str, Any]] = []
-    own = {joint.child: joint for joint in urdf.joints}
+    joint_of_child = {joint.child: joint for joint in urdf.joints}
     for link in urdf.links:
         node: dict[str, Any] = {"name": link.name}
-        if link.name in own:
-            joint = own[link.name]
+        if link.name in joint_of_child:
+            joint = joint_of_child[link.name]
             value = values.get(joint.name, 0.0)
             pose = joint.parent_from_child @ joint_motion(joint, value)
             node["translation"] = _rounded(pose[:3, 3])

@@ -164,11 +164,11 @@ def _connect(
     if parent is not None:
         joint.CreateBody0Rel().SetTargets([parent])
     joint.CreateBody1Rel().SetTargets([child])
-    own = np.eye(4) if child_from_joint is None else child_from_joint
+    joint_pose = np.eye(4) if child_from_joint is None else child_from_joint
     joint.CreateLocalPos0Attr(Gf.Vec3f(*parent_from_joint[:3, 3].tolist()))
     joint.CreateLocalRot0Attr(_quaternion(parent_from_joint))
-    joint.CreateLocalPos1Attr(Gf.Vec3f(*own[:3, 3].tolist()))
-    joint.CreateLocalRot1Attr(_quaternion(own))
+    joint.CreateLocalPos1Attr(Gf.Vec3f(*joint_pose[:3, 3].tolist()))
+    joint.CreateLocalRot1Attr(_quaternion(joint_pose))
 
 
 def _quaternion(pose: np.ndarray) -> Gf.Quatf:

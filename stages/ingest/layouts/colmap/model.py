@@ -126,9 +126,9 @@ class _Reader:
     def count(self, smallest: int, what: str) -> int:
         """Return a declared number of records of at least `smallest` bytes."""
         number = self.take("Q")[0]
-        left = len(self.data) - self.place
-        if number * smallest > left:
-            raise BadInput(f"{self.path}: declares {number} {what}, but only {left} bytes follow")
+        remaining = len(self.data) - self.place
+        if number * smallest > remaining:
+            raise BadInput(f"{self.path}: declares {number} {what}, but only {remaining} bytes follow")
         return number
 
     def _bytes(self, count: int) -> bytes:

@@ -57,8 +57,8 @@ def matches(root: Path) -> str | None:
     folders = _model_folders(root)
     if not folders:
         return None
-    place = folders[0].relative_to(root).as_posix()
-    return f"folder with cameras and images files in {'it' if place == '.' else place + '/'}: COLMAP sparse model"
+    folder = folders[0].relative_to(root).as_posix()
+    return f"folder with cameras and images files in {'it' if folder == '.' else folder + '/'}: COLMAP sparse model"
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
@@ -74,7 +74,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     refuse_exr((path.name for path in depths if path), str(root))
     has_depth = depth_words is not None
     has_color = not has_depth or any(path.is_file() for path in colors)
-    recorded, given = _recorded(model, images, colors, depths, parameters)
+    recorded, notes_of_options = _recorded(model, images, colors, depths, parameters)
     groups, group_notes = grouped(recorded, [str(image.camera) for image in images])
     unregistered = _unregistered(image_folder, colors)
     counts = {group.name: len(group.members) for group in groups}
@@ -84,8 +84,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     entries = []
     ordered: list[tuple[str, int | None]] = [(image.name, index) for index, image in enumerate(images)]
     ordered += [(path.relative_to(image_folder).as_posix(), None) for path in unregistered]
-    for place, (name, index) in enumerate(sorted(ordered, key=lambda item: natural_key(item[0]))):
-        time = place / parameters.frame_rate
+    for order, (name, index) in enumerate(sorted(ordered, key=lambda item: natural_key(item[0]))):
+        time = order / parameters.frame_rate
         if index is None:
             entries.append(Entry(name, time, None, _never, "missing_pose", chosen[0]))
         elif group_of[index].name in chosen:
@@ -94,10 +94,10 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             pose = images[index].world_from_camera
             problem = "non_rigid_pose" if pose is None else None
             entries.append(Entry(name, time, pose, load, problem, group_of[index].name))
-    lenses = [one.lens.words for one in dict.fromkeys(recorded) if not one.lens.is_pinhole]
+    lenses = [camera.lens.words for camera in dict.fromkeys(recorded) if not camera.lens.is_pinhole]
     notes = (
         *model_notes,
-        *given,
+        *notes_of_options,
         *group_notes,
         *(
             (f"lens distortion undone ({lenses[0] if len(lenses) == 1 else f'{len(lenses)} lenses'})",)
@@ -158,8 +158,10 @@ def _largest_model(root: Path, parameters: IngestParameters) -> tuple[SparseMode
             if parameters.damage == "refuse" or len(damage) == len(folders):
                 raise
     largest = max(models, key=lambda model: len(model.images))
-    place = largest.folder.relative_to(root).as_posix()
-    notes = [f"poses and intrinsics from {'the folder' if place == '.' else place}: {len(largest.images)} images"]
+    folder_name = largest.folder.relative_to(root).as_posix()
+    notes = [
+        f"poses and intrinsics from {'the folder' if folder_name == '.' else folder_name}: {len(largest.images)} images"
+    ]
     if len(models) > 1:
         listed = ", ".join(f"{model.folder.relative_to(root).as_posix()} {len(model.images)}" for model in models)
         notes.append(f"largest of {len(models)} models taken ({listed}); they do not share a world")
@@ -196,10 +198,10 @@ def _recorded(
     cameras: dict[int, RecordedCamera] = {}
     notes: tuple[str, ...] = ()
     for number in dict.fromkeys(image.camera for image in images):
-        own = [index for index, image in enumerate(images) if image.camera == number]
+        of_camera = [index for index, image in enumerate(images) if image.camera == number]
         where = f"{model.folder}: camera {number}"
-        size = depth_image_size(path for index in own if (path := depths[index]) is not None)
-        size = size or color_image_size(colors[index] for index in own)
+        size = depth_image_size(path for index in of_camera if (path := depths[index]) is not None)
+        size = size or color_image_size(colors[index] for index in of_camera)
         camera = _camera(model.cameras[number], where).at(size, where)
         cameras[number], notes = overridden_recording(camera, parameters)
     return [cameras[image.camera] for image in images], notes

@@ -200,9 +200,9 @@ def stamps_of(names: tuple[str, ...]) -> np.ndarray | None:
     digits), microseconds (16) or seconds with decimals."""
     stamps = []
     for name in names:
-        whole = re.fullmatch(r"[0-9]{16}|[0-9]{19}", name)
+        digits = re.fullmatch(r"[0-9]{16}|[0-9]{19}", name)
         seconds = re.fullmatch(r"([0-9]{9,10})\.([0-9]{1,9})", name)
-        if whole:
+        if digits:
             stamps.append(int(name) if len(name) == 19 else int(name) * 1000)
         elif seconds:
             stamps.append(int(seconds[1]) * 10**9 + int(seconds[2].ljust(9, "0")))

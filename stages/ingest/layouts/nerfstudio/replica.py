@@ -34,8 +34,8 @@ def matches(root: Path) -> str | None:
     """Return the rule that matched, or None."""
     if not (root / TRAJECTORY).is_file():
         return None
-    seen = next((name for name in ("frame", "depth") if any(root.glob(f"{RESULTS}/{name}*"))), None)
-    return f"folder with {TRAJECTORY} and {RESULTS}/{seen}*: Replica" if seen else None
+    frame_kind = next((name for name in ("frame", "depth") if any(root.glob(f"{RESULTS}/{name}*"))), None)
+    return f"folder with {TRAJECTORY} and {RESULTS}/{frame_kind}*: Replica" if frame_kind else None
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
@@ -54,7 +54,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         camera, source = pinhole(RENDERED[1], size, str(root)), "intrinsics assumed: Replica, 600 600 599.5 339.5"
     else:
         camera, source = camera_from_options(size, parameters, f"{root}: there is no {CAMERA}"), "no cam_params.json"
-    camera, given = overridden(camera, parameters)
+    camera, notes_of_options = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, default_units)
     entries = tuple(
         Entry(
@@ -67,7 +67,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     )
     notes = (
         source,
-        *given,
+        *notes_of_options,
         unit_note,
         f"poses assumed: line n of {TRAJECTORY} belongs to image n, counted from 0",
         f"times assumed: frame number / {parameters.frame_rate:g} per second",

@@ -45,7 +45,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             files.setdefault(int(match[1]), {})[match[2]] = path
     size = depth_image_size([images["depth"] for _, images in sorted(files.items()) if "depth" in images])
     camera, notes = _camera(root, size)
-    camera, given = overridden(camera, parameters)
+    camera, notes_of_options = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, 1000.0)
     theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
     register = parameters.register_color and theirs
@@ -68,7 +68,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         )
     notes = (
         *notes,
-        *given,
+        *notes_of_options,
         unit_note,
         f"times assumed: frame number / {parameters.frame_rate:g} per second",
         REGISTERED_NOTE if register else UNREGISTERED_NOTE if theirs else OTHER_CAMERA_NOTE,

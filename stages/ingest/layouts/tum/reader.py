@@ -64,8 +64,8 @@ def matches(root: Path) -> str | None:
     if not root.is_dir():
         return None
     if (root / COLOR_LIST).is_file():
-        more = f" and {DEPTH_LIST}" if (root / DEPTH_LIST).is_file() else ", no depth"
-        return f"folder with {COLOR_LIST}{more}: TUM RGB-D"
+        depth_words = f" and {DEPTH_LIST}" if (root / DEPTH_LIST).is_file() else ", no depth"
+        return f"folder with {COLOR_LIST}{depth_words}: TUM RGB-D"
     pairs = next((name for name in ASSOCIATIONS if (root / name).is_file()), None)
     if pairs is None and (root / DEPTH_LIST).is_file():
         return f"folder with {DEPTH_LIST}, no colour: TUM RGB-D"
@@ -82,14 +82,14 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     poses = _poses(root, unit)
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
     recorded, notes = _camera(root, size, parameters, icl_nuim)
-    recorded, given = overridden_recording(recorded, parameters)
+    recorded, notes_of_options = overridden_recording(recorded, parameters)
     units, unit_note = depth_units(parameters, UNITS_PER_METRE)
     form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), units)
     tolerance = round(parameters.maximum_time_difference * 1e9)
-    seen = colors if colors.paths else depths
-    partners = mutual_nearest(seen.stamps, depths.stamps, tolerance)
+    main_list = colors if colors.paths else depths
+    partners = mutual_nearest(main_list.stamps, depths.stamps, tolerance)
     entries = []
-    for stamp, path, partner in zip(seen.stamps, seen.paths, partners, strict=True):
+    for stamp, path, partner in zip(main_list.stamps, main_list.paths, partners, strict=True):
         missing = bool(depths.paths) and partner < 0
         depth = depths.paths[partner] if partner >= 0 else None
         # The shape of the scene comes from the depth image, so its time is that of the frame.
@@ -103,7 +103,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unpaired = len(depths.paths) - int((partners >= 0).sum())
     notes = (
         *notes,
-        *given,
+        *notes_of_options,
         *((unit_note,) if depths.paths else ()),
         *(poses.notes if poses else ()),
         *((f"{unpaired} depth images are paired with no colour image",) if unpaired else ()),

@@ -56,8 +56,8 @@ class CompiledDrawn:
     def backward(self, gradients: Picture) -> GaussianGradients:
         """Return the derivatives of a loss by the Gaussians and the camera, given those by the picture."""
         g = self._gaussians
-        parts = (gradients.color, gradients.depth[..., None], gradients.features)
-        image_gradients = np.concatenate(parts, axis=-1).astype(np.float32, copy=False)
+        channels = (gradients.color, gradients.depth[..., None], gradients.features)
+        image_gradients = np.concatenate(channels, axis=-1).astype(np.float32, copy=False)
         behind = self._left * (image_gradients @ self._background - gradients.alpha).astype(np.float32)
         by_entry = blend_back(
             *(self._starts, self._members, self._flat, self._reach, self._values),

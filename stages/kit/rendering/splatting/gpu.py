@@ -40,13 +40,13 @@ class GpuRasterizer:
         twist = torch.zeros(6, device="cuda", requires_grad=True)
         camera = view.camera
         basis = view_basis(gaussians.means, view.camera_from_world, gaussians.harmonics.shape[1])
-        given = torch.tensor(basis, dtype=torch.float32, device="cuda")
-        colors = torch.clamp(torch.einsum("nk,nkc->nc", given, leaves["harmonics"]) + 0.5, min=0.0)
+        harmonic_basis = torch.tensor(basis, dtype=torch.float32, device="cuda")
+        colors = torch.clamp(torch.einsum("nk,nkc->nc", harmonic_basis, leaves["harmonics"]) + 0.5, min=0.0)
         values = torch.cat([colors, leaves["features"]], dim=1)
         matrix = [[camera.fx, 0.0, camera.cx + 0.5], [0.0, camera.fy, camera.cy + 0.5], [0.0, 0.0, 1.0]]
         background = torch.zeros(1, values.shape[1], device="cuda")
         background[0, :3] = torch.tensor(view.background)
-        image, alpha, told = self._draw(
+        image, alpha, details = self._draw(
             leaves["means"],
             leaves["quaternions"],
             torch.exp(leaves["log_scales"]),
@@ -62,8 +62,8 @@ class GpuRasterizer:
             backgrounds=background,
             render_mode="RGB+D",
         )
-        told["means2d"].retain_grad()
-        return GpuDrawn(leaves, twist, image[0], alpha[0, ..., 0], told)
+        details["means2d"].retain_grad()
+        return GpuDrawn(leaves, twist, image[0], alpha[0, ..., 0], details)
 
 
 class GpuDrawn:

@@ -211,9 +211,9 @@ class PageCanvas:
     def trust(self, rows: Mapping[str, Trust]) -> None:
         """See Canvas."""
         for name, trust in rows.items():
-            said = [cleaned(reason) for reason in trust.reasons]
+            reasons = [cleaned(reason) for reason in trust.reasons]
             color = bytes_of(trust_color(trust.share))
-            self._trust[name] = {"share": round(trust.share, 3), "reasons": said, "color": color}
+            self._trust[name] = {"share": round(trust.share, 3), "reasons": reasons, "color": color}
 
     def moment(self, seconds: float, text: str, *, bad: bool = False) -> None:
         """See Canvas."""
@@ -253,12 +253,12 @@ class PageCanvas:
         every = max(1, -(-total // MOST_PICTURE_BYTES))
         if every > 1:
             self._left_out.add(f"all but each {every}th picture")
-        kept = []
+        pictures = []
         for path, moment, data in self._pictures[::every]:
             kind = "image/png" if data.startswith(PNG_START) else "image/jpeg"
             address = f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
-            kept.append({"path": path, "time": moment, "address": address})
-        return kept
+            pictures.append({"path": path, "time": moment, "address": address})
+        return pictures
 
     def _document(self) -> dict[str, Any]:
         meshes = self._drawn_meshes()
@@ -287,9 +287,9 @@ class PageCanvas:
         for entry in self._said["transforms"]:
             placed.setdefault(entry["path"], np.array([*entry["rows"], 0, 0, 0, 1]).reshape(4, 4))
         for path, low, high in bounds:
-            parts, world = path.split("/"), np.eye(4)
-            for k in range(len(parts)):
-                world = world @ placed.get("/".join(parts[: k + 1]), np.eye(4))
+            names, world = path.split("/"), np.eye(4)
+            for k in range(len(names)):
+                world = world @ placed.get("/".join(names[: k + 1]), np.eye(4))
             corners = apply(world, trimesh.bounds.corners([low, high]))
             self.enclose(corners.min(axis=0), corners.max(axis=0))
         margin = MARGIN * (self._high - self._low)

@@ -135,11 +135,11 @@ def _rows(trial: TablewareTrial | None) -> tuple[TablewareRow, ...]:
 
 def view(page: Page) -> dict[str, Any]:
     """Return what there is of a table: what was seen, planned, tried, compared."""
-    shown = tableware_view(
+    values = tableware_view(
         page.given("tableware_detections", TablewareDetections),
         page.given("tableware_plan", TablewarePlan),
         page.given("tableware_trial", TablewareTrial),
         page.given("tableware_evaluation", TablewareEvaluation),
         WIDTH,
     )
-    return {"tableware": shown}
+    return {"tableware": values}
