@@ -62,7 +62,7 @@ def batch(
         scripts = session.write_array(batch_to_run, out, jobs=jobs, force=force, retry=retry)
         if scripts is None:
             say("no scene has to run; --retry all runs them again")
-            return _ended(session.collect_tasks(batch_to_run, out), out, say, json_output)
+            return _report_end(session.collect_tasks(batch_to_run, out), out, say, json_output)
         say(f"{scripts.scenes} scenes in {scripts.tasks} array tasks; submit them with: {scripts.submit}")
         return _report({"batch": str(out), "submit": str(scripts.submit)}, json_output, 0)
     else:
@@ -77,10 +77,10 @@ def batch(
                 terminal=sys.stderr.isatty(),
                 quiet=silent,
             )
-    return _ended(end, out, say, json_output)
+    return _report_end(end, out, say, json_output)
 
 
-def _ended(end: BatchEnd, out: Path, say: Callable[[str], None], json_output: bool) -> int:
+def _report_end(end: BatchEnd, out: Path, say: Callable[[str], None], json_output: bool) -> int:
     """Say what became of every scene, and return the exit code of the worst."""
     say(", ".join(f"{count} {name}" for name, count in end.counts().items()))
     scenes = {job.name: end.latest[job.name].model_dump(mode="json") for job in end.jobs if job.name in end.latest}

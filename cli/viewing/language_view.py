@@ -31,7 +31,7 @@ def draw_language_map(language: LanguageMap, canvas: Canvas) -> None:
     vectors = read_vectors(language)
     if len(vectors.means):
         coarse = vectors.pieces[-1] if len(vectors.pieces) else np.zeros(len(vectors.means), int)
-        canvas.points("pieces", vectors.means, _painted(coarse), 0.012)
+        canvas.points("pieces", vectors.means, _colors_of(coarse), 0.012)
     looked_at = [(k, region) for k, region in enumerate(info.regions) if region.looks >= FEWEST_LOOKS]
     looked_at = sorted(looked_at, key=lambda each: -max(each[1].box.size))[:MOST_BOXES]
     canvas.boxes(
@@ -62,7 +62,7 @@ def draw_answers(answers: Answers, canvas: Canvas) -> None:
     )
 
 
-def _painted(numbers: np.ndarray) -> np.ndarray:
+def _colors_of(numbers: np.ndarray) -> np.ndarray:
     palette = np.array([instance_color(k) for k in range(int(numbers.max(initial=0)) + 2)])
     return np.round(255 * palette[numbers + 1]).astype(np.uint8)
 

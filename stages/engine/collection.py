@@ -91,7 +91,7 @@ def survey(
     artifacts = _read_artifacts(folders, roots)
     items = [_leftover_item(target, leftover_paths) for target, leftover_paths in sorted(leftovers.items())]
     chosen = {
-        path: _classified(path, artifacts, superseded=superseded, intermediate=intermediate, keep=keep)
+        path: _classify(path, artifacts, superseded=superseded, intermediate=intermediate, keep=keep)
         for path, artifact in sorted(artifacts.items())
         if artifact.ours
     }
@@ -220,7 +220,7 @@ def _leftover_item(target: Path, paths: list[Path]) -> Item:
     return Item(target, "leftover", "", size, reason, collectable=True)
 
 
-def _classified(
+def _classify(
     path: Path, artifacts: dict[Path, _Artifact], *, superseded: bool, intermediate: bool, keep: Collection[str]
 ) -> Item:
     artifact = artifacts[path]

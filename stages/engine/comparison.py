@@ -129,11 +129,11 @@ def compare(first: Path, second: Path) -> list[ArtifactComparison]:
         )
     before, after = artifacts_of(first), artifacts_of(second)
     comparisons = [_compare_one(name, before.get(name), after.get(name)) for name in sorted(set(before) | set(after))]
-    order = {name: _started(path) for name, path in (after | before).items()}
+    order = {name: _start_time(path) for name, path in (after | before).items()}
     return sorted(comparisons, key=lambda item: (order[item.name], item.name))
 
 
-def _started(path: Path) -> str:
+def _start_time(path: Path) -> str:
     try:
         return read_manifest(path).provenance.started
     except BadInput:

@@ -93,7 +93,7 @@ def exchange(first: Path, second: Path) -> bool:
     raise OSError(code, os.strerror(code), str(second))
 
 
-def _journalled_replace(partial: Path, target: Path) -> None:
+def _replace_by_journal(partial: Path, target: Path) -> None:
     journal, aside = _beside(target, "journal"), _beside(target, f"old-{secrets.token_hex(4)}")
     text = json.dumps({"partial": partial.name, "old": aside.name})
     with journal.open("w") as file:
@@ -233,5 +233,5 @@ def take_place(partial: Path, target: Path) -> None:
     if not target.exists():
         os.rename(partial, target)
     elif not exchange(partial, target):
-        _journalled_replace(partial, target)
+        _replace_by_journal(partial, target)
     sync_folder(target.parent)

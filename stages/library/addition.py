@@ -80,14 +80,16 @@ def run(
     _check_options(models, parameters)
     decompose = uses_coacd(parameters)
     mapping_file = read_mapping(mapping) if mapping is not None else Mapping()
-    all_models, records, seed = _kept_models(library, context)
+    all_models, records, seed = _copy_models(library, context)
     uses = {} if library is None else {entry.model: entry for entry in library.info.affordances}
     names = {model.id.lower(): 1 for model in all_models}
     folder = SourceFolder(models)
     imported = 0
     for source in context.progress.track(find_models(folder), description="importing models"):
         if isinstance(source, Unread):
-            records.append(_left_out(source.source, source.source, "", (source.reason.replace(f"{folder.root}/", ""),)))
+            records.append(
+                _record_of_left_out(source.source, source.source, "", (source.reason.replace(f"{folder.root}/", ""),))
+            )
             continue
         source = replace(source, name=plain_text(source.name), source=plain_text(source.source))
         try:
@@ -95,7 +97,10 @@ def run(
                 record, result = _import(source, Said(mapping_file.entry(source), parameters), names, decompose)
         except BadInput as error:
             reason = str(error).replace(f"{folder.root}/", "")
-            record, result = _left_out(source.name, source.source, source.format, (reason, *source.findings)), None
+            record, result = (
+                _record_of_left_out(source.name, source.source, source.format, (reason, *source.findings)),
+                None,
+            )
         records.append(record)
         if result is not None:
             names.setdefault(result.model.id.lower(), 1)
@@ -138,7 +143,7 @@ def _check_options(models: Path, parameters: AdditionParameters) -> None:
         raise UsageError(f"no class {parameters.class_name!r}", hint=f"one of: {', '.join(names)}")
 
 
-def _kept_models(library: CadLibrary | None, context: Context) -> tuple[list[CadModel], list[ImportedModel], int]:
+def _copy_models(library: CadLibrary | None, context: Context) -> tuple[list[CadModel], list[ImportedModel], int]:
     """Copy the models of an existing library; return them, what was said when they were imported, and its seed."""
     if library is None:
         return [], [], context.seed
@@ -170,10 +175,10 @@ def _import(
     if class_name is None and parameters.unknown == "object":
         class_name = "object"
     if class_name == SKIP:
-        return _left_out(source.name, source.source, source.format, ("left out by the mapping",)), None
+        return _record_of_left_out(source.name, source.source, source.format, ("left out by the mapping",)), None
     if class_name is None:
         reason = "nothing tells its class (--class-name, --mapping, --unknown object)"
-        return _left_out(source.name, source.source, source.format, (reason, *source.findings)), None
+        return _record_of_left_out(source.name, source.source, source.format, (reason, *source.findings)), None
     groups, findings = grouped(source)
     points = source_points(groups)
     if not np.isfinite(points).all() or float(np.abs(points).max()) > 1e9:
@@ -256,7 +261,7 @@ def _record(source: SourceModel, result: Assembled, choice: Choice, front: str, 
     )
 
 
-def _left_out(name: str, source: str, kind: str, findings: tuple[str, ...]) -> ImportedModel:
+def _record_of_left_out(name: str, source: str, kind: str, findings: tuple[str, ...]) -> ImportedModel:
     return ImportedModel(
         id="",
         name=plain_text(name),

@@ -79,7 +79,7 @@ def _sweep(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) 
     before = {name: world.joint_value(body.name, name) for name in body.joints}
     opened: set[str] = set()
     while True:
-        joint_range = _swept(world, body, joint, riding)
+        joint_range = _sweep_one_joint(world, body, joint, riding)
         door = None if joint_range.free_at_start else _door_of(world, body, joint, joint_range.hit_link)
         if door is None or door in opened:
             break
@@ -113,7 +113,7 @@ def _limits(world: PhysicsWorld, body: LoadedBody, joint: str) -> tuple[float, f
     return (-np.pi, np.pi) if info[9] < info[8] else (info[8], info[9])  # without limits: once around
 
 
-def _swept(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) -> JointRange:
+def _sweep_one_joint(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) -> JointRange:
     """Sweep a joint with every other one where it is."""
     index = body.joints[joint]
     lower, upper = _limits(world, body, joint)

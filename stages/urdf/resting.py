@@ -52,7 +52,7 @@ def rested_bodies(root: Path, bodies: Sequence[BundleBody]) -> list[BundleBody]:
         return SMALLEST_MOVE + PADDING * contacts
 
     return [
-        _placed(body, poses[body.name], smallest_move(body)) if body.name in poses and near(body) else body
+        _at_new_pose(body, poses[body.name], smallest_move(body)) if body.name in poses and near(body) else body
         for body in bodies
     ]
 
@@ -75,7 +75,7 @@ def _motion(body: BundleBody, poses: dict[str, np.ndarray]) -> tuple[float, floa
     return float(np.linalg.norm(apply(change, middle[None])[0] - middle)), turned
 
 
-def _placed(body: BundleBody, world_from_body: np.ndarray, smallest_move: float) -> BundleBody:
+def _at_new_pose(body: BundleBody, world_from_body: np.ndarray, smallest_move: float) -> BundleBody:
     """Return the body at its new pose; the same one when it moved less than `smallest_move` [m] and hardly turned."""
     moved, turned = _motion(body, {body.name: world_from_body})
     if moved < smallest_move and turned < SMALLEST_TURN:

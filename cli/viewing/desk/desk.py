@@ -153,7 +153,9 @@ class Desk:
             state: dict[str, Any] = {"artifact": shown_now, "trouble": trouble}
             if self.edits is not None:
                 self._apply()
-                rows = [{**record.model_dump(mode="json"), "of": _said(edit)} for record, edit in self._pairs()]
+                rows = [
+                    {**record.model_dump(mode="json"), "of": _edit_in_words(edit)} for record, edit in self._pairs()
+                ]
                 state |= {
                     "trouble": trouble or cleaned(self._trouble),
                     "revision": self._revision or "",
@@ -182,7 +184,7 @@ class Desk:
         """
         with self._turn:
             file = self._check_fresh(artifact, revision)
-            edit = asked_edit(by, note, self._anchored(asked))
+            edit = asked_edit(by, note, self._with_anchors(asked))
             append_edits(file, [edit], as_read=revision)
             return self.now()
 
@@ -202,7 +204,7 @@ class Desk:
             raise Changed(f"{self.edits}: somebody else has changed it meanwhile", hint=UNWRITTEN)
         return self.edits
 
-    def _anchored(self, request: Mapping[str, Any]) -> dict[str, Any]:
+    def _with_anchors(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of an edit with anchors where things are named."""
         forms = {form["what"]: (each, form["fields"]) for each in self.subjects for form in forms_of(each.table)}
         edit_name = request.get("what")
@@ -212,7 +214,7 @@ class Desk:
         return subject.fields(edit_name, fields, request)
 
 
-def _said(edit: Edit) -> str:
+def _edit_in_words(edit: Edit) -> str:
     """Return an edit in a few words."""
     values = edit.model_dump(mode="json", by_alias=True, exclude={"what", "by", "when", "note"}, exclude_defaults=True)
     of = values.get("of")

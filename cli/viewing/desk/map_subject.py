@@ -23,13 +23,13 @@ class MapSubject(Subject[MapState]):
     option = "map --panoptic-map"
 
     @cached_property
-    def _seen(self) -> MapState:
+    def _map_state(self) -> MapState:
         assert isinstance(self.artifact, PanopticMap)
         return read_state(self.artifact)[0]
 
     def begun(self) -> MapState:
         """See Subject."""
-        state = self._seen
+        state = self._map_state
         state.things()
         return replace(state, entities=dict(state.entities), touched=set(state.touched), _things=dict(state._things))
 

@@ -105,8 +105,8 @@ class SceneSubject(GraphSubject):
         ids |= set() if self._library is None else {model.id for model in self._library.info.models}
         return super().facts() | {"models": sorted(ids)}
 
-    def _known(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
-        fields, before = super()._known(thing, node), self.state.replacements.get(node.id)
+    def _facts_of(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
+        fields, before = super()._facts_of(thing, node), self.state.replacements.get(node.id)
         folder = None if node.model_id is None else self.state.model_folder(node.model_id)
         joints = [] if folder is None else list(read_model(folder).joints)
         held_joints = set() if before is None else set(before.held)

@@ -80,12 +80,12 @@ class _Handler(BoundedHandler):
         self.answer(200, json.dumps(self.server.desk.now()).encode(), HEADERS)
 
     def do(self) -> None:
-        self._answered(lambda body: self._done(Asked.model_validate_json(body)))
+        self._send_answer(lambda body: self._do(Asked.model_validate_json(body)))
 
     def ask(self) -> None:
-        self._answered(lambda body: self.server.desk.ask(Question.model_validate_json(body).text))
+        self._send_answer(lambda body: self.server.desk.ask(Question.model_validate_json(body).text))
 
-    def _answered(self, answer: Callable[[bytes], dict[str, Any]]) -> None:
+    def _send_answer(self, answer: Callable[[bytes], dict[str, Any]]) -> None:
         body = self.body()
         if body is None:
             return
@@ -103,7 +103,7 @@ class _Handler(BoundedHandler):
         finally:
             self.done()
 
-    def _done(self, request: Asked) -> dict[str, Any]:
+    def _do(self, request: Asked) -> dict[str, Any]:
         desk, at = self.server.desk, {"artifact": request.artifact, "revision": request.revision}
         if request.remove is not None:
             return desk.remove(request.remove, **at)

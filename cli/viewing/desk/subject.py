@@ -75,13 +75,13 @@ class Subject(ABC, Generic[Held]):
             if value is None or (value in (NOTHING, NO_MODEL) and value in field.get("choices", ())):
                 continue
             if kind == "thing" and value not in field.get("choices", ()):
-                value = self._said(self.thing(value))
+                value = self._anchor_fields(self.thing(value))
             elif kind == "things" and isinstance(value, list):
-                value = [self._said(self.thing(name_of_thing)) for name_of_thing in value]
+                value = [self._anchor_fields(self.thing(name_of_thing)) for name_of_thing in value]
             values[name] = value
         return values
 
-    def _said(self, thing: Thing) -> dict[str, Any]:
+    def _anchor_fields(self, thing: Thing) -> dict[str, Any]:
         return self.anchor_of(thing).model_dump(mode="json", by_alias=True)
 
     def facts(self) -> dict[str, Any]:

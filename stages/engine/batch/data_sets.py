@@ -19,7 +19,7 @@ def _absolute(text: str, base: Path) -> Path:
     return Path(os.path.abspath(base / os.path.expanduser(text)))
 
 
-def _listed(file: Path, where: str) -> list[str]:
+def _read_list(file: Path, where: str) -> list[str]:
     try:
         lines = file_text(file, LARGEST_LIST, error=UsageError).splitlines()
     except UsageError as error:
@@ -44,7 +44,7 @@ def find_scenes(data: DataSpec, base: Path, where: str) -> list[tuple[str, Path]
             raise UsageError(f"{where}: data: {folder}: no such folder", hint="check folders")
     if data.list is not None:
         file = _absolute(data.list, base)
-        for line in _listed(file, where):
+        for line in _read_list(file, where):
             path = _absolute(line, base)
             if not path.exists():
                 raise UsageError(f"{where}: data: {path}: no such file or folder", hint=f"check {file}")

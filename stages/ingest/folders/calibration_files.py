@@ -237,10 +237,10 @@ def _size(document: dict[Any, Any], path: Path) -> tuple[int, int]:
     numbers = _numbers(values)
     if numbers is None:
         numbers = _numbers(_first(document, "resolution", "image_size", "imageSize"))
-    return _checked_size(numbers or (0, 0), path)
+    return _check_size(numbers or (0, 0), path)
 
 
-def _checked_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
+def _check_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
     if len(numbers) != 2 or not all(0 <= value <= 100_000 for value in numbers):
         raise BadInput(f"{path}: image size {list(numbers)} is impossible")
     return round(numbers[0]), round(numbers[1])
@@ -252,11 +252,11 @@ def _checked_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
 def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     if KITTI.search(text):
         return _kitti(text, path, camera_number)
-    keyed = _keyed(text)
+    keyed = _split_lines(text)
     if "cam0" in keyed and "baseline" in keyed:
         return _middlebury(keyed, path)
     if "fx" in keyed:
-        return FolderCalibration(_camera_of(_typed(keyed), path))
+        return FolderCalibration(_camera_of(_parse_values(keyed), path))
     try:
         numbers = [float(field) for field in re.sub(r"#.*", "", text).replace(",", " ").split()]
     except ValueError:
@@ -269,12 +269,12 @@ def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     raise BadInput(f"{path}: {len(numbers)} numbers, expected fx fy cx cy [distortion], 3x3 or 4x4")
 
 
-def _keyed(text: str) -> dict[str, str]:
+def _split_lines(text: str) -> dict[str, str]:
     lines = (re.split(r"\s*[=:]\s*", line.strip(), maxsplit=1) for line in text.splitlines())
     return {words[0]: words[1] for words in lines if len(words) == 2}
 
 
-def _typed(keyed: dict[str, str]) -> dict[str, Any]:
+def _parse_values(keyed: dict[str, str]) -> dict[str, Any]:
     typed: dict[str, Any] = {}
     for key, value in keyed.items():
         try:
@@ -325,7 +325,7 @@ def _middlebury(keyed: dict[str, str], path: Path) -> FolderCalibration:
     offset = numbers("doffs", 1)[0] if "doffs" in keyed else float(second[0, 2] - first[0, 2])
     if abs(second[0, 2] - first[0, 2] - offset) > 0.5:
         raise BadInput(f"{path}: doffs {offset:g} is not the difference of the principal points in cam0 and cam1")
-    size = _checked_size([numbers(key, 1)[0] for key in ("width", "height")], path) if "width" in keyed else (0, 0)
+    size = _check_size([numbers(key, 1)[0] for key in ("width", "height")], path) if "width" in keyed else (0, 0)
     # The difference of the principal points is doffs to the digits printed; disparities are stated against doffs.
     second[0, 2] = first[0, 2] + offset
     records = [

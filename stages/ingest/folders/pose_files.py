@@ -63,13 +63,13 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
         return _folder(path, names)
     if path.suffix == ".log":
         matrices: list[Pose] = [(matrix, None) for matrix in read_open3d_log(path)]
-        return _counted(matrices, names, path)
+        return _check_count(matrices, names, path)
     columns = columns_of(path)
     if columns - 1 in WITHOUT_STAMP:
         rows = named_rows(path, columns)
         images = _images([label for _, label, _ in rows], names)
         if columns != 8 or _are_names([label for _, label, _ in rows], images):
-            return _named(path, rows, images, names)
+            return _poses_by_image(path, rows, images, names)
         return read_stamped_poses(path)
     if columns not in COLUMNS:
         read_text(path)
@@ -77,7 +77,7 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
             f"{path}: {columns} columns are no pose",
             hint="7, 8 (with a stamp), 12 or 16 numbers a line, after the image's name or not",
         )
-    return _counted([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
+    return _check_count([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
 
 
 def _images(labels: list[str], names: list[str]) -> list[str | None]:
@@ -115,7 +115,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _named(
+def _poses_by_image(
     path: Path, rows: list[tuple[int, str, np.ndarray]], images: list[str | None], names: list[str]
 ) -> list[Pose]:
     """Return the pose of each image by the image that a row is of; none for images without a row.
@@ -145,7 +145,7 @@ def _pose(row: np.ndarray, where: str) -> Pose:
     return np.vstack([row.reshape(-1, 4)[:3], [0, 0, 0, 1] if len(row) == 12 else row[12:]]), None
 
 
-def _counted(poses: list[Pose], names: list[str], path: Path) -> list[Pose]:
+def _check_count(poses: list[Pose], names: list[str], path: Path) -> list[Pose]:
     if len(poses) != len(names):
         raise BadInput(f"{path}: {len(poses)} poses for {len(names)} images", hint="one pose an image, in order")
     return poses

@@ -98,7 +98,7 @@ def depth_note(log: MessageLog, topic: str, content: LogContent, parameters: Ing
     images = content.images[topic]
     for location in images.locations[:1]:
         try:
-            unit = depth_unit(_fetched(log, location, "depth"))
+            unit = depth_unit(_fetch_image(log, location, "depth"))
         except Unusable:
             break
         return f"depth in {'metres' if unit == 1 else 'millimetres'} ({images.encoding}, REP-118)"
@@ -109,7 +109,7 @@ def _never() -> LoadedFrame:
     raise Unusable("missing_partner")
 
 
-def _fetched(log: MessageLog, location: Hashable, stream: str) -> ImageRecord:
+def _fetch_image(log: MessageLog, location: Hashable, stream: str) -> ImageRecord:
     message = log.fetch(location)
     decode = decoder_for(message.channel)
     try:
@@ -128,13 +128,13 @@ def _loader(
     def load() -> LoadedFrame:
         color = depth = right = labels = None
         if geometry.color is not None and "color" in places:
-            color = picture(_fetched(log, places["color"], "color"), geometry.color, geometry.camera)
+            color = picture(_fetch_image(log, places["color"], "color"), geometry.color, geometry.camera)
         if geometry.right is not None and "right" in places:
-            right = picture(_fetched(log, places["right"], "right"), geometry.right, geometry.camera)
+            right = picture(_fetch_image(log, places["right"], "right"), geometry.right, geometry.camera)
         if geometry.depth is not None and "depth" in places:
-            depth = _depth(_fetched(log, places["depth"], "depth"), geometry, parameters.depth_scale)
+            depth = _depth(_fetch_image(log, places["depth"], "depth"), geometry, parameters.depth_scale)
         if "labels" in places:
-            labels = _labels(_fetched(log, places["labels"], "labels"), geometry)
+            labels = _labels(_fetch_image(log, places["labels"], "labels"), geometry)
         return LoadedFrame(color, depth, labels, right)
 
     return load

@@ -49,7 +49,7 @@ def geometry_of(topics: CameraTopics, content: LogContent, parameters: IngestPar
     each other. Raises BadInput when intrinsics are missing or impossible, and for pairs that are none.
     """
     if all(getattr(parameters, name) is not None for name in ("fx", "fy", "cx", "cy")):
-        return _given(topics, content, parameters, where)
+        return _geometry_by_options(topics, content, parameters, where)
     if topics.right is not None:
         geometry = _with_right(topics, content, parameters, where)
     elif topics.color is None or topics.depth is None:
@@ -60,7 +60,9 @@ def geometry_of(topics: CameraTopics, content: LogContent, parameters: IngestPar
     return replace(geometry, camera=camera, notes=(*geometry.notes, *notes_of_options))
 
 
-def _given(topics: CameraTopics, content: LogContent, parameters: IngestParameters, where: str) -> CameraGeometry:
+def _geometry_by_options(
+    topics: CameraTopics, content: LogContent, parameters: IngestParameters, where: str
+) -> CameraGeometry:
     """All intrinsics are given: images are taken as they are."""
     main = content.images[topics.depth or topics.main]
     size = main.size if main.size != (0, 0) else content.images[topics.main].size

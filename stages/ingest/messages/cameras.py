@@ -106,7 +106,7 @@ def fixed_transform(target: str, source: str, content: LogContent) -> np.ndarray
 
 def find_cameras(content: LogContent) -> list[CameraTopics]:
     """Group the image topics of a log into cameras, in order of their names."""
-    colors = _preferred([name for name, images in content.images.items() if images.role == "color"], content)
+    colors = _without_duplicates([name for name, images in content.images.items() if images.role == "color"], content)
     right_of = _right_eyes(colors, content)
     lefts = [topic for topic in colors if topic not in right_of.values()]
     depths = sorted(name for name, images in content.images.items() if images.role == "depth")
@@ -122,7 +122,7 @@ def find_cameras(content: LogContent) -> list[CameraTopics]:
     return sorted(named_cameras, key=lambda camera: camera.name)
 
 
-def _preferred(topics: list[str], content: LogContent) -> list[str]:
+def _without_duplicates(topics: list[str], content: LogContent) -> list[str]:
     """Return the topics without those that show the same as another one: of one device and one frame."""
     groups: dict[tuple[tuple[str, ...], str], list[str]] = {}
     for topic in sorted(topics):

@@ -42,7 +42,7 @@ def decode_compressed_depth(encoding: str, data: bytes) -> np.ndarray:
         raise Unusable("undecodable_depth", f"{len(data)} bytes")
     _, a, b = _HEADER.unpack_from(data)
     body = data[_HEADER.size :]
-    stored = decode_rvl(body) if "rvl" in encoding.lower() else _decoded_png(body)
+    stored = decode_rvl(body) if "rvl" in encoding.lower() else _decode_png(body)
     if stored_as(encoding, data) == "16UC1":
         return stored
     if not (np.isfinite(a) and np.isfinite(b) and a > 0):
@@ -66,7 +66,7 @@ def stored_as(encoding: str, data: bytes) -> str:
     return "32FC1" if quantised else "16UC1"
 
 
-def _decoded_png(body: bytes) -> np.ndarray:
+def _decode_png(body: bytes) -> np.ndarray:
     if not body.startswith(PNG_START) or not may_be_decoded(body):
         raise Unusable("undecodable_depth", "no PNG of a sensible size after the header of compressed depth")
     image = decode_image(body)

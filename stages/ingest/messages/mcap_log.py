@@ -199,7 +199,7 @@ class McapLog:
                     elif length >= MESSAGE_HEAD.size:
                         counts_here[int.from_bytes(data[start : start + 2], "little")] += 1
             except Damaged as fault:
-                self._lost_chunk(index, fault, counts_here.total())
+                self._report_lost_chunk(index, fault, counts_here.total())
             counts.update(counts_here)
         for offset in self._loose:
             counts[int.from_bytes(self._file.read(offset + HEAD.size, 2), "little")] += 1
@@ -239,7 +239,7 @@ class McapLog:
                     content = data[start + MESSAGE_HEAD.size : start + length]
                     yield LogMessage(channel, log_time, content, Location(index, start))
         except Damaged as fault:
-            self._lost_chunk(index, fault, counts_here.total())
+            self._report_lost_chunk(index, fault, counts_here.total())
         else:
             indexed = self._structure.indexed_messages(index)
             if indexed is not None and counts_here.total() < indexed:
@@ -301,7 +301,7 @@ class McapLog:
             raise Damaged("has a wrong checksum")
         return data
 
-    def _lost_chunk(self, index: int, fault: Damaged, read: int) -> None:
+    def _report_lost_chunk(self, index: int, fault: Damaged, read: int) -> None:
         messages = self._structure.indexed_messages(index)
         count = "no index says how many messages" if messages is None else f"{messages} messages by its index"
         consequence = f"all but its first {read} messages are lost" if read else "it is lost"

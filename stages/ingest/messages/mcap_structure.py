@@ -256,7 +256,7 @@ class McapStructure:
     def _visit_index(self, offset: int, length: int) -> None:
         head = self._file.exactly(offset + HEAD.size, min(length, _INDEX_HEAD))
         entries = int.from_bytes(head[2:], "little")
-        if len(head) < _INDEX_HEAD or entries % _INDEX_ENTRY or entries != _bounded(length) - _INDEX_HEAD:
+        if len(head) < _INDEX_HEAD or entries % _INDEX_ENTRY or entries != _check_length(length) - _INDEX_HEAD:
             raise Damaged(f"is a message index of {length} bytes that claims {entries} bytes of entries")
         if self._data_end is not None:
             return
@@ -283,7 +283,7 @@ class McapStructure:
         return self._body(offset, length)
 
     def _body(self, offset: int, length: int) -> bytes:
-        return self._file.exactly(offset + HEAD.size, _bounded(length))
+        return self._file.exactly(offset + HEAD.size, _check_length(length))
 
     # --- after a damaged record ------------------------------------------------------------------------------
 
@@ -389,7 +389,7 @@ class McapStructure:
             self.damage.found("checksum of the data section is wrong: something in it has changed")
 
 
-def _bounded(length: int) -> int:
+def _check_length(length: int) -> int:
     if length > LARGEST_RECORD:
         raise Damaged(f"has {length} bytes, more than the {LARGEST_RECORD} that are accepted")
     return length

@@ -165,10 +165,10 @@ def color_pixels(record: ImageRecord) -> np.ndarray | bytes:
     pixels = _raw(record, packing.dtype, packing.channels, "undecodable_color")
     if pixels.dtype == np.uint16:
         pixels = (pixels >> 8).astype(np.uint8)
-    return pixels.copy() if packing.to_rgb is None else _converted(pixels, packing.to_rgb)
+    return pixels.copy() if packing.to_rgb is None else _convert_color(pixels, packing.to_rgb)
 
 
-def _converted(pixels: np.ndarray, conversion: int) -> np.ndarray:
+def _convert_color(pixels: np.ndarray, conversion: int) -> np.ndarray:
     try:
         return cv2.cvtColor(pixels, conversion)
     except cv2.error as error:
@@ -179,7 +179,7 @@ def _planar_color(record: ImageRecord, conversion: int) -> np.ndarray:
     width, height = record.width, record.height
     if width % 2 or height % 2:
         raise Unusable("undecodable_color", f"{record.encoding} of odd size {width}x{height}")
-    return _converted(_rows(record, width, height * 3 // 2, width * height, "undecodable_color"), conversion)
+    return _convert_color(_rows(record, width, height * 3 // 2, width * height, "undecodable_color"), conversion)
 
 
 def _compressed_color(record: ImageRecord) -> np.ndarray | bytes:
@@ -190,7 +190,7 @@ def _compressed_color(record: ImageRecord) -> np.ndarray | bytes:
         raise Unusable(reason, f"{len(data)} bytes of {record.encoding!r:.40}, neither JPEG, PNG nor WebP")
     _check_whole(data, "undecodable_color")
     if not may_be_decoded(data):
-        raise Unusable("undecodable_color", _claimed(data))
+        raise Unusable("undecodable_color", _claimed_size(data))
     image = decode_color(data)
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes of {record.encoding!r:.40}")
@@ -223,7 +223,7 @@ def depth_pixels(record: ImageRecord) -> np.ndarray:
     if record.compressed:
         if is_compressed_depth(record.encoding, record.data):
             return decode_compressed_depth(record.encoding, record.data)
-        image = _decoded_png(record, "undecodable_depth")
+        image = _decode_png(record, "undecodable_depth")
         if image.dtype != np.uint16 or image.ndim != 2:
             raise Unusable("depth_not_16_bit", f"PNG of shape {image.shape}, {image.dtype}: a picture of depth")
         return image
@@ -248,7 +248,7 @@ def depth_unit(record: ImageRecord) -> float:
 def label_pixels(record: ImageRecord) -> np.ndarray:
     """Return labels (H, W) uint16. Raises Unusable."""
     if record.compressed:
-        image = _decoded_png(record, "undecodable_labels")
+        image = _decode_png(record, "undecodable_labels")
         if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
             raise Unusable("undecodable_labels", f"PNG of shape {image.shape}, {image.dtype}")
         return image.astype(np.uint16)
@@ -261,7 +261,7 @@ def label_pixels(record: ImageRecord) -> np.ndarray:
     return image.astype(np.uint16)
 
 
-def _decoded_png(record: ImageRecord, reason: str) -> np.ndarray:
+def _decode_png(record: ImageRecord, reason: str) -> np.ndarray:
     data = record.data
     if data.startswith(JPEG_START):
         raise Unusable("depth_not_16_bit" if "depth" in reason else reason, "JPEG does not keep values")
@@ -269,7 +269,7 @@ def _decoded_png(record: ImageRecord, reason: str) -> np.ndarray:
         raise Unusable(reason, f"{len(data)} bytes of {record.encoding!r:.40}, no PNG")
     _check_whole(data, reason)
     if not may_be_decoded(data):
-        raise Unusable(reason, _claimed(data))
+        raise Unusable(reason, _claimed_size(data))
     image = decode_image(data)
     if image is None:
         raise Unusable(reason, f"PNG of {len(data)} bytes")
@@ -308,7 +308,7 @@ def _is_webp(data: bytes) -> bool:
     return data.startswith(b"RIFF") and data[8:12] == b"WEBP"
 
 
-def _claimed(data: bytes) -> str:
+def _claimed_size(data: bytes) -> str:
     size = image_size(data)
     claim = f"claims {size[0]}x{size[1]} pixels" if size else "has no readable header"
     return f"an image of {len(data)} bytes that {claim}"

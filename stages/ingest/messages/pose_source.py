@@ -78,7 +78,7 @@ def find_poses(
     """
     content.tree.prefer(parameters.world_frame)
     if parameters.pose_topic is not None:
-        asked_for = _asked_for(content, frame, parameters, where)
+        asked_for = _from_given_topic(content, frame, parameters, where)
         return asked_for, list(asked_for.notes)
     notes: list[str] = []
     poses = _from_tree(content, frame, parameters, where, notes)
@@ -160,12 +160,12 @@ def _odometry_of(content: LogContent, frame: str) -> Poses | None:
     fitting = [
         poses
         for poses in content.poses.values()
-        if poses.child_frame_id and not NOT_MEASURED & set(words(poses.topic)) and _joined(content, poses, frame)
+        if poses.child_frame_id and not NOT_MEASURED & set(words(poses.topic)) and _are_connected(content, poses, frame)
     ]
     return min(fitting, key=lambda poses: (-poses.track.count, poses.topic), default=None)
 
 
-def _joined(content: LogContent, poses: Poses, frame: str) -> bool:
+def _are_connected(content: LogContent, poses: Poses, frame: str) -> bool:
     if poses.child_frame_id == frame:
         return True
     tree = content.tree
@@ -177,7 +177,7 @@ def _from_topics(
 ) -> PoseSource | None:
     odometry = _odometry_of(content, frame)
     if odometry is not None:
-        return _posed_by(odometry, content, frame, parameters, where)
+        return _source_of_topic(odometry, content, frame, parameters, where)
     bare = [
         poses
         for poses in content.poses.values()
@@ -185,7 +185,7 @@ def _from_topics(
     ]
     best = min(bare, key=lambda poses: (-poses.track.count, poses.topic), default=None)
     if best is not None:
-        return _posed_by(best, content, frame, parameters, where)
+        return _source_of_topic(best, content, frame, parameters, where)
     for poses in sorted(content.poses.values(), key=lambda poses: poses.topic):
         if poses.child_frame_id:
             notes.append(
@@ -195,21 +195,23 @@ def _from_topics(
     return None
 
 
-def _asked_for(content: LogContent, frame: str, parameters: IngestParameters, where: str) -> PoseSource:
+def _from_given_topic(content: LogContent, frame: str, parameters: IngestParameters, where: str) -> PoseSource:
     poses = content.poses.get(str(parameters.pose_topic))
     if poses is None:
         topics = ", ".join(sorted(content.poses)) or "none"
         raise BadInput(f"{where}: no poses on topic {parameters.pose_topic!r}", hint=f"topics with poses: {topics}")
-    if poses.child_frame_id and not _joined(content, poses, frame):
+    if poses.child_frame_id and not _are_connected(content, poses, frame):
         raise BadInput(
             f"{where}: {poses.topic} says where {poses.child_frame_id!r} is, and no transforms lead from there to the "
             f"camera {frame!r}",
             hint="record tf_static",
         )
-    return _posed_by(poses, content, frame, parameters, where)
+    return _source_of_topic(poses, content, frame, parameters, where)
 
 
-def _posed_by(poses: Poses, content: LogContent, frame: str, parameters: IngestParameters, where: str) -> PoseSource:
+def _source_of_topic(
+    poses: Poses, content: LogContent, frame: str, parameters: IngestParameters, where: str
+) -> PoseSource:
     world = parameters.world_frame or poses.frame_id
     if world != poses.frame_id:
         _check_frame(world, content, where)

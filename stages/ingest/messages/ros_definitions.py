@@ -87,13 +87,13 @@ def definitions_of(type_name: str, schema_encoding: str, schema: bytes) -> Defin
     name = short_name(type_name)
     if name in definitions and schema_encoding == "ros1msg":
         definitions |= {"builtin_interfaces/Time": ROS1_TIME, "builtin_interfaces/Duration": ROS1_TIME}
-    return _completed(name, definitions, "ros1" if schema_encoding == "ros1msg" else "ros2")
+    return _collect_needed(name, definitions, "ros1" if schema_encoding == "ros1msg" else "ros2")
 
 
 ROS1_TIME = (Field("sec", "I"), Field("nanosec", "I"))
 
 
-def _completed(name: str, definitions: Definitions, version: str) -> Definitions:
+def _collect_needed(name: str, definitions: Definitions, version: str) -> Definitions:
     """Keep what `name` refers to, directly or not; take missing types from the bundled ones."""
     needed: Definitions = {}
     waiting = [name]
@@ -292,9 +292,9 @@ class _IdlReader:
             word = f"{word} {self._take()}"
         if word in PRIMITIVES:
             return PRIMITIVES[word], None
-        return self._resolved(word)
+        return self._resolve(word)
 
-    def _resolved(self, name: str) -> tuple[str, int | None]:
+    def _resolve(self, name: str) -> tuple[str, int | None]:
         path = name.removeprefix("::").replace("::", "/")
         if not re.fullmatch(r"[A-Za-z_][\w/]*", path):
             raise UnreadableDefinition(f"{name[:40]!r} in its definition is no type")

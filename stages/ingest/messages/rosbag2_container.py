@@ -82,13 +82,13 @@ class Rosbag2Messages:
             try:
                 for message in part.messages(None if wanted_ids is None else chosen):
                     try:
-                        stored = self._stored(index, message)
+                        stored = self._as_stored(index, message)
                     except ValueError as error:
                         faults[f"a packed message {error}"] += 1
                         continue
                     yield stored
             except BadInput as error:
-                raise self._named(index, error) from None
+                raise self._with_part_name(index, error) from None
             finally:
                 self._in_use.remove(index)
             packed = [f"{number} times: {reason}" for reason, number in sorted(faults.items())]
@@ -102,13 +102,13 @@ class Rosbag2Messages:
         if not isinstance(location, Place) or location.part not in self._readable:
             raise BadInput(f"{self.path}: {location!r} is no place in the bag")
         try:
-            return self._stored(location.part, self._part(location.part).fetch(location.inside))
+            return self._as_stored(location.part, self._part(location.part).fetch(location.inside))
         except BadInput as error:
-            raise self._named(location.part, error) from None
+            raise self._with_part_name(location.part, error) from None
         except ValueError as error:
             raise BadInput(f"{self.path}: {self._name(location.part)}: a packed message {error}", hint=HINT) from None
 
-    def _stored(self, index: int, message: StoredMessage) -> StoredMessage:
+    def _as_stored(self, index: int, message: StoredMessage) -> StoredMessage:
         channel = self.channels[self._numbers[index, message.channel.id]]
         data = unpacked_within(message.data, LARGEST_MESSAGE) if self._bag.packed_messages else message.data
         return StoredMessage(channel, message.log_time, data, Place(index, message.location))
@@ -193,7 +193,7 @@ class Rosbag2Messages:
             idle = [part_index for part_index in self._open if part_index not in self._in_use]
             if len(self._open) >= MOST_OPEN and idle:
                 self._close_part(idle[0])
-            part = self._opened(index)
+            part = self._open_part(index)
         self._open[index] = part
         return part
 
@@ -203,7 +203,7 @@ class Rosbag2Messages:
         if index in self._unpacked:
             self._unpacked.pop(index).cleanup()
 
-    def _opened(self, index: int) -> Part:
+    def _open_part(self, index: int) -> Part:
         """Open a part; one that is packed as a whole is unpacked into a temporary folder first."""
         path = self._bag.parts[index]
         opened = path
@@ -218,14 +218,14 @@ class Rosbag2Messages:
             fault = "is neither MCAP nor SQLite (wrong first bytes)" if head else "is empty"
             raise BadInput(f"{path}: {fault}", hint=HINT)
         except BadInput as error:
-            error = self._named(index, error)
+            error = self._with_part_name(index, error)
             self._close_part(index)
             raise error from None
         except BaseException:
             self._close_part(index)
             raise
 
-    def _named(self, index: int, error: BadInput) -> BadInput:
+    def _with_part_name(self, index: int, error: BadInput) -> BadInput:
         """Return an error with the name of the part, where it has that of the unpacked file."""
         if index not in self._unpacked:
             return error

@@ -130,7 +130,7 @@ class SqliteMessages:
         if missing > 0:
             self._lines.found(f"is cut: {missing} bytes less than it should have, what stood there is lost")
         if size % page:
-            copy = self._copied([])
+            copy = self._copy_files([])
             os.truncate(copy, size - size % page)
             self._database.close()
             self._database = self._connect(copy, "mode=ro&immutable=1")
@@ -163,7 +163,7 @@ class SqliteMessages:
 
     def _take_in(self, journals: list[Path]) -> None:
         """Open a copy, into which SQLite takes the journals in; the file itself is never written."""
-        copy = self._copied(journals)
+        copy = self._copy_files(journals)
         try:
             taken_in = self._connect(copy, "mode=rw")
             taken_in.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
@@ -174,7 +174,7 @@ class SqliteMessages:
         self._database = taken_in
         self.notes.append("the recording ended without closing the bag; its journal was taken in")
 
-    def _copied(self, journals: list[Path]) -> Path:
+    def _copy_files(self, journals: list[Path]) -> Path:
         """Copy the file and its journals into a temporary folder; return the copy."""
         path = self.path.resolve()
         try:

@@ -54,7 +54,7 @@ def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -
             values = f"--fx {camera.fx * resize:.6g} --fy {camera.fy * resize:.6g} "
             values += f"--cx {(camera.cx + 0.5) * resize - 0.5:.6g} --cy {(camera.cy + 0.5) * resize - 0.5:.6g}"
             add("wasted", f"{intrinsics}: the calibration is for {size}", f"give {values}")
-        elif _centered(camera.cy, camera.width) and _centered(camera.cx, camera.height):
+        elif _is_centered(camera.cy, camera.width) and _is_centered(camera.cx, camera.height):
             add("wasted", f"{intrinsics}: cx and cy are swapped", f"give --cx {camera.cy:g} --cy {camera.cx:g}")
         else:
             add("doubtful", intrinsics, f"{give}, unless the image was cropped")
@@ -74,11 +74,11 @@ def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -
 def other_size(camera: Camera) -> float | None:
     """Return the factor that makes the intrinsics fit the image, when they are those of a resized one."""
     for factor in RESIZES:
-        centered = _centered((camera.cx + 0.5) * factor - 0.5, camera.width, 0.06)
-        if centered and _centered((camera.cy + 0.5) * factor - 0.5, camera.height, 0.06):
+        centered = _is_centered((camera.cx + 0.5) * factor - 0.5, camera.width, 0.06)
+        if centered and _is_centered((camera.cy + 0.5) * factor - 0.5, camera.height, 0.06):
             return factor
     return None
 
 
-def _centered(center: float, size: int, tolerance: float = 0.1) -> bool:
+def _is_centered(center: float, size: int, tolerance: float = 0.1) -> bool:
     return abs((center + 0.5) / max(size, 1) - 0.5) <= tolerance

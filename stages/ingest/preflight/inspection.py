@@ -256,7 +256,13 @@ def _judge_camera(
         findings += stereo_findings(stereo, name)
     if poses is not None:
         findings += pose_findings(
-            outcome.report, depth, source_camera.camera, interval, name, untouched=_untouched(parameters), units=units
+            outcome.report,
+            depth,
+            source_camera.camera,
+            interval,
+            name,
+            untouched=_are_poses_untouched(parameters),
+            units=units,
         )
     if motion is not None:
         findings += motion_findings(motion, outcome.report.verdict == "agree", name)
@@ -308,7 +314,7 @@ def _pose_outcome(source_camera: SourceCamera, material: CameraMaterial, has_dep
     return replace(outcome, report=outcome.report.model_copy(update=changes))
 
 
-def _untouched(parameters: IngestParameters) -> bool:
+def _are_poses_untouched(parameters: IngestParameters) -> bool:
     """Whether poses are taken as the log has them."""
     return parameters.pose_convention == "as-is" and parameters.pose_scale == 1
 

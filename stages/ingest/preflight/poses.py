@@ -139,11 +139,11 @@ def check_poses(pairs: Pairs, poses: np.ndarray, times: np.ndarray, measure: Mea
     candidates = [as_is, *_single_changes(pairs, poses, measure)]
     best = min(candidates, key=lambda c: c.cost)
     if as_is.fit.residual > measure.good or _better(best, as_is):
-        best = _searched(pairs, poses, candidates, measure)
+        best = _search(pairs, poses, candidates, measure)
         candidates.append(best)
     fine_scale = _fine_scale(pairs, poses, best if _better(best, as_is) else as_is) if measure.sees_scale else None
     focal = min((c for c in candidates if c.focal != 1), key=lambda c: c.cost, default=None)
-    report = _judged(candidates, as_is, best, still, fine_scale, pairs, times, measure)
+    report = _judge(candidates, as_is, best, still, fine_scale, pairs, times, measure)
     return PoseOutcome(report, as_is, best, pairs, focal)
 
 
@@ -168,7 +168,7 @@ def _better(first: Candidate, second: Candidate) -> bool:
     return first.cost < CLEARLY_BETTER * second.cost and first.fit.wins(second.fit) >= MOST_PAIRS
 
 
-def _searched(pairs: Pairs, poses: np.ndarray, candidates: list[Candidate], measure: Measure) -> Candidate:
+def _search(pairs: Pairs, poses: np.ndarray, candidates: list[Candidate], measure: Measure) -> Candidate:
     """Return the best of all single changes and of conventions with scales, the scale refined.
 
     One change that explains everything is tried with other scales only; otherwise every convention is.
@@ -232,7 +232,7 @@ def _fine_scale(pairs: Pairs, poses: np.ndarray, about: Candidate) -> float | No
     return float(about.scale * np.exp(center))
 
 
-def _judged(
+def _judge(
     candidates: Iterable[Candidate],
     as_is: Candidate,
     best: Candidate,
@@ -285,7 +285,7 @@ def _judged(
         )
     bad = _bad_pairs(as_is.fit, measure) if verdict == "agree" else np.zeros(0, dtype=int)
     bad_times = sorted({float(times[pairs.pairs[k][0]]) for k in bad})
-    reported = [as_is, *_shown(ranked, as_is)]
+    reported = [as_is, *_candidates_to_report(ranked, as_is)]
     return PoseReport(
         verdict=verdict,
         method=measure.name,
@@ -322,7 +322,7 @@ def _bad_pairs(fit: Fit, measure: Measure) -> np.ndarray:
     return np.flatnonzero(overlapping & (fit.residuals > measure.bad) & (fit.residuals > 4 * fit.residual))
 
 
-def _shown(ranked: list[Candidate], as_is: Candidate) -> list[Candidate]:
+def _candidates_to_report(ranked: list[Candidate], as_is: Candidate) -> list[Candidate]:
     """The conventions, the powers of ten, the best scale, focal length and lag: what a person wants to see."""
     reported, kinds = [], set()
     for candidate in ranked:

@@ -133,18 +133,18 @@ def _check_mesh(mesh: trimesh.Trimesh, path: str, *, may_be_empty: bool, hint: s
 
 def _parse(data: bytes, kind: str) -> trimesh.Trimesh | None:
     if len(data) > REMEMBERED_BYTES:
-        return _parsed(data, kind)
-    parsed = _remembered(data, kind)
+        return _load_mesh(data, kind)
+    parsed = _parse_cached(data, kind)
     return parsed.copy() if parsed is not None else None
 
 
 @lru_cache(maxsize=1024)
-def _remembered(data: bytes, kind: str) -> trimesh.Trimesh | None:
+def _parse_cached(data: bytes, kind: str) -> trimesh.Trimesh | None:
     """Pieces of models and rooms are read again and again: to be checked, moved, drawn, measured."""
-    return _parsed(data, kind)
+    return _load_mesh(data, kind)
 
 
-def _parsed(data: bytes, kind: str) -> trimesh.Trimesh | None:
+def _load_mesh(data: bytes, kind: str) -> trimesh.Trimesh | None:
     try:
         # From memory and without a resolver, so that names inside the file lead nowhere.
         loaded = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
@@ -215,7 +215,7 @@ def _glb_tree(data: bytes) -> dict[str, Any]:
 
 
 @contextmanager
-def _told_as_broken() -> Iterator[None]:
+def _refuse_as_broken() -> Iterator[None]:
     try:
         yield
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
@@ -232,7 +232,7 @@ def _check_glb(data: bytes) -> bool:
     version, total, length = struct.unpack_from("<III", data, 4)
     if version != 2 or total != len(data) or 20 + length > total or data[16:20] != b"JSON":
         raise BadInput(f"GLB version {version} declares {total} bytes and {length} of JSON, the file has {len(data)}")
-    with _told_as_broken():
+    with _refuse_as_broken():
         tree = _glb_tree(data)
         views = [
             (whole_number(view.get("byteOffset", 0)), whole_number(view["byteLength"]))
@@ -294,7 +294,7 @@ def _times_shown(tree: dict[str, Any]) -> list[int]:
 
 def _glb_counts(data: bytes) -> tuple[int, int]:
     """Return the triangles and the vertices of a checked GLB, each mesh as often as it is shown, and once more."""
-    with _told_as_broken():
+    with _refuse_as_broken():
         tree = _glb_tree(data)
         counts = [whole_number(accessor["count"]) for accessor in tree.get("accessors", ())]
         triangles = vertices = 0
@@ -315,7 +315,7 @@ def gltf_pixels(data: bytes, where: str, *, hint: str = "make the artifact again
     """
     try:
         _check_glb(data)
-        with _told_as_broken():
+        with _refuse_as_broken():
             return _pixels(data)
     except BadInput as error:
         raise BadInput(f"{where}: {error.message}", hint=hint) from None

@@ -86,7 +86,7 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
     Raises BadInput for names that are not unique ASCII, missing or cyclic parents, poses that are not rigid, scales
     that are not positive, and for models whose files are broken.
     """
-    ordered = _parents_first(_checked(bodies))
+    ordered = _parents_first(_check_bodies(bodies))
     (root / "bodies").mkdir(parents=True, exist_ok=True)
     (root / "meshes").mkdir(exist_ok=True)
     center = _room_center(bodies)
@@ -117,7 +117,7 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
     return scene
 
 
-def _checked(bodies: list[BundleBody]) -> list[BundleBody]:
+def _check_bodies(bodies: list[BundleBody]) -> list[BundleBody]:
     names: set[str] = set()
     for body in bodies:
         if not NAME.fullmatch(body.name) or body.name == WORLD or body.name.startswith((".", "-")):

@@ -98,11 +98,11 @@ def model_links(
     links = []
     for part in model.parts:
         link = urdf.link(part)
-        visuals = tuple(_copied(root, model.id, part, folder, shape, scale, visual=True) for shape in link.visuals)
+        visuals = tuple(_copy_shape(root, model.id, part, folder, shape, scale, visual=True) for shape in link.visuals)
         if part_colors and part in part_colors:
             visuals = recolored_shapes(root, name, visuals, part_colors[part])
         collisions = tuple(
-            _copied(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions
+            _copy_shape(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions
         )
         inertial = None if link.inertial is None else link.inertial.scaled(scale)
         links.append(Link(names[part], inertial, visuals, collisions, link.friction))
@@ -168,7 +168,9 @@ def scaled_joint(joint: Joint, body: str, scale: float) -> Joint:
     )
 
 
-def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, scale: float, *, visual: bool) -> Shape:
+def _copy_shape(
+    root: Path, model_id: str, part: str, folder: Path, shape: Shape, scale: float, *, visual: bool
+) -> Shape:
     frame = shape.link_from_shape.copy()
     frame[:3, 3] *= scale
     if shape.box_size is not None:

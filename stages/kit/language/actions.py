@@ -98,7 +98,9 @@ def check_call(call: ActionCall, language: ActionLanguage) -> Failure | None:
     for name, kind in zip(call.objects, action.objects, strict=True):
         known_names = language.names.get(kind, frozenset())
         if name not in known_names:
-            return _failure("unknown_object", call, f"there is no {kind} {quoted(name)}{_meant(name, known_names)}")
+            return _failure(
+                "unknown_object", call, f"there is no {kind} {quoted(name)}{_suggestion(name, known_names)}"
+            )
     return _check_numbers(call, action)
 
 
@@ -124,7 +126,7 @@ def _check_numbers(call: ActionCall, action: ActionType) -> Failure | None:
     return None
 
 
-def _meant(name: str, names: frozenset[str]) -> str:
+def _suggestion(name: str, names: frozenset[str]) -> str:
     close = get_close_matches(name[:LONGEST_NAME], sorted(names), n=1)
     return f"; did you mean {quoted(close[0])}?" if close else f"; there are {len(names)} others" if names else ""
 

@@ -113,7 +113,7 @@ class OpenAICompatibleBackend:
 def encode_request(request: Request, form: Form, limit_name: str, *, temperature: bool = True) -> dict[str, Any]:
     """Return the body of a request; `form` says how the reply is asked for, `temperature` whether one is."""
     schema = request.schema
-    messages = [_encoded(message) for message in request.messages]
+    messages = [_encode(message) for message in request.messages]
     body: dict[str, Any] = {"model": request.model, limit_name: request.maximum_tokens, "stream": False}
     if temperature:
         body["temperature"] = request.temperature
@@ -126,19 +126,19 @@ def encode_request(request: Request, form: Form, limit_name: str, *, temperature
         # Without constrained decoding the model has to be told.
         document = json.dumps(schema.document, sort_keys=True)
         instruction = f"Reply with one JSON object that follows this JSON schema, and nothing else:\n{document}"
-        messages.append(_encoded(say("user", instruction)))
+        messages.append(_encode(say("user", instruction)))
         if form == "json_object":
             body["response_format"] = {"type": "json_object"}
     return {**body, "messages": messages}
 
 
-def _encoded(message: Message) -> dict[str, Any]:
+def _encode(message: Message) -> dict[str, Any]:
     if len(message.parts) == 1 and isinstance(message.parts[0], Text):
         return {"role": message.role, "content": message.parts[0].text}  # what every server understands
-    return {"role": message.role, "content": [_encoded_part(part) for part in message.parts]}
+    return {"role": message.role, "content": [_encode_part(part) for part in message.parts]}
 
 
-def _encoded_part(part: Text | Image) -> dict[str, Any]:
+def _encode_part(part: Text | Image) -> dict[str, Any]:
     if isinstance(part, Text):
         return {"type": "text", "text": part.text}
     data = base64.b64encode(part.data).decode()

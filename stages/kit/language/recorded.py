@@ -52,11 +52,11 @@ class RecordingBackend:
         """Return the reply, out of the file or of the backend. Raises what that raises."""
         digest = request.digest
         occurrence = self._asked[digest]
-        raw = self._answered(request, digest, occurrence)
+        raw = self._answer(request, digest, occurrence)
         self._asked[digest] += 1
         return raw
 
-    def _answered(self, request: Request, digest: str, occurrence: int) -> RawReply:
+    def _answer(self, request: Request, digest: str, occurrence: int) -> RawReply:
         exchange = self._file.transcript.find(digest, occurrence)
         if exchange is not None:
             return exchange.raw

@@ -48,7 +48,7 @@ def schema_of(model: type[M]) -> ReplySchema[M]:
             return model.model_validate_json(json.dumps(value), strict=True)
         except ValidationError as error:
             reasons = [f"{_place(e['loc'])}: {e['msg']}" for e in error.errors(include_url=False)]
-            raise DoesNotFollow(_joined(reasons)) from None
+            raise DoesNotFollow(_join_reasons(reasons)) from None
 
     return ReplySchema(model.__name__, _all_required(model.model_json_schema()), read, strict=True)
 
@@ -67,7 +67,7 @@ def schema_from(name: str, document: dict[str, Any]) -> ReplySchema[Any]:
     def read(value: Any) -> Any:
         errors = sorted(validator.iter_errors(value), key=lambda e: list(map(str, e.absolute_path)))
         if errors:
-            raise DoesNotFollow(_joined([f"{_place(tuple(e.absolute_path))}: {e.message}" for e in errors]))
+            raise DoesNotFollow(_join_reasons([f"{_place(tuple(e.absolute_path))}: {e.message}" for e in errors]))
         return value
 
     return ReplySchema(name, document, read, strict=False)
@@ -92,7 +92,7 @@ def _place(path: tuple[Any, ...]) -> str:
     return ".".join(str(part) for part in path) or "the object"
 
 
-def _joined(reasons: list[str]) -> str:
+def _join_reasons(reasons: list[str]) -> str:
     and_more = f" (and {len(reasons) - MOST_REASONS} more)" if len(reasons) > MOST_REASONS else ""
     text = " ".join("; ".join(reasons[:MOST_REASONS]).split())
     return (text if len(text) <= LONGEST_REASON else text[: LONGEST_REASON - 3] + "...") + and_more

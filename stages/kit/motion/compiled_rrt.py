@@ -184,8 +184,8 @@ def search(
             if free == steps:
                 points_b[parent] = target
                 if forward:
-                    return _joined(points_a, parents_a, count_a - 1, points_b, parents_b, parent), used
-                return _joined(points_b, parents_b, parent, points_a, parents_a, count_a - 1), used
+                    return _join_trees(points_a, parents_a, count_a - 1, points_b, parents_b, parent), used
+                return _join_trees(points_b, parents_b, parent, points_a, parents_a, count_a - 1), used
         if count_a < count_b:
             continue
         points_a, points_b = points_b, points_a
@@ -196,7 +196,7 @@ def search(
 
 
 @njit(cache=True, error_model="numpy")
-def _joined(
+def _join_trees(
     points_a: np.ndarray, parents_a: np.ndarray, node_a: int, points_b: np.ndarray, parents_b: np.ndarray, node_b: int
 ) -> np.ndarray:
     """Return the path from the root of tree a to node_a, which is node_b, and on to a root of tree b."""

@@ -130,12 +130,12 @@ def ranked(info: LanguageMapFile, index: RegionIndex, probabilities: np.ndarray,
     for region in np.argsort(-probabilities, kind="stable"):
         if len(answers) == most:
             break
-        if not _known_place(info, index, int(region), answers):
+        if not _is_known_place(info, index, int(region), answers):
             answers.append(int(region))
     return answers
 
 
-def _known_place(info: LanguageMapFile, index: RegionIndex, region: int, answers: list[int]) -> bool:
+def _is_known_place(info: LanguageMapFile, index: RegionIndex, region: int, answers: list[int]) -> bool:
     """Whether a region shares its box or its Gaussians with one of those kept; entities of a map are things of their
     own."""
     if not answers or info.source == "panoptic_map":

@@ -75,7 +75,8 @@ class Finder:
         """Return places, the likeliest first, of which no two are one."""
         fits_of_text = self.fits(text)
         return [
-            self._found(fits_of_text, region) for region in ranked(self.info, self.index, fits_of_text.probabilities)
+            self._result_of(fits_of_text, region)
+            for region in ranked(self.info, self.index, fits_of_text.probabilities)
         ]
 
     def find_related(self, relation: tuple[str, str, str], graph: ContactGraphFile) -> list[Found]:
@@ -91,7 +92,7 @@ class Finder:
                 if chance > best.get(number[a], (0.0, 0))[0]:
                     best[number[a]] = (chance, b)
         order = sorted(best, key=lambda region: (-best[region][0], region))[:MOST_ANSWERS]
-        return [replace(self._found(first, k), probability=best[k][0], other=best[k][1]) for k in order]
+        return [replace(self._result_of(first, k), probability=best[k][0], other=best[k][1]) for k in order]
 
     def place(self, region: int) -> np.ndarray:
         """Return (3,) where an answer points [m]: of the Gaussians of a piece the one nearest their median, as the
@@ -101,7 +102,7 @@ class Finder:
             return np.array(self.info.regions[region].box.center)
         return points[int(np.linalg.norm(points - np.median(points, axis=0), axis=1).argmin())]
 
-    def _found(self, fits_of_text: Fits, region: int) -> Found:
+    def _result_of(self, fits_of_text: Fits, region: int) -> Found:
         field, size = None, None
         if fits_of_text.field is not None and fits_of_text.sizes is not None:
             field = float(np.clip(fits_of_text.field[region], 0, 1))

@@ -40,18 +40,18 @@ class ServiceEncoder:
         batches = [np.zeros((0, self.width), np.float32)]
         for start in range(0, len(crops), BATCH):
             part = [base64.b64encode(_png(crop)).decode() for crop in crops[start : start + BATCH]]
-            batches.append(self._asked({"pictures": part}, len(part)))
+            batches.append(self._request_vectors({"pictures": part}, len(part)))
         return np.concatenate(batches)
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
         """Return (M, width) float32 unit vectors of texts."""
-        return self._asked({"texts": list(texts)}, len(texts))
+        return self._request_vectors({"texts": list(texts)}, len(texts))
 
     def unread(self, text: str) -> tuple[str, ...]:
         """Return nothing: what a service has read is not known."""
         return ()
 
-    def _asked(self, body: dict[str, Any], count: int) -> np.ndarray:
+    def _request_vectors(self, body: dict[str, Any], count: int) -> np.ndarray:
         answer = self._connection.post("/encode", json.dumps(body).encode(), "application/json")
         try:
             rows = np.array(self._document(answer.body).get("vectors"), np.float32)

@@ -214,7 +214,7 @@ def align(
             if np.abs(step[:6]).max() < SMALLEST_STEP:
                 break
     matrix, _, sums = _normal_equations(target.levels[0], source.levels[0], motion, gain, bias, 0, use_color)
-    return _described(motion, matrix, sums)
+    return _summarise(motion, matrix, sums)
 
 
 def judge(target: Pyramid, source: Pyramid, target_from_source: np.ndarray, level: int = 0) -> Alignment:
@@ -223,7 +223,7 @@ def judge(target: Pyramid, source: Pyramid, target_from_source: np.ndarray, leve
     matrix, _, sums = _normal_equations(
         target.levels[number], source.levels[number], np.asarray(target_from_source, dtype=float), 1, 0, number, False
     )
-    return _described(np.asarray(target_from_source, dtype=float), matrix, sums)
+    return _summarise(np.asarray(target_from_source, dtype=float), matrix, sums)
 
 
 def _normal_equations(
@@ -246,7 +246,7 @@ def _damping(matrix: np.ndarray) -> np.ndarray:
     return np.diag(diagonal)
 
 
-def _described(motion: np.ndarray, matrix: np.ndarray, sums: np.ndarray) -> Alignment:
+def _summarise(motion: np.ndarray, matrix: np.ndarray, sums: np.ndarray) -> Alignment:
     samples, on_surface, floating, _, planes, plane_squares, colors, color_squares = sums
     motion_part, mixed, exposure = matrix[:6, :6], matrix[:6, 6:], matrix[6:, 6:]
     # What the unknown exposure takes from the motion's certainty (Schur complement).

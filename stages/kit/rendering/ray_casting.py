@@ -185,10 +185,10 @@ class SceneRenderer:
             color = color * np.float32(lamp.area / 6.0)
             blocked = np.zeros(len(light), dtype=np.bool_)
         else:
-            blocked = self._blocked(hits, point)
+            blocked = self._shadow_mask(hits, point)
         shading.add_light(light, highlight, hits, self._surfaces(), blocked, point, color, self.light_map is None)
 
-    def _blocked(self, hits: Hits, point: np.ndarray) -> np.ndarray:
+    def _shadow_mask(self, hits: Hits, point: np.ndarray) -> np.ndarray:
         if not self.shadows:
             return np.zeros(len(hits.t), dtype=np.bool_)
         t = np.where(hits.primitive != shading.MISS, hits.t, 0.0)[:, None]

@@ -152,7 +152,7 @@ class Connection:
         timer: threading.Timer | None = None
         reused = self._open is not None
         try:
-            connection = self._connected()
+            connection = self._connect()
             timer = threading.Timer(self._timeout, _cut, (connection, late))
             timer.daemon = True
             timer.start()
@@ -186,7 +186,7 @@ class Connection:
         if response.status in RETRIED:
             raise TryAgain(
                 f"status {response.status} ({excerpt})",
-                self._asked_wait(response.getheader("Retry-After", "")),
+                self._parse_retry_after(response.getheader("Retry-After", "")),
                 response.status,
             )
         if response.status != 200:
@@ -198,7 +198,7 @@ class Connection:
             )
         return Answer(data, self.hide(response.getheader("Content-Type", "")))
 
-    def _asked_wait(self, text: str) -> float:
+    def _parse_retry_after(self, text: str) -> float:
         """Return the seconds of a Retry-After header, which holds a number or a date (RFC 9110, 10.2.3); else 0."""
         if text.isascii() and text.isdigit():
             return float(text[:9])
@@ -218,7 +218,7 @@ class Connection:
             raise http.client.IncompleteRead(data, length - len(data))
         return data
 
-    def _connected(self) -> http.client.HTTPConnection:
+    def _connect(self) -> http.client.HTTPConnection:
         if self._open is None:
             assert self._parts.hostname is not None
             kind = http.client.HTTPSConnection if self._parts.scheme == "https" else http.client.HTTPConnection

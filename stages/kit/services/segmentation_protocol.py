@@ -191,9 +191,9 @@ def parse_request(body: bytes, content_type: str, *, most_pixels: int = LARGEST_
         _refuse("the part `request` is malformed (frame, seed or world_from_camera)")
     color = depth = None
     if "color" in content_of:
-        color = _decoded("color", content_of["color"], camera, foxglove.decode_color)
+        color = _decode("color", content_of["color"], camera, foxglove.decode_color)
     if "depth" in content_of:
-        depth = _decoded("depth", content_of["depth"], camera, _millimetres)
+        depth = _decode("depth", content_of["depth"], camera, _millimetres)
         if description.get("depth_unit_m") != 0.001:
             _refuse("depth_unit_m is not 0.001")
         depth = foxglove.millimetres_to_depth(depth)
@@ -290,7 +290,7 @@ def _millimetres(data: bytes) -> np.ndarray | None:
     return image if image is not None and image.ndim == 2 and image.dtype == np.uint16 else None
 
 
-def _decoded(name: str, data: bytes, camera: Camera, decode: Any) -> np.ndarray:
+def _decode(name: str, data: bytes, camera: Camera, decode: Any) -> np.ndarray:
     if not may_be_decoded(data):
         _refuse(f"the part `{name}` is no image, or declares more pixels than it holds")
     if image_size(data) != (camera.width, camera.height):

@@ -82,13 +82,13 @@ def find_landmarks(task: Relaxed) -> Landmarks:
             if other_atom in row_of:
                 needed[k, row_of[other_atom]] = True
     goal = np.isin(atoms, task.goal)
-    before = needed | _reasonable(task, atoms, needed, goal, achievers)
+    before = needed | _reasonable_orders(task, atoms, needed, goal, achievers)
     initial = task.initial[atoms].astype(bool)
     first = initial & ~before.any(axis=1)
     return Landmarks(atoms, before, needed, goal, first)
 
 
-def _reasonable(
+def _reasonable_orders(
     task: Relaxed, atoms: np.ndarray, needed: np.ndarray, goal: np.ndarray, achievers: list[list[int]]
 ) -> np.ndarray:
     """Return orders [k, m] of goals: m had better come before k, as k in place destroys what m needs.

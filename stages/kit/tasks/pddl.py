@@ -17,7 +17,7 @@ Literals = tuple[tuple[Atom, ...], tuple[Atom, ...]]
 """Positive atoms and negated ones."""
 
 
-def _typed(pairs: list[tuple[str, str]], types: bool = True) -> str:
+def _typed_list(pairs: list[tuple[str, str]], types: bool = True) -> str:
     # Every name gets its type: a bare one before `b - kind` would read back as a kind.
     if not types:
         return " ".join(name for name, _ in pairs)
@@ -35,16 +35,18 @@ def domain_text(domain: Domain) -> str:
     requirements = [word for word, needed in zip(REQUIREMENTS, used_features, strict=True) if needed]
     lines = [f"(define (domain {domain.name})", f"  (:requirements {' '.join(requirements)})"]
     if domain.types:
-        lines.append(f"  (:types {_typed(list(domain.types.items()))})")
+        lines.append(f"  (:types {_typed_list(list(domain.types.items()))})")
     lines.append("  (:predicates")
     for name, kinds in domain.predicates.items():
-        arguments = _typed([(f"?{chr(97 + number)}", kind) for number, kind in enumerate(kinds)], bool(domain.types))
+        arguments = _typed_list(
+            [(f"?{chr(97 + number)}", kind) for number, kind in enumerate(kinds)], bool(domain.types)
+        )
         lines.append(f"    ({name} {arguments})" if arguments else f"    ({name})")
     lines.append("  )")
     for schema in domain.schemas:
         lines += [
             f"  (:action {schema.name}",
-            f"    :parameters ({_typed(list(schema.parameters), bool(domain.types))})",
+            f"    :parameters ({_typed_list(list(schema.parameters), bool(domain.types))})",
             f"    :precondition {_conjunction(list(schema.preconditions), list(schema.negative))}",
             f"    :effect {_conjunction(list(schema.add), list(schema.delete))})",
         ]
@@ -56,7 +58,7 @@ def problem_text(problem: Problem, domain_name: str) -> str:
     initial = "\n".join(f"    ({' '.join(atom)})" for atom in sorted(problem.initial))
     return (
         f"(define (problem {problem.name})\n  (:domain {domain_name})\n"
-        f"  (:objects {_typed(sorted(problem.objects.items()), any(problem.objects.values()))})\n"
+        f"  (:objects {_typed_list(sorted(problem.objects.items()), any(problem.objects.values()))})\n"
         f"  (:init\n{initial})\n"
         f"  (:goal {_conjunction(sorted(problem.goal), sorted(problem.negative_goal))}))\n"
     )
@@ -133,7 +135,7 @@ def parse_domain(text: str) -> Domain:
         if predicate in predicates:
             raise refuse(f"predicate {predicate} is declared twice")
         kinds = [kind for _, kind in typed_names(listed[1:], f"predicate {predicate}")]
-        predicates[predicate] = tuple(_known_type(kind, types, f"predicate {predicate}") for kind in kinds)
+        predicates[predicate] = tuple(_check_type(kind, types, f"predicate {predicate}") for kind in kinds)
     schemas = tuple(_schema(part, types, predicates) for part in actions)
     for schema in schemas:
         if sum(each.name == schema.name for each in schemas) > 1:
@@ -152,7 +154,7 @@ def _check_ancestors(kind: str, types: dict[str, str]) -> None:
         passed.add(kind)
 
 
-def _known_type(kind: str, types: dict[str, str], subject: str) -> str:
+def _check_type(kind: str, types: dict[str, str], subject: str) -> str:
     if kind and kind not in types:
         raise refuse(f"{subject}: type {kind!r} is not declared")
     return kind
@@ -169,7 +171,7 @@ def _schema(part: list[Expression], types: dict[str, str], predicates: dict[str,
     for unknown in set(fields) - {":parameters", ":precondition", ":effect"}:
         raise refuse(f"{subject}: field {unknown} is not read")
     parameters = tuple(
-        (variable, _known_type(kind, types, subject))
+        (variable, _check_type(kind, types, subject))
         for variable, kind in typed_names(entries(fields.get(":parameters", []), f"{subject}: parameters"), subject)
     )
     for variable, _ in parameters:
@@ -214,7 +216,7 @@ def parse_problem(text: str, domain: Domain | None = None) -> Problem:
 def check_problem(domain: Domain, problem: Problem) -> None:
     """Raises BadInput when a problem names types, predicates or objects that there are not, or of a wrong type."""
     for name, kind in problem.objects.items():
-        _known_type(kind, domain.types, f"object {name}")
+        _check_type(kind, domain.types, f"object {name}")
     for atom in sorted(problem.initial | problem.goal | problem.negative_goal):
         _check_atom(atom, domain.predicates, "the problem")
         for term, kind in zip(atom[1:], domain.predicates[atom[0]], strict=True):

@@ -28,7 +28,7 @@ def told_front(parts: Sequence[Part], class_name: str) -> tuple[Direction, str] 
         vertices = np.concatenate([surface.vertices for surface in part.surfaces])
         least, most = vertices.min(axis=0), vertices.max(axis=0)
         weight = float(np.linalg.norm(most - least))
-        out = _drawn_out(part, most - least)
+        out = _drawer_direction(part, most - least)
         total += weight * (((0.5 * (least + most) - middle) / half)[:2] if out is None else out)
     weights = sum(
         float(np.linalg.norm(np.ptp(np.concatenate([s.vertices for s in p.surfaces]), axis=0))) for p in parts[1:]
@@ -48,7 +48,7 @@ def told_front(parts: Sequence[Part], class_name: str) -> tuple[Direction, str] 
     return None
 
 
-def _drawn_out(part: Part, size: np.ndarray) -> np.ndarray | None:
+def _drawer_direction(part: Part, size: np.ndarray) -> np.ndarray | None:
     """Return the horizontal direction (2,) in which a drawer of this size (3,) comes out; None for other parts.
 
     A sliding door slides too, but it is thin across its way.

@@ -57,7 +57,7 @@ def grouped(source: SourceModel) -> tuple[list[Group], list[str]]:
         name, head, root_from_link = waiting.pop(0)
         for joint in children.get(name, []):
             pose = root_from_link @ joint.parent_from_child
-            own_joint = _kept(joint, findings)
+            own_joint = _moving_joint(joint, findings)
             if own_joint is not None and head != roots[0]:
                 findings.append(f"joint {joint.name!r:.40} moves on a part that moves: held fast")
                 own_joint = None
@@ -75,7 +75,7 @@ def grouped(source: SourceModel) -> tuple[list[Group], list[str]]:
     return groups, findings
 
 
-def _kept(joint: SourceJoint, findings: list[str]) -> SourceJoint | None:
+def _moving_joint(joint: SourceJoint, findings: list[str]) -> SourceJoint | None:
     """Return the joint as one that moves, or None for one that does not."""
     if joint.kind in ("fixed", "floating"):
         return None

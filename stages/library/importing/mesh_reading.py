@@ -261,7 +261,7 @@ def _read_gltf(folder: SourceFolder, path: Path) -> MeshContent:
     data = folder.read(path)
     findings: list[str] = []
     if path.suffix.lower() == ".gltf":
-        data, findings = _packed(folder, path, data)
+        data, findings = _pack(folder, path, data)
     elif gltf_pixels(data, str(path), hint=HINT) > MOST_PIXELS:
         data = _without_pictures(data)
         findings.append(f"{path.name}: its pictures are too large, colours are those of the materials")
@@ -270,7 +270,7 @@ def _read_gltf(folder: SourceFolder, path: Path) -> MeshContent:
     return MeshContent(surfaces, Declared(1.0, "format"), Declared(Y_UP, "format"), tuple(findings))
 
 
-def _packed(folder: SourceFolder, path: Path, data: bytes) -> tuple[bytes, list[str]]:
+def _pack(folder: SourceFolder, path: Path, data: bytes) -> tuple[bytes, list[str]]:
     """Return a .gltf with its buffers as one GLB, pictures left out, and what has to be said about it."""
     findings: list[str] = []
     try:

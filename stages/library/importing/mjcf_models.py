@@ -81,7 +81,7 @@ class _Reader:
         root = folder.read_xml(path)
         if root.tag != "mujoco":
             raise BadInput(f"{path}: root element is <{root.tag}>, expected <mujoco>")
-        self.root = self._expanded(root, path, 0, 0)
+        self.root = self._expand(root, path, 0, 0)
         self.compiler: Attributes = {}
         for element in self.root.iter("compiler"):
             self.compiler.update(element.attrib)
@@ -99,7 +99,7 @@ class _Reader:
     def _asset_name(self, element: ElementTree.Element) -> str:
         return element.get("name") or Path(element.get("file", "").replace("\\", "/")).stem
 
-    def _expanded(self, element: ElementTree.Element, path: Path, depth: int, level: int) -> ElementTree.Element:
+    def _expand(self, element: ElementTree.Element, path: Path, depth: int, level: int) -> ElementTree.Element:
         """Return the element, `level` elements and `depth` files down, with what its <include>s name in their place."""
         self.elements += 1
         if self.elements > MOST_ELEMENTS or level > DEEPEST_ELEMENTS:
@@ -111,7 +111,7 @@ class _Reader:
         children: list[ElementTree.Element] = []
         for child in element:
             if child.tag != "include":
-                children.append(self._expanded(child, path, depth, level + 1))
+                children.append(self._expand(child, path, depth, level + 1))
                 continue
             self.included += 1
             name = child.get("file", "")
@@ -122,12 +122,12 @@ class _Reader:
                 raise BadInput(f"{path}: includes are nested too deeply, or in a circle")
             if ".." in Path(name).parts:
                 self.findings.append("files are named elsewhere; those of the same path in the folder were taken")
-            children.extend(self._expanded(self._included(file), file, depth + 1, level))
+            children.extend(self._expand(self._parse_included(file), file, depth + 1, level))
         copy = ElementTree.Element(element.tag, dict(element.attrib))
         copy.extend(children)
         return copy
 
-    def _included(self, path: Path) -> ElementTree.Element:
+    def _parse_included(self, path: Path) -> ElementTree.Element:
         if path not in self.parsed:
             self.parsed[path] = self.folder.read_xml(path)
             if sum(1 for root in self.parsed.values() for _ in root.iter()) > 2 * MOST_ELEMENTS:

@@ -277,14 +277,14 @@ def decomposed(mesh: Mesh) -> list[np.ndarray]:
     settings = repr((sorted(COACD_SETTINGS.items()), coacd_version(), vertices.shape, faces.shape)).encode()
     key = hashlib.sha256(settings + vertices.tobytes() + faces.tobytes()).hexdigest()
     path = cache_folder() / f"{key}.npz"
-    hulls = _cached(path)
+    hulls = _read_cached(path)
     if hulls is None:
         import coacd
 
         coacd.set_log_level("error")
         decomposition = coacd.run_coacd(coacd.Mesh(vertices, faces), **COACD_SETTINGS)
         hulls = [np.asarray(points, dtype=np.float64) for points, _ in decomposition]
-        _keep(path, hulls)
+        _write_cached(path, hulls)
     return hulls
 
 
@@ -293,7 +293,7 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "scenewright" / "decompositions"
 
 
-def _cached(path: Path) -> list[np.ndarray] | None:
+def _read_cached(path: Path) -> list[np.ndarray] | None:
     if not path.is_file():
         return None
     with suppress(BadInput):  # a damaged file of the cache is made again
@@ -303,7 +303,7 @@ def _cached(path: Path) -> list[np.ndarray] | None:
     return None
 
 
-def _keep(path: Path, hulls: list[np.ndarray]) -> None:
+def _write_cached(path: Path, hulls: list[np.ndarray]) -> None:
     buffer = io.BytesIO()
     np.savez(buffer, points=np.concatenate(hulls), sizes=np.array([len(part) for part in hulls]))
     partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}")

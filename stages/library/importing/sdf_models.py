@@ -69,7 +69,7 @@ class _Reader:
         if self.element.find("model") is not None or self.element.find("include") is not None:
             self.findings.append("models inside the model are left out")
         for link in self.element.findall("link"):
-            self.poses[link.get("name", "")] = self._placed(link)
+            self.poses[link.get("name", "")] = self._pose_of_link(link)
         links = tuple(self._link(link) for link in self.element.findall("link"))
         if not links:
             raise BadInput(f"{self.path}: model {name!r:.60} has no links")
@@ -102,7 +102,7 @@ class _Reader:
         angles = np.radians(values[3:]) if pose.get("degrees") == "true" else values[3:]
         return transform_from(Rotation.from_euler("xyz", angles).as_matrix(), values[:3])
 
-    def _placed(self, link: ElementTree.Element) -> np.ndarray:
+    def _pose_of_link(self, link: ElementTree.Element) -> np.ndarray:
         where = f"{self.path}: link {link.get('name', '')!r:.60}"
         pose, element = self._pose(link, where), link.find("pose")
         base = "" if element is None else element.get("relative_to", "")

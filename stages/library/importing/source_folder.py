@@ -46,10 +46,10 @@ class SourceFolder:
 
     def files(self) -> list[Path]:
         """Return the files, sorted by path; hidden ones and links out of the folder are left out. Raises BadInput."""
-        real_files = [path for path in self._listed() if path.is_file() and self._inside(path)]
+        real_files = [path for path in self._walk() if path.is_file() and self._inside(path)]
         return sorted(real_files, key=lambda p: p.relative_to(self.root).as_posix())
 
-    def _listed(self) -> Iterator[Path]:
+    def _walk(self) -> Iterator[Path]:
         waiting, folders, files = [str(self.root)], 0, 0
         while waiting:
             try:
@@ -98,10 +98,10 @@ class SourceFolder:
         if len(self._found) > MOST_KEPT_NAMES:
             self._found.clear()
         if (name, bases) not in self._found:
-            self._found[name, bases] = self._searched(name, bases)
+            self._found[name, bases] = self._search(name, bases)
         return self._found[name, bases]
 
-    def _searched(self, name: str, bases: tuple[Path, ...]) -> Path | None:
+    def _search(self, name: str, bases: tuple[Path, ...]) -> Path | None:
         plain = SCHEME.sub("", name.strip().replace("\\", "/"))
         if not plain:
             return None

@@ -74,9 +74,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     refuse_exr((path.name for path in depths if path), str(root))
     has_depth = depth_words is not None
     has_color = not has_depth or any(path.is_file() for path in colors)
-    recorded, notes_of_options = _recorded(model, images, colors, depths, parameters)
+    recorded, notes_of_options = _recorded_cameras(model, images, colors, depths, parameters)
     groups, group_notes = grouped(recorded, [str(image.camera) for image in images])
-    unregistered = _unregistered(image_folder, colors)
+    unregistered = _unregistered_images(image_folder, colors)
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(root))
     units, unit_note = depth_units(parameters, 1.0 if depth_words == DENSE_MAPS else 1000.0)
@@ -171,7 +171,7 @@ def _largest_model(root: Path, parameters: IngestParameters) -> tuple[SparseMode
 def _depths(root: Path, images: list[ModelImage]) -> tuple[list[Path | None], str | None]:
     """Return the depth of each image, and the folder it is from (None: there is none)."""
     if (root / "depth").is_dir():
-        paths = [_named_like(root / "depth", image.name, root) for image in images]
+        paths = [_find_file_like(root / "depth", image.name, root) for image in images]
         return paths, "depth" if any(paths) else None
     dense_maps: list[Path | None] = []
     for image in images:
@@ -180,14 +180,14 @@ def _depths(root: Path, images: list[ModelImage]) -> tuple[list[Path | None], st
     return dense_maps, DENSE_MAPS if any(dense_maps) else None
 
 
-def _named_like(folder: Path, name: str, root: Path) -> Path | None:
+def _find_file_like(folder: Path, name: str, root: Path) -> Path | None:
     stem = name.rsplit(".", 1)[0] if "." in Path(name).name else name
     endings = (*DEPTH_SUFFIXES, ".npy", ".exr")
     candidates = (named_file(folder, stem + ending, str(root)) for ending in endings)
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _recorded(
+def _recorded_cameras(
     model: SparseModel,
     images: list[ModelImage],
     colors: list[Path],
@@ -226,7 +226,7 @@ def _camera(camera: ModelCamera, where: str) -> RecordedCamera:
     return RecordedCamera(pinhole(numbers, camera.size, where), PINHOLE if lens.is_pinhole else lens)
 
 
-def _unregistered(folder: Path, registered: list[Path]) -> list[Path]:
+def _unregistered_images(folder: Path, registered: list[Path]) -> list[Path]:
     in_model = set(registered)
     images = (path for path in folder.rglob("*") if path.suffix.lower() in COLOR_SUFFIXES and path.is_file())
     return [path for path in images if path not in in_model] if folder.name in IMAGE_FOLDERS else []

@@ -167,7 +167,7 @@ def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_righ
         matrix = calibration.left.K
         fx, _, cx, _, fy, cy, *_ = matrix
         return _Eyes(Lens(Camera.of_outside(root, width=0, height=0, fx=fx, fy=fy, cx=cx, cy=cy), (0, 0)))
-    sized = [_sized(each, width, height) for each in (calibration.left, calibration.right) if each is not None]
+    sized = [_with_size(each, width, height) for each in (calibration.left, calibration.right) if each is not None]
     if has_right and len(sized) < 2:
         raise BadInput(f"{root}: the calibration is of one camera, the images are pairs", hint=PAIR_HINT)
     if not (has_right or side_by_side):
@@ -195,7 +195,7 @@ def _is_double(record: CalibrationRecord, width: int, height: int) -> bool:
     return bool(record.K[2] < 0.4 * width and width > 1.9 * height)
 
 
-def _sized(record: CalibrationRecord, width: int, height: int) -> CalibrationRecord:
+def _with_size(record: CalibrationRecord, width: int, height: int) -> CalibrationRecord:
     """Return a calibration that states its size; one that does not is taken to be of the images."""
     return record if record.width else replace(record, width=width, height=height)
 
@@ -210,7 +210,7 @@ def _loader(
 
     def load() -> LoadedFrame:
         if eyes.side_by_side:
-            left, second = _halves(_decoded(color, "color"), eyes)
+            left, second = _halves(_decode(color, "color"), eyes)
             return LoadedFrame(left, _depth() if has_depth else None, right=second)
         return LoadedFrame(
             _picture(color, eyes.left, "color") if any(images.colors) else None,
@@ -250,13 +250,13 @@ def _halves(image: np.ndarray, eyes: _Eyes) -> tuple[np.ndarray, np.ndarray]:
 def _picture(path: Path | None, lens: Lens, stream_name: str) -> np.ndarray | bytes:
     """Return a file's picture without distortion; its own bytes where these can be kept."""
     if lens.maps is not None:
-        return lens.picture(_decoded(path, stream_name))
+        return lens.picture(_decode(path, stream_name))
     if path is None:
         raise Unusable(f"missing_{stream_name}")
     return usable_color(file_bytes(path, stream_name), lens.camera)
 
 
-def _decoded(path: Path | None, stream_name: str) -> np.ndarray:
+def _decode(path: Path | None, stream_name: str) -> np.ndarray:
     if path is None:
         raise Unusable(f"missing_{stream_name}")
     image = decode_color(file_bytes(path, stream_name))

@@ -28,7 +28,7 @@ class VideoFrames:
         """(width, height) of the frames."""
         if not 0 < width * height <= LARGEST_IMAGE:
             raise BadInput(f"{path}: declares frames of {width:g}x{height:g} pixels")
-        self.count = self._counted()
+        self.count = self._count_frames()
 
     def frame(self, index: int) -> np.ndarray:
         """Return frame `index` as (H, W, 3) uint8 RGB. Raises Unusable when it cannot be decoded."""
@@ -57,7 +57,7 @@ class VideoFrames:
             raise BadInput(f"{self.path}: is no video that can be read", hint="export its frames as images")
         return capture
 
-    def _counted(self) -> int:
+    def _count_frames(self) -> int:
         """Return the number of frames that can be decoded: what the file declares is often wrong."""
         count = 0
         while count < MOST_FRAMES and self._capture.grab():

@@ -103,7 +103,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if not default_unit > 0:
         raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
     units, unit_note = depth_units(parameters, 1 / default_unit)
-    recorded, notes_of_options = _recorded(frames, has_depth, parameters)
+    recorded, notes_of_options = _recorded_cameras(frames, has_depth, parameters)
     groups, group_notes = grouped(recorded, _labels(frames, recorded))
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(file)) if counts else ()
@@ -212,12 +212,12 @@ def _number(fields: dict[str, Any], name: str, where: str, default: float | None
     return float(value)
 
 
-def _recorded(
+def _recorded_cameras(
     frames: list[_Frame], has_depth: bool, parameters: IngestParameters
 ) -> tuple[list[RecordedCamera], tuple[str, ...]]:
     """Return each frame's camera at the size of its images. Sizes are looked up once for each kind of intrinsics."""
     alike: dict[_Stated, list[_Frame]] = {}
-    stated = [_stated(frame) for frame in frames]
+    stated = [_read_stated(frame) for frame in frames]
     for stated_camera, frame in zip(stated, frames, strict=True):
         alike.setdefault(stated_camera, []).append(frame)
     recorded: dict[_Stated, RecordedCamera] = {}
@@ -237,7 +237,7 @@ def _recorded(
     return [recorded[stated_camera] for stated_camera in stated], notes
 
 
-def _stated(frame: _Frame) -> _Stated:
+def _read_stated(frame: _Frame) -> _Stated:
     fields, where = frame.fields, frame.where
 
     def optional(name: str) -> float | None:

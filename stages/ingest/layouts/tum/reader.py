@@ -123,7 +123,7 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
     path = next((root / name for name in ASSOCIATIONS if (root / name).is_file()), None)
     if path is None or (root / COLOR_LIST).is_file():
         colors, depths = (
-            _read_list(root, name, unit) if (root / name).is_file() else _sorted([], [])
+            _read_list(root, name, unit) if (root / name).is_file() else _sort_by_time([], [])
             for name in (COLOR_LIST, DEPTH_LIST)
         )
         return colors, depths
@@ -137,7 +137,7 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
         for (stamps, paths), (stamp, name) in zip(columns, pairs, strict=True):
             stamps.append(round(exact_stamp(stamp, where) * unit))
             paths.append(named_file(root, name, where))
-    return _sorted(*columns[0]), _sorted(*columns[1])
+    return _sort_by_time(*columns[0]), _sort_by_time(*columns[1])
 
 
 def _read_list(root: Path, name: str, unit: float) -> _Stamped:
@@ -147,7 +147,7 @@ def _read_list(root: Path, name: str, unit: float) -> _Stamped:
             raise BadInput(f"{where}: expected a time stamp and a file name")
         stamps.append(round(exact_stamp(fields[0], where) * unit))
         paths.append(named_file(root, fields[1].strip(), where))
-    return _sorted(stamps, paths)
+    return _sort_by_time(stamps, paths)
 
 
 def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
@@ -160,7 +160,7 @@ def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
     ]
 
 
-def _sorted(stamps: list[int], paths: list[Path]) -> _Stamped:
+def _sort_by_time(stamps: list[int], paths: list[Path]) -> _Stamped:
     order = sorted(range(len(stamps)), key=lambda index: stamps[index])
     return _Stamped(np.array([stamps[i] for i in order], np.int64), tuple(paths[i] for i in order))
 

@@ -135,7 +135,7 @@ def _tile(
     in_tile: torch.Tensor,
     background: torch.Tensor,
 ) -> torch.Tensor:
-    """Return channels and alpha (h, w, C + 1) of pixels (h, w, 2), Gaussians `near` given from front to back."""
+    """Return channels and alpha (h, w, C + 1) of pixels (h, w, 2), Gaussians `in_tile` given from front to back."""
     offset = pixels[:, :, None, :] - flat.centers[in_tile]
     distance = torch.einsum("hwni,nij,hwnj->hwn", offset, conics[in_tile], offset)
     alpha = torch.clamp(flat.opacities[in_tile] * torch.exp(-0.5 * distance), max=rasterizer.LARGEST_ALPHA)
