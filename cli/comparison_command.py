@@ -11,7 +11,9 @@ import typer
 from scenewright.cli.output import out
 
 LISTED_FILES = 6
+"""Most changed files that are named unless all are asked for."""
 MEGABYTE = 1e6
+"""Bytes a megabyte."""
 
 
 def diff(

@@ -29,6 +29,7 @@ _BLANK = SegmentRequest(
     Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5),
     seed=0,
 )
+"""Empty request with which a backend is tried before it serves."""
 
 
 def open_server(

@@ -15,6 +15,7 @@ from scenewright.schemas.errors import MachineFailure, ScenewrightError
 from scenewright.schemas.plain_text import cleaned
 
 INTERRUPTED = 130
+"""Exit code of an interrupted command (docs/ARCHITECTURE.md, "Exit codes")."""
 
 
 class ReaderLeft(ScenewrightError):

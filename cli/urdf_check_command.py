@@ -10,6 +10,7 @@ import typer
 from scenewright.cli.output import out
 
 BAD_INPUT = 3
+"""Exit code of a broken file (docs/ARCHITECTURE.md, "Exit codes")."""
 
 
 def urdf_check(

@@ -12,8 +12,9 @@ Point = tuple[Coordinate, Coordinate]
 Label = Annotated[str, Field(min_length=1, max_length=80)]
 """A class, or what somebody wrote in its place: data, never an instruction."""
 MOST_ROOMS, MOST_FURNITURE, MOST_THINGS = 12, 60, 300
+"""Most rooms, furniture and things of an apartment; bounds, by eye."""
 LARGEST_SIDE = 30.0
-"""Of a whole apartment [m]."""
+"""Largest side of a whole apartment [m]."""
 
 
 class Room(Model):

@@ -11,6 +11,7 @@ from scenewright.schemas.outside import check_bounds
 
 MANIFEST_NAME = "manifest.json"
 FORMAT_VERSION = 1
+"""Version of the manifest's form."""
 LARGEST_MANIFEST = 64 * 2**20
 """A manifest over this size [bytes] is no manifest: 64 MiB list about 300,000 files."""
 
@@ -27,6 +28,7 @@ CONVENTIONS: dict[str, str] = {
 
 
 MOST_INPUTS = 1000
+"""Most inputs of an artifact; a bound, by eye."""
 LONGEST_PATH = 4096
 """Letters; no system opens longer ones."""
 

@@ -31,6 +31,7 @@ DEEPEST = 64
 MOST_VALUES = 5_000_000
 """Values of a document."""
 LARGEST_INTEGER = 2**63 - 1
+"""Largest integer of a file from outside: what 64 bits hold."""
 
 _MACHINE = (errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 _KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))

@@ -13,6 +13,7 @@ from scenewright.schemas.tableware_dishes import TablewareDishes
 
 TablewareKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
 MOST_ITEMS = 60
+"""Most items of a table; a bound, by eye."""
 
 
 class TablewareItem(Model):

@@ -12,8 +12,9 @@ from scenewright.stages.kit.open_words.vectors import read_vectors
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 FEWEST_LOOKS = 1
+"""Fewest looks of a region that is drawn."""
 MOST_BOXES = 300
-"""Of a splat's pieces, the largest."""
+"""Most boxes that are drawn of a splat's pieces, the largest."""
 
 
 def draw_language_map(language: LanguageMap, canvas: Canvas) -> None:

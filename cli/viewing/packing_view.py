@@ -25,7 +25,9 @@ PICTURES = ("layout", "attempts", "scene")
 PERIOD = 0.05
 """Time from one row of the trajectory to the next [s]; it has no times of its own."""
 BASKET_COLOR, BLOCK_COLOR = (0.85, 0.75, 0.55), (0.4, 0.4, 0.4)
+"""Colours of the basket and of blocks (sRGB, 0 to 1)."""
 START_COLOR, PACKED_COLOR = (0.6, 0.7, 0.85), (0.2, 0.55, 0.35)
+"""Colours of boxes at the start and packed (sRGB, 0 to 1)."""
 
 
 def draw_packing(packing: Packing, canvas: Canvas) -> None:

@@ -25,6 +25,7 @@ LOOKED_WITH = 96
 BEHIND = (0.1, 0.05)
 """A Gaussian is seen unless it lies farther behind what is shown than this [m], and this share of it."""
 RADII = (0.004, 0.03)
+"""Smallest and largest radius of a drawn Gaussian [m]; by eye."""
 
 
 def draw_splat(splat: Splat, canvas: Canvas) -> None:

@@ -17,17 +17,23 @@ from scenewright.stages.kit.viewing.canvas import Canvas
 from scenewright.stages.kit.viewing.meshes import draw_solid
 
 STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
+"""Colours of estimated needle, thread and tip, and of the truth (sRGB, 0 to 1)."""
 ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))
 """Right, left."""
 PAD = (0.12, 0.12, 0.004)
+"""Size of the pad [m]."""
 RIDGE = (0.005, 0.05, 0.005)
 """Half its width, half its length, its height [m]: half an ellipse across, as the simulator has it."""
 REMOTE_CENTRES = ((-0.12, 0.0, 0.15), (0.12, 0.0, 0.15))
-"""Of the right and the left arm [m]: every shaft goes through its own."""
+"""Remote centres of the right and the left arm [m]: every shaft goes through its own."""
 NEEDLE_RADIUS = 0.012
+"""Radius of the needle's arc in a trial [m]."""
 JAW = 0.0102
+"""Distance of the wrist from the tip of the jaws [m]."""
 WIRE, LINE = 0.0005, 0.0003
+"""Radii of the drawn needle and thread [m]."""
 ARC = np.linspace(0.0, np.pi, 40)
+"""Angles on a half circle, of the needle and the ridge [rad]."""
 
 
 def arc_points(pose: np.ndarray, radius: float) -> np.ndarray:

@@ -17,8 +17,9 @@ from scenewright.stages.kit.viewing.meshes import draw_solid
 TABLE = (0.78, 0.61, 0.03)
 """Extents of the table top [m]; its surface is at z = 0."""
 TABLE_COLOR = (0.84, 0.83, 0.8)
+"""Colour of the table (sRGB, 0 to 1)."""
 BIN_AT, BIN_PITCH, BIN_COLUMNS = (0.62, -0.4), 0.2, 5
-"""Where what came to the bin is shown: beside the table, in rows."""
+"""Where what came to the bin is shown [m]: beside the table, in rows."""
 
 
 def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:

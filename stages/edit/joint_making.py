@@ -31,6 +31,7 @@ from scipy.spatial import QhullError
 FINEST = 0.05
 """Triangles are cut to edges of this length before they are told apart [m]."""
 FEWEST_FACES = 8
+"""Fewest faces on either side of a cut; by eye."""
 THINNEST = 5e-3
 """A piece that is flatter is made a box of this thickness [m]."""
 BODY = "body"

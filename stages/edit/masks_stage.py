@@ -23,7 +23,7 @@ from scenewright.stages.kit.stage import Context
 
 LABEL = "masks drawn from a map"
 LARGEST_ID = 0xFFFFFF
-"""Of a panoptic picture."""
+"""Largest id of a panoptic picture: 24 bits."""
 
 
 def run(

@@ -23,6 +23,7 @@ from scenewright.stages.kit.geometry.planes import moved_planes
 from scenewright.stages.kit.geometry.transforms import apply, transform_from
 
 GREY = 128
+"""Grey value, of 255, of surfaces without a colour."""
 HINT = "run `cad` again"
 
 

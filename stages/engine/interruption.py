@@ -21,6 +21,7 @@ PARENT_VARIABLE = "SCENEWRIGHT_PARENT"
 SET_PARENT_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 REPEAT_SECONDS = 1.0
+"""Time after which an unheeded interruption is repeated [s]."""
 _requested = False
 _insists = False
 _waits = False

@@ -27,6 +27,7 @@ logger = logging.getLogger("scenewright")
 
 ENVIRONMENT = "SCENEWRIGHT_MODELS"
 PREFIX_LENGTH = 16
+"""Hexadecimal digits of a sha256 in the name of a cached file."""
 CACHED_NAME = re.compile(rf"(?P<prefix>[0-9a-f]{{{PREFIX_LENGTH}}})-(?P<name>[^/]+)")
 
 

@@ -19,6 +19,7 @@ from scenewright.stages.engine.reading import check_hashes, check_sizes, read_ma
 from scenewright.stages.kit.stage import Stage
 
 KEY_LENGTH = 16
+"""Hexadecimal digits of a key in the name of a shared artifact."""
 KEPT = 4
 """Entries of a step in a shared folder; the oldest go."""
 

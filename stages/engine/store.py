@@ -27,7 +27,9 @@ from scenewright.schemas.outside import file_content, json_of
 LARGEST_JOURNAL = 2**20
 """Bytes."""
 AT_FDCWD = -100
+"""Linux: paths are relative to the working directory (fcntl.h)."""
 RENAME_EXCHANGE = 2
+"""Linux: flag of renameat2 that lets two names change places (fs.h)."""
 TIMINGS_NAME = "timings.json"
 """The runner writes it into every artifact."""
 MOST_BY_ONE = 50

@@ -7,7 +7,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 STANDARD_GRAVITY = 9.80665
+"""Standard acceleration of free fall [m/s^2] (CGPM 1901)."""
 FEWEST_SAMPLES = 20
+"""Fewest samples with a pose from which up is taken; by eye."""
 TOLERANCE = 0.1
 """Relative deviation of the mean acceleration from gravity; more means motion, other units, or wrong poses."""
 

@@ -27,6 +27,7 @@ OPENCV_MODELS = (
 )
 """Names under which logs mean OpenCV's radial, tangential and thin prism coefficients, in OpenCV's order."""
 OPENCV_COUNTS = (4, 5, 8, 12, 14)
+"""Numbers of distortion coefficients that OpenCV's models have."""
 FISHEYE_MODELS = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4")
 SAME_RAY = 0.5
 """Pixels by which two cameras may differ anywhere in the image and still count as one."""

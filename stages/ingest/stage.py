@@ -27,7 +27,9 @@ from scenewright.stages.kit.stage import Context
 GRAVITY_FRAMES = 60
 """Frames whose depth is looked at to find the floor."""
 PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
+"""Median depth [m] outside of which the depth unit is doubted; by eye."""
 LARGE_STEP = 1.0
+"""Step of the camera between two frames [m] that is reported; by eye."""
 LIT_EVERY, DARK = 10, 8.0
 """Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
 StreamName = Literal["color", "depth", "right", "labels", "pose"]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 MEGABYTE, MEBIBYTE = 1e6, 2**20
+"""Bytes a megabyte and a mebibyte."""
 LOG_MEGABYTES_PER_MEGAPIXEL = 0.87
 """JPEG colour and zstd-packed 16-bit depth, as frames are stored; 0.84 to 0.88 on generated logs."""
 USUAL_FRAME = 0.3072

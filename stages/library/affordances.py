@@ -32,11 +32,15 @@ WALL_LEVEL = 0.3
 LEVELS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Shares of the free height at which a way out is looked for."""
 RIM_STEPS = 24
+"""Heights at which a rim is looked for."""
 ROUND_FILL = 0.88
 """A floor that fills less of its rectangle is round: its volume stands on the largest square within."""
 SIDEWAYS = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
+"""Horizontal unit directions in which a way out is looked for."""
 UP = np.array([0.0, 0, 1.0])
+"""Direction against gravity."""
 LIFT = 1e-3
+"""Distance by which samples are lifted off the surface that they lie on [m]."""
 
 
 @dataclass(frozen=True)

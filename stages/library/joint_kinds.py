@@ -13,7 +13,7 @@ KNOB_OFFSET = 0.3
 KNOB_REACH, LEVER_REACH = 0.25, 0.15
 """Largest reach from the axis of a knob and of a lever, as shares of the diagonal of the model."""
 LARGEST_REACH = 0.2
-"""And at most this [m]: the doors of a whole kitchen in one piece are no levers."""
+"""Longest reach of a lever [m]: the doors of a whole kitchen in one piece are no levers."""
 SLIDING_DOOR = 0.3
 """A sliding door is thinner across its way than this share of its length along it; a drawer is not."""
 PANEL_FLATNESS = 0.85

@@ -20,7 +20,9 @@ from scenewright.stages.report.surfaces import Model
 from scenewright.stages.report.views import Bounds, View, best_azimuth, direction_of, fitted_pose, page_camera
 
 ELEVATION = np.radians(28.0)
+"""Angle from which candidates are looked at over the horizontal [rad]; by eye."""
 QUALITY = 72
+"""JPEG quality of the pictures of candidates; by eye."""
 
 
 @dataclass(frozen=True)

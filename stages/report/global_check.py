@@ -15,9 +15,11 @@ from scenewright.stages.report.placed_models import ModelShelf
 from scenewright.stages.report.surfaces import Model, cad_model
 
 CONFLICT = (0.80, 0.08, 0.07)
+"""Colour of objects in conflict (sRGB, 0 to 1)."""
 CALM = 0.62
 """How far the colours of what collides with nothing go towards light grey."""
 NAMED_PAIRS = 6
+"""Most pairs of objects that a caption names."""
 
 
 @dataclass(frozen=True)

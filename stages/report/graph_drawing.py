@@ -17,8 +17,11 @@ from scenewright.stages.kit.drawing.tree_layout import tree_layout
 from scenewright.stages.kit.measurement.relation_evidence import evidence
 
 ROW = 30
+"""Height of a row [px]."""
 LETTER = 7.1
+"""Width of a letter in the boxes [px]; by eye."""
 GAP = 46
+"""Gap between the columns [px]."""
 
 
 @dataclass(frozen=True)

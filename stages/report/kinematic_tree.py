@@ -15,8 +15,9 @@ from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR, owner_o
 from scenewright.stages.report.graph_drawing import GAP, LETTER, ROW, DrawnEdge, DrawnNode, elbow
 
 GUTTER = 60
-"""Between the two trees [px]."""
+"""Gap between the two trees [px]."""
 TOP = 48
+"""Space for the headings over the trees [px]."""
 
 
 @dataclass(frozen=True)

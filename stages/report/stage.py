@@ -17,6 +17,7 @@ from scenewright.stages.report.parameters import STAGE, ReportParameters
 from scenewright.stages.report.section import all_sections
 
 MAXIMUM_BYTES = 15_000_000
+"""Largest report [bytes]; a larger one is refused."""
 
 
 def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | None) -> Report:

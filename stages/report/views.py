@@ -12,10 +12,13 @@ from scenewright.stages.kit.rendering.surfaces import TriangleSoup
 from scenewright.stages.report.surfaces import Model
 
 FIELD_OF_VIEW = np.radians(32.0)
+"""Opening angle of the views [rad]; by eye."""
 PLAN_FIELD_OF_VIEW = np.radians(8.0)
-"""From above: almost parallel rays, so that walls stay lines."""
+"""Opening angle of the plan from above [rad]: almost parallel rays, so that walls stay lines."""
 ELEVATION = np.radians(42.0)
+"""Angle of the views over the horizontal [rad]; by eye."""
 AZIMUTHS = 12
+"""Directions around a scene that are tried for its view; by eye."""
 SHELL = 0.25
 """Triangles this near to the bounds that look outward belong to the outside of the room [m]."""
 

@@ -29,7 +29,7 @@ DEPTH = 0.003
 """Things that lie no deeper in each other are left alone [m]: the settle test lets 5 mm pass, and Bullet pads every
 mesh by one."""
 TOUCHING = 0.001
-"""Of those that do, pieces may lie this deep in each other [m]."""
+"""Depth [m] by which pieces that touch may lie in each other."""
 CLEARANCE = 0.002
 """Room that is left around what was cut out [m]: the padding of both."""
 

@@ -20,9 +20,10 @@ from scenewright.stages.urdf.settle_report import free_bodies
 from scipy.spatial.transform import Rotation
 
 SECONDS = 3.0
+"""Simulated time in which bodies come to rest [s]; by eye."""
 PADDING, SMALLEST_MOVE, SMALLEST_TURN = 0.002, 0.0005, np.radians(0.5)
-"""Less is left alone [m], [rad]: Bullet pads the hulls of two meshes by 1 mm each, and lifts what stands on another by
-as much for every contact below it."""
+"""Smallest gap [m], move [m] and turn [rad] that count: Bullet pads the hulls of two meshes by 1 mm each, and lifts
+what stands on another by as much for every contact below it."""
 LARGEST_MOVE, LARGEST_TURN = 0.01, np.radians(5.0)
 """A body that goes further [m], [rad] was misplaced."""
 STILL = 0.005

@@ -18,9 +18,11 @@ from scenewright.stages.kit.open_words.options import EncoderParameters
 LEAST = 0.5
 """Probability of an answer, as `splat query` takes it unless it is told otherwise."""
 MOST = 10
+"""Most answers that are shown."""
 COLD = 0.5
 """Relevancy from which on a Gaussian is shown warm: what fits no better than the canonical phrases has none."""
 MOST_WARM = 40_000
+"""Most Gaussians that are shown warm; by eye."""
 
 
 class Asking:

@@ -25,6 +25,7 @@ from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas, ServedPa
 
 SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("editing.js", "asking.js"))
 EMPTY = EditsFile(format="scenewright-edits", version=1)
+"""What a desk without a file of edits applies."""
 
 
 class Stale(BadInput):

@@ -15,7 +15,7 @@ from scenewright.stages.engine.batch.results import SceneResult
 from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower
 
 REFRESH = 0.5
-"""Between two drawings of the table [s]."""
+"""Time between two drawings of the table [s]."""
 LONGEST_TABLE = 30
 """Rows of running scenes."""
 

@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 RESERVED = frozenset({"results.jsonl", "summary.csv", "summary.md", "summary.html", "slurm"})
 """What the batch itself writes into its folder."""
 _LONGEST = 100
+"""Longest name of a folder [bytes]; longer ones are cut and end in a digest."""
 _UNSAFE = re.compile(r"[^\w.+-]+")
 
 

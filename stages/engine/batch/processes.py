@@ -10,7 +10,7 @@ from contextlib import suppress
 import psutil
 
 _PAUSE = 0.02
-"""Between two looks at a group that is being ended [s]."""
+"""Time between two looks at a group that is being ended [s]."""
 
 
 def descendants(pid: int) -> list[int]:

@@ -7,14 +7,16 @@ import re
 _QUANTITY = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([A-Za-z]+)")
 _RANGE = re.compile(r"([0-9]+)\s*-\s*([0-9]+)")
 _SECONDS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
+"""Seconds a unit of time."""
 _BYTES = {"B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12} | {
     "KiB": 2**10,
     "MiB": 2**20,
     "GiB": 2**30,
     "TiB": 2**40,
 }
+"""Bytes a unit of size."""
 LARGEST_SEED_RANGE = 100_000
-"""More seeds than this is a typing error, not an experiment."""
+"""Most seeds of a range: more is a typing error, not an experiment."""
 
 
 def _parse(text: str, units: dict[str, int], example: str) -> float:

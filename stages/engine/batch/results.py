@@ -18,6 +18,7 @@ RESULTS_NAME = "results.jsonl"
 LARGEST_RESULTS = 2**30
 """Bytes: a million scenes."""
 FORMAT = 1
+"""Version of the lines of results.jsonl."""
 
 
 class SceneResult(Model):

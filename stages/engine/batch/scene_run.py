@@ -45,9 +45,9 @@ LAUNCHER = Path(__file__).with_name("launcher.py")
 PROCESS_NAME = ".batch-process.json"
 """Beside the log while a scene runs: who runs it, for the next batch to end it if this one is killed."""
 LONGEST_PAUSE = 0.05
-"""Between two looks at the process [s]."""
+"""Longest time between two looks at the process [s]."""
 SAMPLE_INTERVAL = 0.25
-"""Between two looks at its memory [s]."""
+"""Time between two looks at the process's memory [s]."""
 MEMORY_GRACE = 1.0
 """A scene over its memory limit endangers the others: it has this long to stop [s]."""
 

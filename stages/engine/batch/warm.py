@@ -22,8 +22,9 @@ from scenewright.stages.engine.batch.scene_run import LAUNCHER, run_scene, scene
 
 WORKER = "scenewright.stages.engine.batch.warm_worker"
 SECONDS_BETWEEN_LOOKS = 0.25
+"""Time between two looks at a waiting worker [s]."""
 PATIENCE = 5.0
-"""Beyond the grace of a scene, for a worker that is asked to stop [s]."""
+"""Time beyond the grace of a scene that a worker gets to stop when it is asked to [s]."""
 
 
 class _Died(Exception):

@@ -28,8 +28,10 @@ from scenewright.stages.kit.formats.trajectories import (
 FILES = ("pose.txt", "poses.txt", "groundtruth.txt", "trajectory.txt", "trajectory.tum", "traj.txt", "trajectory.log")
 FOLDERS = ("pose", "poses")
 WITHOUT_STAMP = (7, 12, 16)
+"""Numbers a row without a stamp: position and quaternion, 3 x 4, 4 x 4."""
 WHOLE_NUMBER = re.compile(r"[0-9]{1,18}")
 COLUMNS = (8, *WITHOUT_STAMP)
+"""Numbers a row that are read: with a stamp, as TUM writes them, or without."""
 Pose = tuple[np.ndarray | None, str | None]
 """world_from_camera (4, 4), or the reason why there is none."""
 

@@ -18,6 +18,7 @@ from scenewright.stages.ingest.stereo import stereo_lenses
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 SAME_PLACE = 1e-6
+"""Largest difference of two 4 x 4 motions that are called equal [m, 1]; rounding."""
 
 
 @dataclass(frozen=True)

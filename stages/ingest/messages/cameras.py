@@ -27,6 +27,7 @@ from scenewright.stages.ingest.stereo import is_pair
 ALMOST_ALL = 0.9
 """A topic with this share of another's images may stand in for it."""
 ENDLESS = 1 << 62
+"""Longest time over which a pose is carried [ns]: any, as only the fixed part of the tree is asked."""
 EVERY_CAMERA = "all"
 
 

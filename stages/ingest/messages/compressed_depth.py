@@ -21,6 +21,7 @@ from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_d
 _HEADER = struct.Struct("<iff")
 _RVL_SIZE = struct.Struct("<II")
 _TRUNCATED, _OVERRUN, _WRONG_VALUE = -1, -2, -3
+"""Codes that the compiled decoder returns in place of a count of words."""
 _RVL_FAULTS = {
     _TRUNCATED: "the RVL stream ends too early",
     _OVERRUN: "the RVL stream holds more pixels than its header says",

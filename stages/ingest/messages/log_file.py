@@ -9,6 +9,7 @@ from pathlib import Path
 from scenewright.schemas.errors import BadInput
 
 PIECE = 1 << 20
+"""Bytes that are read at a time for a checksum; by eye."""
 
 
 class Damaged(Exception):

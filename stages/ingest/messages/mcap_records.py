@@ -20,11 +20,15 @@ HEAD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 FOOTER_SIZE = 20
+"""Bytes of an MCAP footer without its record head (MCAP specification)."""
 DATA_END_SIZE = 4
+"""Bytes of an MCAP data-end record without its record head (MCAP specification)."""
 COMPRESSIONS = ("", "lz4", "zstd")
 _CHUNK = struct.Struct("<QQQI")
 _LONGEST_CHUNK_HEAD = _CHUNK.size + 4 + 64 + 8
+"""Bytes of a chunk's head with the longest name of a compression that is read."""
 _WINDOW = 4 << 20
+"""Bytes that are searched at a time for a chunk; by eye."""
 
 
 class _Fields:

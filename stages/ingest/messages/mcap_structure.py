@@ -40,7 +40,9 @@ MOST_DEFINITIONS = 256 << 20
 _PER_DEFINITION = 500
 """Bytes that a definition costs besides its own."""
 _INDEX_HEAD = 6
+"""Bytes of a message index before its entries: channel and length (MCAP specification)."""
 _INDEX_ENTRY = 16
+"""Bytes of an entry of a message index: time and offset (MCAP specification)."""
 _KNOWN = {int(code) for code in Opcode}
 _PARSED = {Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT}
 """Opcodes whose records prove in another way that they are what they say, or are too many to look at twice."""

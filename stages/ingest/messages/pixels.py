@@ -76,6 +76,7 @@ PICTURE = "a picture of depth or labels for people, without the values"
 GREY_OR_PALETTE = (b"\0", b"\3")
 """Colour types in the header of a PNG."""
 LARGEST_LABEL = 65535
+"""Largest label that is stored: labels are kept in 16 bits."""
 
 
 # --- what a topic's images are ---------------------------------------------------------------------------------

@@ -43,6 +43,7 @@ PRIMITIVES = {
 """Name in `.msg` or `.idl` -> code of the struct module."""
 TEXT = "string"
 SEQUENCE = -1
+"""Count of a field that is a sequence: any number of values."""
 EMPTY_STRUCT_MEMBER = "structure_needs_at_least_one_member"
 """The one byte that ROS 2 gives a struct without fields, as C has no empty structs; ROS 1 gives it none."""
 

@@ -27,6 +27,7 @@ MOST_VALUES = 250_000
 DEEPEST = 24
 """Levels of messages within messages."""
 _ENCAPSULATION = 4
+"""Bytes of the CDR encapsulation header (OMG DDSI-RTPS)."""
 _PADDING = 8
 """Bytes that a CDR message may be longer than its fields: writers round up."""
 

@@ -39,6 +39,7 @@ LARGEST_CHUNK = 1 << 30
 LARGEST_CONNECTION = 16 << 20
 """Bytes of one connection record that are accepted."""
 MOST_CONNECTIONS = 65_536
+"""Most connections of a bag; a bound against damaged files."""
 
 
 class Place(NamedTuple):

@@ -14,14 +14,18 @@ from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
+"""Values of `op` in a record's header (ROS bag format 2.0)."""
 COMPRESSIONS = (b"none", b"bz2", b"lz4")
 LARGEST_HEADER = 1 << 20
 """Bytes of a record's header that are accepted."""
 _USUAL_HEADER = 256
+"""Bytes that are read first of a record's header: most are no longer."""
 _LENGTH = struct.Struct("<I")
 _WINDOW = 4 << 20
+"""Bytes that are searched at a time for a chunk; by eye."""
 _CHUNK_START = re.compile(rb"[\x10-\x80]\0{3}[\x04-\x40]\0{3}(?:op=\x05|size=|compression=)", re.DOTALL)
 _LONGEST_HEADER = 0x80
+"""Longest header of a chunk that is searched for [bytes]; by eye."""
 _MARK = b"op=" + bytes([CHUNK])
 
 

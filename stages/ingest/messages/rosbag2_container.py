@@ -23,7 +23,9 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 GREATEST_RATIO = 100
 """Unpacked over packed bytes of a part that states no size; 64 MiB are always accepted."""
 GREATEST_STATED_RATIO = 1000
+"""Largest ratio of unpacked to packed size where the metadata states the packing; by eye."""
 ALWAYS_ACCEPTED = 64 << 20
+"""Bytes up to which a part is unpacked whatever its ratio; by eye."""
 MOST_OPEN = 8
 """Parts that are open at a time."""
 Part = McapMessages | SqliteMessages

@@ -23,13 +23,16 @@ from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"SQLite format 3\x00"
 _HEAD_SIZE = 100
+"""Bytes of the head of an SQLite file (SQLite file format)."""
 _MOST_STEPS = 4000
 """Millions of steps of SQLite's machine that opening may take; a sound bag of 10 million messages takes about 300."""
 _FAULTS = (sqlite3.Error, UnicodeDecodeError, MemoryError)
 """What Python makes of a damaged file; the second of an error message with a damaged name, the third of a row that
 claims more than is accepted."""
 _MOST_TOPICS = 65_536
+"""Most topics of a bag; a bound against damaged files."""
 _PAGE_SIZES = {1 << power for power in range(9, 17)}
+"""Page sizes that SQLite allows (SQLite file format)."""
 LARGEST_MESSAGE = 512 << 20
 """Bytes of one message that are accepted."""
 _JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"

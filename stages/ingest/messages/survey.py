@@ -32,6 +32,7 @@ IMU_STEP = 50_000_000
 SIZE_ATTEMPTS = 20
 """Compressed images of a topic that are decoded to learn their size."""
 MOST_REASONS = 20
+"""Most reasons a topic that are counted apart; the rest are "other reasons"."""
 LATEST = 1 << 62
 """Log times [ns] beyond this, in the year 2116, are damage and count as this."""
 STATIC = "tf_static"

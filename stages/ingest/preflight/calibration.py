@@ -12,6 +12,7 @@ CENTER_TOLERANCE = 0.15
 FIELD_OF_VIEW = (25.0, 130.0)
 """Horizontal, degrees: from a long lens to a wide one without distortion."""
 ASPECT = (0.8, 1.25)
+"""Focal lengths fx / fy between which pixels are plausible; by eye."""
 RESIZES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 1.5, 2.0, 3.0, 4.0)
 """Ratios of image sizes in which cameras are used."""
 

@@ -8,8 +8,9 @@ import numpy as np
 from markupsafe import Markup, escape
 
 WIDTH, WIDE = 560, 1040
-"""Of a drawing, and of one across the page [pixels]."""
+"""Width of a drawing, and of one across the page [px]."""
 LEFT, RIGHT, BOTTOM, TOP = 46, 10, 24, 8
+"""Margins of a drawing around its axes [px]."""
 
 
 def _number(value: float) -> str:

@@ -16,6 +16,7 @@ TYPICAL = (0.4, 6.0)
 FACTORS = (0.001, 0.1, 0.2, 1 / 6.5535, 5.0, 6.5535, 10.0, 1000.0)
 """What wrong units do to depth: metres, millimetres, 0.1 mm and the divisors 5000 and 6553.5, one for another."""
 LITTLE_VALID = 0.1
+"""Share of valid pixels below which depth is called scarce; by eye."""
 SATURATED = 0.2
 """Share of valid pixels at the largest value that suggests a cut-off."""
 COARSE_VALUES = 256
@@ -23,6 +24,7 @@ COARSE_VALUES = 256
 COARSE_STEP = 0.02
 """... and steps of at least this at that [m]."""
 HISTOGRAM_BINS = 48
+"""Bars of the depth histogram; by eye."""
 
 
 def depth_report(looks: Iterable[Look]) -> DepthReport | None:

@@ -15,14 +15,19 @@ from scenewright.stages.ingest.preflight.fits import Fit, as_fit, relative_pose
 from scenewright.stages.ingest.preflight.looking import Look
 
 FEATURES = 800
+"""Most SIFT features of a picture; by eye."""
 MOST_PAIRS, MOST_MATCHES = 12, 400
 """Matching is the dear part of the pre-flight: more of either changes no verdict."""
 ITERATIONS = 200
+"""Most iterations of the robust fit of the fundamental matrix; by eye."""
 MATCH_RATIO = 0.8
+"""Largest ratio of the best to the second best distance of descriptors (Lowe 2004)."""
 INLIER_DISTANCE = 1.5
 """Pixels from the epipolar line that a match may have to count as one."""
 LEAST_INLIERS = 30
+"""Fewest matches of a pair that is used; by eye."""
 TRUNCATION_PIXELS = 4.0
+"""Distance from the epipolar line at which the cost stops to grow [px]; by eye."""
 STILL_PIXELS = 1.5
 """Median shift of matches under which two pictures count as taken from the same place."""
 

@@ -18,7 +18,9 @@ JUMP_FACTOR = 12.0
 REPEATED = 0.2
 """Share of poses equal to the one before worth a warning."""
 LITTLE_OVERLAP = 0.5
+"""Shared view of neighbouring frames below which it is called little; by eye."""
 LISTED = 8
+"""Most jumps whose times are listed."""
 
 
 def motion_report(

@@ -10,11 +10,13 @@ from scenewright.stages.ingest.preflight.looking import Look
 from scenewright.stages.ingest.preflight.report import Finding, PictureReport, exact
 
 MEASURING_WIDTH = 320
+"""Width to which pictures are thinned before they are measured [px]."""
 RELATIVE_BLUR = 0.3
 """Sharpness under this share of the log's median is blur."""
 ABSOLUTE_BLUR = 12.0
 """Sharpness under this is blur, or a picture of nothing."""
 DARK, BRIGHT = 8, 247
+"""Grey values, of 255, beyond which a pixel is dark or bright; by eye."""
 LEAST_NEIGHBOURS = 8
 """Pairs of neighbours from which flicker and repetition are told."""
 SAME_PICTURE = 0.15

@@ -20,7 +20,9 @@ from scenewright.stages.ingest.preflight.report import Hypothesis, PoseReport, P
 SCALES = tuple(float(f"{10 ** (k / 3):.6g}") for k in range(-9, 10))
 """Scales of the translations that are searched: a factor 2.15 apart, which a fit is broad enough to bridge."""
 FOCAL_FACTORS = (0.5, 0.6, 0.7, 0.8, 0.87, 0.93, 1.07, 1.15, 1.25, 1.4, 1.65, 2.0)
+"""Factors of the focal length that are searched, closer around 1; by eye."""
 LAGS = (-5, -4, -3, -2, -1, 1, 2, 3, 4, 5)
+"""Lags between poses and pictures that are searched [frames]."""
 CLEARLY_BETTER = 0.75
 """Cost over another's cost from which one is better, ..."""
 MOST_PAIRS = 0.7
@@ -30,8 +32,9 @@ MOTION_RATIO = 0.8
 COMBINED_COST = 1.1
 """Two mistakes at once must explain more than one."""
 LEAST_PAIRS = 2
+"""Fewest pairs of frames with which poses are checked."""
 LEAST_OVERLAP = 0.25
-"""Of a pair that is called bad: less, and what is hidden decides."""
+"""Smallest overlap of a pair that may be called bad; with less, what is hidden decides."""
 
 
 class Pairs(Protocol):
@@ -70,7 +73,9 @@ class Measure:
 
 
 BY_DEPTH = Measure("depth", 0.03, 0.06, "%", 100.0, sees_scale=True, still=0.02)
+"""Residuals of depth as shares of depth: 3 % is good, 6 % is bad; by eye."""
 BY_FEATURES = Measure("epipolar", 2.0, 4.0, "pixels", 1.0, sees_scale=False, still=1.0)
+"""Residuals of features [px]: 2 is good, 4 is bad; by eye."""
 
 
 @dataclass(frozen=True)

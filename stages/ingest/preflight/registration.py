@@ -15,6 +15,7 @@ from scenewright.stages.ingest.preflight.looking import Look
 from scenewright.stages.ingest.preflight.report import Finding, RegistrationReport, exact, significant
 
 MEASURING_WIDTH = 320
+"""Width to which pictures are thinned before edges are compared [px]."""
 JUMP = 0.08
 """Relative depth difference of neighbouring pixels that is a jump."""
 GRADIENT_LIMIT = 6.0
@@ -22,6 +23,7 @@ GRADIENT_LIMIT = 6.0
 LEAST_EDGES = 80
 """Jump pixels a frame (at 320 pixels width) to say anything."""
 LARGEST_LAG = 5
+"""Largest lag between colour and depth that is searched [frames]."""
 LARGEST_OFFSET = 24
 """Pixels at 320 pixels width."""
 ALIGNED = 1.4
@@ -31,6 +33,7 @@ UNRELATED = 1.2
 LAG_RATIO = 1.1
 """Score of the best lag over that of none from which colour and depth are called shifted in time."""
 OFFSET_RATIO = 1.12
+"""Score of the best offset over that of none from which colour and depth are called shifted in the picture; by eye."""
 RELATED = 1.3
 """Score that another place must have to be claimed as the right one."""
 LEAST_OFFSET = 3

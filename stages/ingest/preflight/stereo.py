@@ -12,7 +12,9 @@ from scenewright.stages.ingest.preflight.looking import Look
 from scenewright.stages.ingest.preflight.report import Finding, StereoReport, significant
 
 FRAMES = 6
+"""Most frames whose two eyes are matched; by eye."""
 LEAST_MATCHES = 40
+"""Fewest matched features with which a stereo pair is checked; by eye."""
 ROW_ERROR = 1.5
 """Median distance of matched rows [pixels] over which a pair is not rectified."""
 

@@ -14,7 +14,7 @@ from scenewright.stages.ingest.preflight.reprojection import projected
 from scenewright.stages.kit.geometry.cameras import back_project
 
 WIDTH = 400
-"""Of a picture on the page [pixels]."""
+"""Width of a picture on the page [px]."""
 RESIDUAL_END = 0.1
 """Relative residual that is drawn in full colour."""
 

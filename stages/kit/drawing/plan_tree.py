@@ -12,7 +12,9 @@ CUT, UNMET, REACHED = "#b3261e", "#a86400", "#2e7d32"
 """Colours of an action without a motion, of a plan whose goal does not hold, of one that was carried through."""
 EDGE, BOX = "#90a0b0", "#eef2f6"
 MOST_BRANCHES, LONGEST_REASON = 28, 110
+"""Most plans that are drawn, and longest reason [characters]."""
 DOTS = 100
+"""Dots an inch of the figure."""
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ STYLE: Any = {
     "savefig.facecolor": "white",
     "legend.frameon": False,
 }
+"""Settings of matplotlib for all plots."""
 
 
 def save(figure: Figure, path: Path, dpi: int = 130) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 MOST_CHUNKS = 4
+"""Most chunks that are kept unpacked; by eye."""
 MOST_BYTES = 64 << 20
-"""Of all kept chunks together; the latest is kept whatever its size."""
+"""Most bytes of all kept chunks together; the latest is kept whatever its size."""
 
 
 class ChunkCache:

@@ -13,9 +13,11 @@ JPEG_BARE_MARKERS = frozenset({0x01, *range(0xD0, 0xD9)})
 """Markers without a length."""
 PNG_START = b"\x89PNG\r\n\x1a\n"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+"""Samples a pixel by colour type (PNG specification, 11.2.2)."""
 DEFLATE_LIMIT = 1032
 """Deflate never packs more than this many bytes into one."""
 TIFF_WIDTH, TIFF_HEIGHT = 256, 257
+"""Tags of an image's size (TIFF 6.0)."""
 PNM = re.compile(rb"P[1-6]((?:\s|#[^\n]*\n)+(\d{1,9}))((?:\s|#[^\n]*\n)+(\d{1,9}))(?=[\s#])")
 
 

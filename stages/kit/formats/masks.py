@@ -16,9 +16,11 @@ from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_d
 from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ID = (1 << 24) - 1
+"""Largest id of a panoptic picture: 24 bits."""
 REMAKE = "run `scenewright segment` again"
 PNG_BEGINNING = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"
 LARGEST_FILE = 4 * LARGEST_IMAGE
+"""Largest panoptic picture in the archive [bytes]; a bound."""
 FRAME_NAME = re.compile(r"(\d{6,9})\.png", re.ASCII)
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Every zip entry bears the earliest date the format knows, so that the same images give the same bytes."""

@@ -27,11 +27,14 @@ from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, image_si
 LARGEST_FILE = 4 * 2**30
 """Bytes."""
 LARGEST_HEADER = 64 * 2**10
+"""Bytes in which the end of a PLY or STL header is looked for; by eye."""
 MOST_TRIANGLES, MOST_VERTICES = 50_000_000, 150_000_000
-"""Of a mesh, where nothing else is asked for; those of a glTF count each time that a node shows them."""
+"""Most triangles and vertices of a mesh where nothing else is asked for; those of a glTF count each time that a node
+shows them."""
 MOST_GLTF_VALUES = 1_000_000
 """Numbers, texts, lists and objects of a glTF description."""
 MOST_NODES, DEEPEST_NODES = 5_000, 200
+"""Most nodes of a glTF, and their deepest nesting; bounds, by eye."""
 MOST_OVERLAP = 4
 """Bytes of the arrays of a GLB for one of the file."""
 LARGEST_TEXT_MESH = 128 * 2**20
@@ -39,7 +42,9 @@ LARGEST_TEXT_MESH = 128 * 2**20
 REMEMBERED_BYTES = 2**15
 """Files up to this size are parsed once."""
 _GLB_COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+"""Bytes a component by its type (glTF 2.0, 3.6.2.2)."""
 _GLB_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+"""Components an element by its type (glTF 2.0, 3.6.2.2)."""
 
 
 def read_mesh(path: Path, *, may_be_empty: bool = False, hint: str = "make the artifact again") -> trimesh.Trimesh:

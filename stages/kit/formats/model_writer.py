@@ -16,10 +16,11 @@ from scenewright.stages.kit.geometry.solids import MassProperties, Solid
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 HINGE_DAMPING, SLIDE_DAMPING = 0.3, 4.0
-"""[N m s/rad], [N s/m]: a door or drawer that is let go comes to rest within a second or two."""
+"""Damping [N m s/rad], [N s/m]: a door or drawer that is let go comes to rest within a second or two."""
 HINGE_FRICTION, SLIDE_FRICTION = 0.1, 1.0
-"""[N m], [N]."""
+"""Friction of joints [N m], [N]; by eye."""
 HINGE_EFFORT, SLIDE_EFFORT = 30.0, 60.0
+"""Largest effort of joints [N m], [N]; by eye."""
 
 
 class Faceted(Protocol):

@@ -36,7 +36,9 @@ from scenewright.stages.kit.geometry.transforms import (
 from scipy.spatial.transform import Rotation
 
 LAYOUT_DENSITY = 1000.0
+"""Density of floor, walls and ceiling [kg/m^3]; by eye."""
 GREY = (0.6, 0.6, 0.6, 1.0)
+"""Colour of links without one (RGBA, 0 to 1)."""
 URDF_MESHES = (".obj", ".stl")
 """What every loader of URDF reads; pybullet refuses a whole file that names a GLB."""
 

@@ -25,6 +25,7 @@ FEWEST_CORNERS = 4
 FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
 """What of furniture counts as its feet above the floor, and how thick they are made [m]."""
 PAD_THICKNESS = 0.02
+"""Thickness of the pad under a carried body [m]; by eye."""
 MARGIN = 0.01
 """Room around a carried thing that is levelled too [m]."""
 

@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 
 MINIMUM_THICKNESS = 0.01
+"""Smallest edge of a box [m]; by eye."""
 LEAST_MAXIMUM, BOXES_PER_AREA = 200, 100.0
 """Most boxes of a mesh: at least so many, and so many for each square metre."""
 MINIMUM_AREA_SHARE = 0.1

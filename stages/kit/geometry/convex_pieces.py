@@ -9,12 +9,15 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 MOST_PIECES = 8
+"""Most convex pieces of a mesh unless more are asked for; by eye."""
 GAIN = 0.12
 """A cut must save this share of the volume of the hull that it cuts."""
 PLACES = (0.15, 0.25, 0.35, 0.5, 0.65, 0.75, 0.85)
-"""Where cuts are tried, as shares of the extent along an axis."""
+"""Shares of the extent along an axis at which cuts are tried; by eye."""
 LEAST_TRIANGLES = 8
+"""Fewest triangles on either side of a cut; by eye."""
 MOST_TRIANGLES = 20_000
+"""Most triangles that cuts are judged by; larger meshes are thinned."""
 
 
 def convex_pieces(vertices: np.ndarray, faces: np.ndarray, most: int = MOST_PIECES) -> list[np.ndarray]:

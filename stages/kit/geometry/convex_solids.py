@@ -8,6 +8,7 @@ import fcl
 import numpy as np
 
 CONTACTS = 20
+"""Most contacts of two pieces that FCL returns."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Penetration:
 
 
 APART = Penetration(0.0, np.array([0.0, 0.0, 1.0]))
+"""Result for solids that do not meet."""
 
 
 def convex_solid(pieces: list[tuple[np.ndarray, np.ndarray]]) -> Solid:

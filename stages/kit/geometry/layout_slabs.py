@@ -18,11 +18,14 @@ from scenewright.stages.kit.geometry.boxes import box_corners, box_rotation
 from scenewright.stages.kit.geometry.transforms import transform_from, transform_from_quaternion
 
 FLOOR_THICKNESS = 0.2
+"""Thickness of the slab of a floor or ceiling [m]; by eye."""
 FLOOR_MARGIN = 0.5
 """How far the floor goes on beyond what was seen of it [m]."""
 WALL_THICKNESS = 0.1
+"""Thickness of the slab of a wall [m]; by eye."""
 THIN_LAYOUT = ("door", "window", "curtain")
 THIN_THICKNESS = 0.05
+"""Thickness of the slab of a door, window or curtain [m]; by eye."""
 MINIMUM_AREA = 0.2
 """Smaller upright surfaces get no slab [m^2]."""
 

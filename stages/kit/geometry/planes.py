@@ -16,8 +16,11 @@ UPWARD = 0.9
 SCREENING_POINTS = 2000
 """Hypotheses are scored on this many points first; only the best few are scored on all (LIBRARIES 3d)."""
 FINALISTS = 5
+"""Best hypotheses of the screening that are scored on all points; by eye."""
 REFITS = 2
+"""Refits of the best plane to its inliers; by eye."""
 BATCH = 64
+"""Planes that are scored at a time, which bounds the memory."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from scenewright.schemas.plan import Failure
 LONGEST_NAME = 200
 """Characters of a name that are said: as many as a scene's names may have; a model's own may be of any length."""
 MOST_CALLS = 200
+"""Most actions of a plan in a reply; a bound, by eye."""
 
 
 class ActionCall(Model):

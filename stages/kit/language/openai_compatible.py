@@ -23,11 +23,12 @@ LARGEST_BODY = 8 * 2**20
 LONGEST_WAIT = 120.0
 """Seconds that a server may ask to be left alone."""
 MOST_TOKENS = 10**9
-"""Of one exchange: a larger count is no count."""
+"""Most tokens of one exchange: a larger count is no count."""
 NOT_UNDERSTOOD = frozenset({400, 422})
+"""HTTP statuses of a request that a service does not understand."""
 STUMBLED = 500
-"""llama.cpp answers so when a reply that it holds to a schema is cut at the largest number of tokens. The same question
-is then asked in a lower form, that once, so that the cut reply comes back and the model is told."""
+"""HTTP status of llama.cpp when a reply that it holds to a schema is cut at the largest number of tokens. The same
+question is then asked in a lower form, that once, so that the cut reply comes back and the model is told."""
 REFUSED_HINT = "see docs/LANGUAGE.md: does --base-url end with /v1, is --model one that it serves, is the key set?"
 
 Form = Literal["json_schema", "json_object", "text"]

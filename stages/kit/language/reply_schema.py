@@ -18,6 +18,7 @@ M = TypeVar("M", bound=BaseModel)
 LONGEST_REASON = 400
 """Characters of what a reply got wrong, as it is said to the model and to people."""
 MOST_REASONS = 5
+"""Most reasons that the model is told at once."""
 
 
 class DoesNotFollow(Exception):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 RECALL_POINTS = np.linspace(0.0, 1.0, 11)
+"""Levels of recall at which precision is averaged (PASCAL VOC 2007)."""
 
 
 @dataclass(frozen=True)

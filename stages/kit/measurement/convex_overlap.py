@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 CELLS = 40
 """Cells along each axis of the grid on which shared space is counted."""
 SAME_DIRECTION = 1e-6
+"""Length of a cross product below which unit directions are called parallel; rounding."""
 
 
 @dataclass(frozen=True)

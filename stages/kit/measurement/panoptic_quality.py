@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 VOID = 0
+"""Label of points that no truth is known for."""
 MATCH_IOU = 0.5
+"""Smallest overlap of a match (Kirillov 2019): at more than one half, matches are unique."""
 
 
 @dataclass(frozen=True)

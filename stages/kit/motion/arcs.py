@@ -20,9 +20,13 @@ from scenewright.stages.kit.simulation.robot import Configuration, Robot, base_p
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 STANDOFF = 0.07
+"""Distance from the handle at which the approach begins [m]; by eye."""
 ARC_STEP = 0.05
+"""Step of a joint between two poses on its way [rad, m]; by eye."""
 SLOW = 0.3
+"""Share of the full speed at which the hand moves at and with the handle; by eye."""
 TILTS = (0.0, 0.5, -0.5, 0.9, -0.9, 1.2, -1.2)
+"""Tilts of the hand against the handle that are tried [rad], the straight one first; by eye."""
 
 
 class JointedModel(ArmModel, Protocol):

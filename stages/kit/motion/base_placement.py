@@ -16,6 +16,7 @@ from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 BASE_RESOLUTION = np.array([0.03, 0.03, 0.06])
+"""Steps at which a motion of the base is checked [m, m, rad]; by eye."""
 
 
 def sample_bases(

@@ -20,6 +20,7 @@ from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK
 from scenewright.stages.kit.simulation.world import Contact, PhysicsWorld
 
 _SCENE, _ROBOT, _CARRIED = 1, 2, 4
+"""Bits of Bullet's collision groups."""
 RESTING_DEPTH = 0.008
 """A carried item may sink this far into what it stands on: reconstructed surfaces are that uncertain."""
 

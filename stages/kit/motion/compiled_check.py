@@ -23,6 +23,7 @@ from scenewright.stages.kit.motion.compiled_arrays import (
 from scenewright.stages.kit.motion.convex_distance import Hull, convex_distance
 
 FREE, UNCERTAIN, HIT = 0, 1, 2
+"""Answers of a check: no collision, not certain, a collision."""
 UNSURE = 0.004
 """Refusals nearer than this [m] to being free are not certain."""
 

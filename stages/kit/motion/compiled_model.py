@@ -15,10 +15,11 @@ from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK, m
 from scenewright.stages.kit.simulation.world import LoadedBody, PhysicsWorld
 
 HULL_MARGIN = 0.001
-"""By which Bullet widens every convex hull [m]."""
+"""Distance by which Bullet widens every convex hull [m]."""
 SAFETY = 0.0005
-"""By which we keep farther away than the mesh checker asks, for its numerical error [m]."""
+"""Distance that is kept beyond what the mesh checker asks, for its numerical error [m]."""
 APART = 2 * HULL_MARGIN + SAFETY
+"""Distance beyond the clearance within which hulls are looked at: both margins and the safety [m]."""
 CARRIED = "carried"
 
 

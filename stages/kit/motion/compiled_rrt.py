@@ -16,9 +16,9 @@ from scenewright.stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_c
 UNCERTAIN_COUNT = 0
 """Place in the counts of refusals that the mesh checker might not share; the others follow."""
 LEAST_GAIN, LEAST_PARTIAL_GAIN = 0.5, 4.0
-"""Of a shortcut, straight and partial, in resolutions: those that save less are not looked at."""
+"""Smallest gains of a shortcut, straight and partial, in resolutions: those that save less are not looked at."""
 WHOLE_WAY = 1_000_000
-"""As `most` of `last_free`: more steps than any way has."""
+"""Most steps of any way, and so the `most` of `last_free` that stops nowhere."""
 
 
 class Moving(NamedTuple):

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 ITERATIONS = 48
+"""Most iterations of a distance; by eye."""
 PRECISION = 1e-5
 """The two bounds of a distance are this near to each other [m] when nothing ends the search earlier."""
 

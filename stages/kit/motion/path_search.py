@@ -30,8 +30,8 @@ from scenewright.stages.kit.motion.rrt_connect import FINER, first_collision, in
 STEP = 16
 """Longest extension of a tree, in resolutions."""
 MESH_SAMPLES, MESH_SMOOTHING = 2000, 60
-"""At most so many samples are drawn, and shortcuts tried, when the mesh checker has taken over: one of its checks costs
-as much as ten compiled ones."""
+"""Most samples that are drawn, and shortcuts tried, when the mesh checker has taken over: one of its checks costs as
+much as ten compiled ones."""
 ESCAPES = 120
 """Directions that are tried to leave a place too narrow for the compiled check."""
 REJECTIONS = 4

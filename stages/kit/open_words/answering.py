@@ -15,6 +15,7 @@ from scenewright.stages.kit.open_words.relevancy import TEMPERATURE, margins, re
 from scenewright.stages.kit.open_words.vectors import Vectors
 
 MOST_ANSWERS = 20
+"""Most answers to a text unless more are asked for."""
 SHARED = 0.3
 """Regions that share more than this of the smaller one's box or Gaussians are one place."""
 

@@ -21,6 +21,7 @@ BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
 NAMED_SPLAT = "named splat"
 """Source of fits for splats whose pieces have classes of a panoptic map."""
 CLOSEST = 1e-4
+"""Closest to 0 and 1 that a share may come, so that its log odds are finite."""
 SHORTEST = 0.01
 """Edge of a region, at least [m]."""
 
@@ -75,7 +76,7 @@ def recognised(regions: np.ndarray, extents: np.ndarray, encoder: Encoder) -> fl
 
 
 UNFITTED = Calibration(0.0, 1.0, 0.0, 0.0, 0.0, fitted=False)
-"""Of an encoder that nothing was fitted for: the relevancy of the looks."""
+"""Calibration of an encoder that nothing was fitted for: the relevancy of the looks."""
 WEIGHTS = ("bias", "looks", "field", "extent", "extent_squared", "class_bias", "class_name")
 OF_PLACES = ("least_recognised", "strange")
 

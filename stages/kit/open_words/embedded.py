@@ -19,6 +19,7 @@ FILE = "words/two_towers.safetensors"
 """Below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
 BATCH = 512
+"""Crops that pass the network at a time, which bounds the memory."""
 SMALL_WORDS = frozenset(("a", "an", "the", "of"))
 _OTHER = "give a file that `make words-train` wrote"
 

@@ -17,9 +17,13 @@ from scenewright.stages.kit.open_words.encoder import unit
 from scenewright.stages.kit.services.connection import Connection
 
 BATCH = 64
+"""Crops of one request, which bounds its size."""
 TIMEOUT, RETRIES, WAIT = 120.0, 3, 1.0
+"""Longest wait for an answer [s], most repeats, and the pause before the first [s]."""
 LARGEST_SIDE = 1024
+"""Largest side of a crop that a service may ask for [px]; a bound."""
 LARGEST_WIDTH = 65536
+"""Most numbers of a vector that a service may send; a bound."""
 _HINT = "is this an encoder of pictures and words? see docs/SPLATS.md"
 
 

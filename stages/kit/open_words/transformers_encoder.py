@@ -27,6 +27,7 @@ FAMILIES = {
 SIDE = 224
 """Crops are handed over so large where the model says nothing else [px]."""
 BATCH = 32
+"""Crops that pass the network at a time, which bounds the memory."""
 PADDED = {"siglip": 64}
 """SigLIP was trained on texts of 64 tokens, padding included."""
 

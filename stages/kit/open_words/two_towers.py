@@ -15,12 +15,17 @@ import torch
 from torch import nn
 
 WIDTH = 64
+"""Numbers of a vector of either tower."""
 SIDE = 48
 """Crops are looked at in this size [px]."""
 MOST_WORDS = 8
+"""Words of a text that are read."""
 MOST_PARTS = 24
+"""Parts of a word that are read: itself and its runs of letters."""
 BUCKETS = 4096
+"""Buckets into which parts of words are hashed."""
 PART_LENGTHS = (3, 4, 5)
+"""Lengths of the runs of letters of a word; by eye."""
 _WORD = re.compile(r"[a-z0-9]+")
 
 

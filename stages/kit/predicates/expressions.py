@@ -19,12 +19,14 @@ from scenewright.stages.kit.tasks.pddl_expressions import parse_expression
 
 Tree = tuple["Tree | str | float", ...]
 ARITHMETIC = {"plus": 2, "minus": 2, "times": 2, "over": 2, "abs": 1}
+"""Arithmetic by its word, and how many numbers each takes."""
 COMPARISONS = ("less", "at_most", "near")
 CONNECTIVES = ("and", "or")
 QUANTIFIERS = ("some", "every")
 WORDS = {*ARITHMETIC, *COMPARISONS, *CONNECTIVES, *QUANTIFIERS, "not", "is", "category"}
 """Of every vocabulary."""
 DEEPEST = 24
+"""Deepest nesting of an expression; a bound against damaged files."""
 LARGEST = 400
 """Words of one expression."""
 HINT = "docs/INTERPRET.md has the language of predicates"

@@ -27,6 +27,7 @@ ROOM_WORDS = Vocabulary(
     of_scene=("reach_low", "reach_high", "hand_opening"),
     relations={"supported": 2, "contained": 2, "held": 1},
 )
+"""Words that expressions may use of a room and its bodies."""
 TOUCH = 0.03
 """What `near` allows [m]."""
 UNSEEN = ("wall", "ceiling", "surroundings")
@@ -63,6 +64,7 @@ SIDES = {
     "bottom": (2, -1.0),
     "top": (2, 1.0),
 }
+"""Words for the sides of a body: axis, and where along it from -1 (least) to 1."""
 
 
 @dataclass(frozen=True)

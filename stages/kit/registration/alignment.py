@@ -19,7 +19,7 @@ from scenewright.stages.kit.registration.rigid_motion import exponential, orthon
 PARAMETERS = 8
 """Rotation, translation, gain and bias."""
 ITERATIONS = (6, 8, 10)
-"""At most so many per level, the finest first."""
+"""Most iterations a level, the finest first."""
 STRIDES = (2, 1, 1)
 """Every how many-th pixel of the source is compared, per level."""
 GATES = (0.06, 0.12, 0.25)
@@ -29,6 +29,7 @@ TOLERANCES = (2.0, 4.0, 8.0)
 BRIGHTNESS_NOISE = 0.03
 """Standard deviation of the brightness of one surface point in two frames, exposure apart."""
 BRIGHTNESS_GATE = 0.3
+"""Largest difference of brightness that counts (0 to 1); by eye."""
 INDEPENDENT_SHARE = 0.01
 """Neighbouring residuals are alike: so many of them count as independent when uncertainty is stated."""
 SYSTEMATIC_DEPTH = 0.005
@@ -37,6 +38,7 @@ keeps near surfaces, whose noise is a millimetre, from outweighing everything el
 SMALLEST_STEP = 2e-5
 """Steps below this end a level [rad and m]."""
 SUMS = 8
+"""How many sums there are."""
 SAMPLES, ON_SURFACE, FLOATING, HIDDEN, PLANES, PLANE_SQUARES, COLORS, COLOR_SQUARES = range(SUMS)
 """What is summed over the pixels of the source beside the equations: how many were compared, lie on the target's
 surface, before it and behind it; how many gave an equation by distance and by brightness, and the squares of those."""

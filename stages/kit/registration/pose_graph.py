@@ -23,6 +23,7 @@ standard deviations each) begin to lose weight."""
 ANCHOR = 1e12
 """Information with which the first node of each connected part is held."""
 MAXIMUM_ITERATIONS = 50
+"""Most iterations of the optimisation; by eye."""
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,11 @@ LIGHT_POINTS = 4
 DIRECTIONS = 48
 """So many look for light over every sample: a Vogel disk lifted to the hemisphere (Malley's method)."""
 MOST_SUBDIVISIONS = 128
+"""Most subdivisions of a triangle's edge in the map; a bound on its memory."""
 RAY_DIRECTION = 3
 """Rays (N, 6): the origin, and from this column on the direction."""
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+"""Turn between two samples of a Vogel disk [rad]."""
 BURIED_SHARE = 0.5
 """A sample from which this share of directions meets back faces lies inside a solid."""
 

@@ -14,7 +14,7 @@ from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scipy.ndimage import binary_erosion
 
 LEAST_PIXELS = 25
-"""Of a mask (ConceptGraphs)."""
+"""Fewest pixels of a mask (ConceptGraphs)."""
 LINK = 0.05
 """Distance of points of one cluster [m] (ConceptGraphs)."""
 

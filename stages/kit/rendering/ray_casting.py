@@ -24,8 +24,9 @@ from scenewright.stages.kit.rendering.shading import Hits, Surfaces
 from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup, linear_to_srgb
 
 BACKGROUND = (0.86, 0.89, 0.92)
-"""sRGB where no ray hits."""
+"""Colour where no ray hits (sRGB, 0 to 1)."""
 _SRGB_TABLE = np.round(linear_to_srgb(np.arange(4096) / 4095.0) * 255.0).astype(np.uint8)
+"""8-bit sRGB of 4096 steps of linear light."""
 
 
 @dataclass(frozen=True)

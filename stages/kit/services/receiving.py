@@ -24,11 +24,11 @@ from scenewright.schemas.errors import MachineFailure, UsageError
 IDLE_SECONDS = 60.0
 """A connection on which nothing comes for so long is closed."""
 HEAD_SECONDS = 10.0
-"""From the first byte of a request to the end of its header."""
+"""Time from the first byte of a request to the end of its header [s]."""
 BODY_SECONDS = 60.0
-"""From there to the end of its body."""
+"""Time from the end of a request's header to the end of its body [s]."""
 SEND_SECONDS = 60.0
-"""For an answer, all of it."""
+"""Time for an answer, all of it [s]."""
 LINGER_SECONDS = 2.0
 """How long what a refused sender still sends is thrown away, so that it can read why."""
 LARGEST_HEAD = 32 * 2**10
@@ -41,6 +41,7 @@ MOST_CONNECTIONS = 64
 """Each has a thread; beyond them the one that has waited longest for a request is closed, or the new
 one told to wait."""
 PIECE = 1 << 20
+"""Bytes of a body that are read at a time; by eye."""
 JSON = "application/json"
 BUSY = b'{"error": "too many connections"}'
 

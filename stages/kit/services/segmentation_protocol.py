@@ -31,12 +31,15 @@ STREAMS = ("color", "depth", "pose")
 LARGEST_BODY = 64 * 2**20
 """Bytes of a request or a reply."""
 MOST_SEGMENTS = 65536
+"""Most segments of an answer; a bound, by eye."""
 LONGEST_TEXT = 200
 """Characters of a name."""
 PART_HEADER_LIMIT = 4096
+"""Longest header of a part [bytes]; a bound, by eye."""
 LARGEST_PART = 64 * 2**10
 """Bytes of the part `request`: JSON takes many times as much when it is read."""
 MOST_PARTS = 8
+"""Most parts of a message; a bound, by eye."""
 
 
 class Category(Model):

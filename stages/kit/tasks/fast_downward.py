@@ -24,7 +24,7 @@ ALIAS = "lama-first"
 UNSOLVABLE = (10, 11, 12)
 """Its exit codes for tasks without a plan."""
 LONGEST = 60.0
-"""After this the planner is stopped: a guard against a hang, not a budget [s]."""
+"""Time after which the planner is stopped [s]: a guard against a hang, not a budget."""
 INSTEAD = "take --planner builtin"
 
 

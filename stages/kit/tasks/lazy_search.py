@@ -15,6 +15,7 @@ from scenewright.stages.kit.tasks.landmarks import Landmarks
 from scenewright.stages.kit.tasks.relaxed import FAR, Relaxed, applicable, successor
 
 BOOST = 1000
+"""Turns that the queues of preferred actions get whenever a heuristic falls to a new low (Richter & Westphal 2010)."""
 
 
 @dataclass(frozen=True)

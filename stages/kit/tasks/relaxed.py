@@ -31,6 +31,7 @@ class Effects(NamedTuple):
 
 
 _EFFECTS = types.NamedUniTuple(types.int32[::1], len(Effects._fields), Effects)
+"""Type of `Effects` for numba."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from scenewright.stages.library.design import CERAMIC, DARK_PLASTIC, PLASTIC, ST
 SHEET = 2700.0
 """Pans and pots: aluminium [kg/m^3]."""
 SIDES = 16
+"""Sides of a round dish or pan."""
 
 
 def arc_handle(middle: np.ndarray, outward: np.ndarray, reach: float, half: float, radius: float) -> list[Solid]:

@@ -22,7 +22,9 @@ from scenewright.stages.library.families.appliances import WHITE, lined_chamber
 from scenewright.stages.library.families.parts import DEPTH_FROM_HEIGHT, GAP, Span, flap, knob, slide_out
 
 GLASS_CERAMIC = Paint((24, 26, 30), 2300.0)
+"""Glass ceramic of a hob: density [kg/m^3]; by eye."""
 SIDES = 16
+"""Sides of a drum or a round door."""
 
 
 def _hot_plates(x: Span, y: Span, top: float, paint: Paint) -> list[Piece]:
@@ -48,6 +50,7 @@ def _oven_door(x: Span, z: Span, paint: Paint, metal: Paint) -> Moving:
 
 
 SCREEN_GLASS = Paint(SCREEN.colors[0], 1400.0)
+"""Glass of an oven door: density [kg/m^3]; by eye."""
 
 
 def oven(random: np.random.Generator, style: int) -> Design:

@@ -41,9 +41,9 @@ CONTAINERS = {
 WIDEST_GRASP = 0.08
 """Opening of a two-finger gripper [m]."""
 LARGEST_MASS = 1000.0
-"""[kg]; larger ones are questioned, and none is assumed to be larger."""
+"""Largest usual mass [kg]: larger ones are questioned, and none is assumed to be larger."""
 HEAVIEST_MODEL = 1e9
-"""[kg]; nothing is taken that says it is heavier."""
+"""Mass [kg] from which on a model is refused."""
 LIGHTEST, HEAVIEST = 5.0, 12000.0
 """Mean density over the collision pieces [kg/m^3]."""
 MOST_STATES_OF = 12
@@ -51,7 +51,8 @@ MOST_STATES_OF = 12
 MOST_PIECES = 1500
 """Collision pieces of all parts."""
 MOST_SECTIONS, MOST_SECTIONS_CLOSED = 100_000, 30_000
-"""Of pieces with planes, in all states and in the closed one. An oven of 48 pieces and 20 states takes 20,000."""
+"""Most sections of pieces with planes, in all states and in the closed one. An oven of 48 pieces and 20 states takes
+20,000."""
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,11 @@ from scenewright.schemas.vocabulary import load_vocabulary
 DATA = Path(__file__).resolve().parents[3] / "data"
 TABLE_FILE, WORDS_FILE = "imported_models.toml", "labels/words.toml"
 LONGEST_PHRASE = 4
+"""Most words of a phrase that names a class."""
 LONGEST_NAME = 400
 """Characters of a name that are looked at: its end, where English puts the thing."""
 SHORTEST_ENDING = 3
+"""Fewest letters of a class name that is recognised as the ending of a word; by eye."""
 FILLERS = re.compile(r"(?:root|body|link|main|model|mesh|base)$")
 SPLIT = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 

@@ -19,11 +19,15 @@ from scenewright.stages.library.importing.source_folder import long_row
 from scipy.spatial.transform import Rotation
 
 MOST_INDICES = 30_000_000
+"""Most numbers of a list in a file; a bound against damaged files."""
 MOST_INSTANCES = 20_000
+"""Most instances of geometries in a scene; a bound against damaged files."""
 MOST_STEPS = 2_000_000
 """Elements that are looked at, those of an instance each time that it is instanced."""
 DEEPEST_NODES = 60
+"""Deepest nesting of nodes; a bound against damaged files."""
 UP_AXES = {"X_UP": (1.0, 0.0, 0.0), "Y_UP": (0.0, 1.0, 0.0), "Z_UP": (0.0, 0.0, 1.0)}
+"""Up directions by the names that COLLADA gives them."""
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ SHELVES = {"meshes", "mesh", "visual", "collision", "textured_objs", "materials"
 """Folders that hold parts of models."""
 PART_OF_A_MODEL = re.compile(r"collision|vhacd|coacd|convex", re.IGNORECASE)
 MOST_MODELS = 20_000
+"""Most models of a folder; a bound, by eye."""
 
 
 @dataclass(frozen=True)

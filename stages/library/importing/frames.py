@@ -9,6 +9,7 @@ from scenewright.stages.library.importing.classes import UsualSize
 from scenewright.stages.library.importing.source_model import Declared, Direction
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
+"""Metres a unit."""
 LIKELY_UNITS = ("m", "cm", "mm", "inch")
 AXES: dict[str, Direction] = {
     "+x": (1.0, 0.0, 0.0),
@@ -18,6 +19,7 @@ AXES: dict[str, Direction] = {
     "+z": (0.0, 0.0, 1.0),
     "-z": (0.0, 0.0, -1.0),
 }
+"""Unit directions by the names that options give them."""
 SMALLEST_THING, LARGEST_THING = 0.01, 10.0
 """Largest extent of things of any class [m]."""
 Y_UP, Z_UP = AXES["+y"], AXES["+z"]

@@ -20,12 +20,13 @@ from scipy.spatial import QhullError
 from shapely.errors import ShapelyError
 
 MOST_TRIANGLES = 1_000_000
-"""Of a model, repeated meshes counted each time, and of a mesh file."""
+"""Most triangles of a model, repeated meshes counted each time, and of a mesh file."""
 MOST_VERTICES = 3 * MOST_TRIANGLES
+"""Most vertices of a model: as many as triangles without shared corners have."""
 MOST_SHAPES = 20_000
 """Boxes, meshes and groups of meshes of a model."""
 MOST_TRIANGLES_OF_A_FILE = 5 * MOST_TRIANGLES
-"""Of all models that one description holds."""
+"""Most triangles of all models that one description holds."""
 MOST_FINDINGS = 40
 """What is said of one model."""
 LONGEST_TEXT = 300

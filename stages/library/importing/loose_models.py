@@ -15,10 +15,13 @@ from scenewright.stages.library.importing.source_folder import SourceFolder, num
 from scenewright.stages.library.importing.source_model import Declared, Direction, SourceLink, SourceModel
 
 LARGEST_TABLE = 64 * 2**20
+"""Largest metadata.csv [bytes]; a bound, by eye."""
 LARGEST_HEADER = 64 * 2**10
+"""Bytes of a table that are read to find its header; by eye."""
 SHAPENET_COLUMNS = {"fullId", "category", "up", "front", "unit"}
 SHAPENET_READ = SHAPENET_COLUMNS | {"name", "isContainerLike"}
 SHAPENET_UP: Direction = (0.0, 0.0, 1.0)
+"""Up direction of ShapeNetSem where a cell is empty (its README)."""
 SHAPENET_FRONT: Direction = (0.0, -1.0, 0.0)
 """What an empty cell of metadata.csv means (ShapeNetSem's README)."""
 BODY = "body"

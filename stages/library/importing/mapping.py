@@ -17,6 +17,7 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.library.importing.source_model import SourceModel
 
 LARGEST_FILE = 4 * 2**20
+"""Largest mapping file [bytes]; a bound, by eye."""
 MOST_PATTERNS = 1000
 """Each of them is held against each model; names without * and ? may be many."""
 LONGEST_NAME = 1000

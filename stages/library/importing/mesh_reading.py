@@ -25,12 +25,17 @@ from scenewright.stages.library.importing.source_model import Declared, Surface,
 
 MESH_SUFFIXES = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
 LARGEST_MATERIALS = 16 * 2**20
+"""Most bytes of all material files of a mesh; a bound, by eye."""
 MOST_MATERIAL_FILES = 100
+"""Most material files of a mesh that are looked at; a bound, by eye."""
 MOST_KEPT_FILES = 1000
+"""Most mesh files that are kept in memory; by eye."""
 MOST_LINES = 20_000_000
+"""Most lines of an OBJ file; a bound, by eye."""
 LONGEST_LINE = 1 << 20
 """Characters of a line of an OBJ file."""
 Y_UP = (0.0, 1.0, 0.0)
+"""Up direction of mesh formats that have y upwards, as the specification of glTF says."""
 HINT = "export it again"
 
 

@@ -32,15 +32,19 @@ from scenewright.stages.library.importing.source_model import (
 from scipy.spatial.transform import Rotation
 
 DEEPEST_INCLUDES = 10
+"""Deepest nesting of included files; a bound against circles."""
 MOST_INCLUDES = 2000
+"""Most included files of a model; a bound, by eye."""
 MOST_ELEMENTS = 500_000
-"""Of a model, those of a file each time that it is included."""
+"""Most elements of a model, those of a file counted each time that it is included."""
 DEEPEST_ELEMENTS = 300
+"""Deepest nesting of elements; a bound against damaged files."""
 MOST_DEFAULTS = 200_000
 """Attributes of all default classes, those that a class inherits counted again."""
 MOST_ATTRIBUTES = 200
 """Attributes that a default class gives one kind of element."""
 DEEPEST_BODIES = 60
+"""Deepest nesting of bodies; a bound against damaged files."""
 LAST_VISIBLE_GROUP = 2
 """Geoms of groups 0 to 2 are drawn by default, those of 3 and up are not."""
 MAIN = "main"

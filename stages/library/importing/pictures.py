@@ -11,12 +11,13 @@ from scenewright.stages.kit.formats.image_headers import image_size, may_be_deco
 from scenewright.stages.library.importing.source_folder import SourceFolder
 
 LARGEST_PICTURE = 64 * 2**20
+"""Largest picture file [bytes]; a bound, by eye."""
 MOST_PIXELS = 400_000_000
-"""Of all pictures of a mesh file, those that are decoded again counted again: two dozen of 4096 x 4096."""
+"""Most pixels of all pictures of a mesh file, those that are decoded again counted again: two dozen of 4096 x 4096."""
 MOST_HELD = 400 * 2**20
 """Bytes of decoded pictures."""
 SAMPLES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=float)
-"""Where a triangle's colour is looked up: its centre and three points towards its corners (barycentric)."""
+"""Places in a triangle where its colour is looked up (barycentric): its centre and three points towards its corners."""
 PALETTE = 8
 """Colours of a part: the URDF names one mesh file for each."""
 

@@ -27,9 +27,9 @@ from scipy.spatial.transform import Rotation
 MOST_PARTS = 500
 """Parts of a model that move."""
 FARTHEST = 1e5
-"""[m] from the origin of the model."""
+"""Farthest from the origin of a model that anything may lie [m]; a bound, by eye."""
 LONGEST_SLIDE = 1e4
-"""[m]."""
+"""Longest way of a sliding joint [m]; a bound, by eye."""
 
 
 @dataclass(frozen=True)

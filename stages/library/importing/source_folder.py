@@ -19,12 +19,17 @@ LARGEST_FILE = 256 * 2**20
 LARGEST_TEXT = 128 * 2**20
 """Bytes of a mesh that is text, which takes several times as much while it is read."""
 LARGEST_XML = 64 * 2**20
+"""Largest XML file [bytes]; a bound, by eye."""
 MOST_FILES = 200_000
+"""Most files of a folder with models; a bound, by eye."""
 MOST_FOLDERS = 200_000
+"""Most folders in a folder with models; a bound, by eye."""
 MOST_NAME_PARTS = 40
 """Folders in the name of a file: its end is looked for in many places."""
 MOST_KEPT_NAMES = 20_000
+"""Most names whose files are remembered; by eye."""
 PIECE = 1 << 20
+"""Characters of a text that are parsed at a time; by eye."""
 LONGEST_NUMBER = 4096
 """Characters."""
 LONGEST_ROW = 100_000

@@ -22,7 +22,9 @@ from scenewright.stages.kit.geometry.transforms import quaternion_of
 from scenewright.stages.urdf.exports import SceneExporter
 
 FLOAT, UNSIGNED_INT, UNSIGNED_SHORT = 5126, 5125, 5123
+"""Component types of accessors (glTF 2.0, 3.6.2.2)."""
 VERTICES, INDICES = 34962, 34963
+"""Targets of buffer views, ARRAY_BUFFER and ELEMENT_ARRAY_BUFFER (glTF 2.0)."""
 Y_UP_FROM_Z_UP = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
 """Quaternion (x, y, z, w)."""
 

@@ -21,6 +21,7 @@ from scenewright.stages.kit.rendering.surfaces import srgb_to_linear
 from scipy.spatial.transform import Rotation
 
 GRAVITY = 9.81
+"""Acceleration of free fall that the scene states [m/s^2]."""
 WORLD = "/World"
 
 

@@ -41,7 +41,9 @@ PARAMETERS = dict(MODELS.values())
 LARGEST_FILE = 4_000_000_000
 """Bytes of images.bin that are walked over; most of them are observations, which are skipped."""
 LONGEST_NAME = 4096
+"""Longest name of an image that is looked for [bytes]; a bound against damaged files."""
 LARGEST_SIZE = 100_000
+"""Largest width or height of a camera [px]; a bound against damaged files."""
 OBSERVATION = 24
 """Bytes of x, y and the point's id."""
 

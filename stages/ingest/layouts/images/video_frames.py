@@ -12,6 +12,7 @@ from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE
 
 SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".webm")
 MOST_FRAMES = 10_000_000
+"""Most frames that are counted in a video; a bound against files that never end."""
 
 
 class VideoFrames:

@@ -41,10 +41,12 @@ from scenewright.stages.kit.geometry.transforms import inverse, is_rigid
 
 NAMES = ("transforms.json", "transforms_train.json")
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+"""Turns the camera axes of OpenCV into those of OpenGL: y and z change sign."""
 DEFAULT_UNIT = 0.001
 """Metres per unit of depth when the file does not say: millimetres."""
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL")
 LARGEST_SIZE = 100_000
+"""Largest width or height of a camera [px]; a bound against damaged files."""
 
 
 @dataclass(frozen=True)

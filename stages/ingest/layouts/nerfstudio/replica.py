@@ -26,6 +26,7 @@ from scenewright.stages.kit.formats.trajectories import number_rows
 
 TRAJECTORY, RESULTS, CAMERA = "traj.txt", "results", "cam_params.json"
 UNITS_PER_METRE = 6553.5
+"""Stored depth per metre where the file does not say; Replica's own camera parameters."""
 RENDERED = ((1200, 680), (600.0, 600.0, 599.5, 339.5))
 """Size and intrinsics of these renderings, for folders from which cam_params.json was left out."""
 

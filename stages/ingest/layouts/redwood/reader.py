@@ -29,7 +29,7 @@ COLOR_FOLDERS = ("image", "color", "rgb")
 TRAJECTORY = "trajectory.log"
 INTRINSICS = ("camera_intrinsic.json", "intrinsic.json")
 PRIMESENSE = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5}
-"""open3d.camera.PinholeCameraIntrinsicParameters.PrimeSenseDefault, 640x480."""
+"""Open3D's `PinholeCameraIntrinsicParameters.PrimeSenseDefault` for 640 x 480 [px]."""
 
 
 def matches(root: Path) -> str | None:

@@ -39,6 +39,7 @@ INTRINSICS = ("asus.ini", "kinect2.ini", "intrinsic/asus.ini", "intrinsic/kinect
 ASUS = (544.47329, 544.47329, 320.0, 240.0)
 """The Asus Xtion of the data set at 640x480, as programs for it state it in agreement."""
 LATEST_MICROSECONDS = 9 * 10**15
+"""Latest time that is believed [microseconds]; larger ones would overflow 64-bit nanoseconds."""
 
 
 def matches(root: Path) -> str | None:

@@ -38,6 +38,7 @@ COLOR_LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
 ASSOCIATIONS = ("associated.txt", "associations.txt", "association.txt", "associate.txt")
 CALIBRATIONS = ("calibration.txt", "camera.txt", "intrinsics.txt")
 UNITS_PER_METRE = 5000.0
+"""Stored depth per metre in TUM's and ICL-NUIM's folders, as both data sets state it."""
 FREIBURG = {
     "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),
     "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
@@ -46,8 +47,10 @@ FREIBURG = {
 """Colour cameras of the data set at 640x480 as its page states them: fx fy cx cy; k1 k2 p1 p2 k3."""
 FREIBURG_NAME = re.compile(r"(?:freiburg|(?<![a-z])fr)([123])(?!\d)")
 ICL_NUIM = (481.2, 480.0, 319.5, 239.5)
+"""Intrinsics fx, fy, cx, cy [px] of ICL-NUIM for 640 x 480, as the data set states them."""
 ICL_NUIM_NAME = re.compile(r"icl[-_ ]?nuim|(?:living_?room|office)_?traj\d|(?<![a-z])(?:lr|of)_?kt\d")
 MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
+"""Mirrors y, before and after a pose: ICL-NUIM's camera has its y axis the other way round."""
 
 
 @dataclass(frozen=True)

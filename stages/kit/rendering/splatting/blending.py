@@ -18,6 +18,7 @@ SMALLEST_ALPHA = np.float32(rasterizer.SMALLEST_ALPHA)
 LARGEST_ALPHA = np.float32(rasterizer.LARGEST_ALPHA)
 LEAST_TRANSMITTANCE = np.float32(rasterizer.LEAST_TRANSMITTANCE)
 ONE, HALF = np.float32(1.0), np.float32(0.5)
+"""Numbers of single precision, so that nothing is computed in double."""
 
 
 @numba.njit(cache=True)

@@ -11,7 +11,7 @@ import numpy as np
 from scenewright.stages.kit.geometry.cells import cell_keys
 
 STEPS = 65_535
-"""Of a coordinate, between the least and the largest of its mesh: 0.15 mm over 10 m."""
+"""Steps of a coordinate between the least and the largest of its mesh: 0.15 mm over 10 m."""
 
 
 @dataclass

@@ -29,15 +29,15 @@ FOLDER = Path(__file__).resolve().parent
 LARGEST_PAGE = 15_000_000
 """Bytes."""
 MOST_VERTICES = 240_000
-"""Of all meshes together; more are thinned."""
+"""Most vertices of all meshes together; more are thinned."""
 EDGES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.5, 1.0, 5.0)
 """Cubes that hold one vertex, the least that suffice [m]."""
 SMALL = 500
 """Vertices of meshes that are never thinned."""
 MOST_POINTS = 60_000
-"""Of a cloud."""
+"""Most points of a cloud; more are thinned."""
 MOST_PICTURE_BYTES = 4_000_000
-"""Of all pictures together; of more, every second one, every third one and so on is kept."""
+"""Most bytes of all pictures together; of more, every second one, every third one and so on is kept."""
 MARGIN = 0.15
 """Around what is kept in sight where no viewer said what that is, of its size."""
 

@@ -9,6 +9,7 @@ from scenewright.stages.report.images import animation, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH, MOST_PICTURES = 1100, 4
+"""Width of pictures [px], and most of them that are shown."""
 
 
 def view(page: Page) -> dict[str, Any] | None:

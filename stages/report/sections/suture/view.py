@@ -15,11 +15,14 @@ from scenewright.stages.report.images import Picture, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 MOST_PICTURES = 6
+"""Most pictures that are shown of an artifact."""
 MOST_RUNS = 60
+"""Most runs that are listed."""
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
 THROWS = 6
+"""Sutures that close the wound of the simulator."""
 CAPTIONS = {
     "sutures": "Figure 4.1: share of trials by sutures to failure",
     "needle": "Errors of the poses; the box is the grasp tolerance (1 mm, 10 degrees)",

@@ -13,7 +13,7 @@ from scenewright.stages.report.images import Picture, animation, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 CAPTIONS = {
     "overlay": "What was seen, and how sure that is",
     "detections": "What was seen, and how sure that is",

@@ -13,9 +13,9 @@ from scenewright.stages.report.images import Picture, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 MOST_TURNS = 400
-"""Of the dialogue."""
+"""Most turns of the dialogue that are listed."""
 
 
 @dataclass(frozen=True)
