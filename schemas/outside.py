@@ -29,7 +29,7 @@ LARGEST_SETTINGS = 4 * 2**20
 DEEPEST = 64
 """Lists and tables within each other."""
 MOST_VALUES = 5_000_000
-"""Values of a document."""
+"""Most values of a document."""
 LARGEST_INTEGER = 2**63 - 1
 """Largest integer of a file from outside: what 64 bits hold."""
 

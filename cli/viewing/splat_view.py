@@ -21,7 +21,7 @@ FAINT = 0.15
 MOMENTS = 24
 """Pictures that say when a Gaussian was first seen, evenly spread over those learned."""
 LOOKED_WITH = 96
-"""Width in which it is looked for there [px]."""
+"""Width of the pictures in which it is looked for when a Gaussian was first seen [px]."""
 BEHIND = (0.1, 0.05)
 """A Gaussian is seen unless it lies farther behind what is shown than this [m], and this share of it."""
 RADII = (0.004, 0.03)

@@ -19,7 +19,7 @@ from scenewright.stages.kit.viewing.meshes import draw_solid
 STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
 """Colours of estimated needle, thread and tip, and of the truth (sRGB, 0 to 1)."""
 ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))
-"""Right, left."""
+"""Colours of the right and the left arm (sRGB, 0 to 1)."""
 PAD = (0.12, 0.12, 0.004)
 """Size of the pad [m]."""
 RIDGE = (0.005, 0.05, 0.005)

@@ -25,7 +25,7 @@ from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
 from scenewright.schemas.outside import file_content, json_of
 
 LARGEST_JOURNAL = 2**20
-"""Bytes."""
+"""Largest journal [bytes]."""
 AT_FDCWD = -100
 """Linux: paths are relative to the working directory (fcntl.h)."""
 RENAME_EXCHANGE = 2

@@ -12,7 +12,7 @@ from scenewright.schemas.outside import file_toml
 from scenewright.stages.kit.stage import NOT_SHOWN, Parameters, Stage
 
 LARGEST_TOML = 16 * 2**20
-"""Bytes."""
+"""Largest configuration file [bytes]."""
 
 
 def read_config(path: Path) -> dict[str, Any]:

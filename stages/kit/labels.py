@@ -30,13 +30,13 @@ LABEL_TABLES = tuple(LABEL_FILES.values())
 OWN = "scenewright"
 """The label set that is the vocabulary itself."""
 MATCHED = (OWN, "coco-panoptic", "ade20k", "words")
-"""Where the labels of a network are sought."""
+"""Label tables in which the labels of a network are sought."""
 VOCABULARIES = ("coco", "nyu40", "scannet", "ade20k")
 ANYTHING = "object"
 LARGEST_FILE = 2**20
-"""Bytes of a label file."""
+"""Largest label file [bytes]."""
 LONGEST_WORD = 100
-"""Characters."""
+"""Longest word [characters]."""
 
 
 class Label(Model):

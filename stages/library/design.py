@@ -50,7 +50,7 @@ LACQUER = Material(
 STEEL = Material(2600.0, ((178, 182, 186), (120, 124, 128), (58, 60, 64), (206, 208, 210)))
 """Bars and legs: tubes, so far lighter than solid steel."""
 APPLIANCE = Material(220.0, ((238, 240, 242), (192, 196, 200), (58, 60, 64), (226, 220, 200), (158, 60, 52)))
-"""Insulated walls between sheets."""
+"""Appliances, insulated walls between sheets: density [kg/m^3] and colours; by eye."""
 FABRIC = Material(70.0, ((92, 110, 132), (150, 80, 70), (112, 126, 96), (176, 164, 146), (70, 72, 78), (196, 150, 90)))
 """Fabric: density [kg/m^3] and colours; by eye."""
 LINEN = Material(70.0, ((236, 232, 224), (180, 196, 210), (214, 196, 178), (140, 156, 140)))
@@ -68,7 +68,7 @@ CERAMIC = Material(
 )
 """Glazed ceramic: density [kg/m^3] and colours; by eye."""
 GLASS = Material(950.0, ((64, 120, 84), (150, 96, 50), (110, 150, 190), (196, 214, 216)))
-"""Filled bottles: close to water."""
+"""Filled bottles of glass: density [kg/m^3], close to water, and colours."""
 CARDBOARD = Material(
     180.0, ((190, 150, 106), (206, 60, 56), (60, 110, 180), (236, 190, 60), (96, 150, 90), (232, 226, 214))
 )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 CLASS_AGNOSTIC = "class-agnostic"
-"""In the label of masks that have no names."""
+"""Word in the label of masks that have no names."""
 MANY_UNCERTAIN, MANY_MESHES, MANY_LOST = 0.25, 0.5, 0.1
 """Shares of supports, of things without a model, of frames, from which there is something to do about them."""
 HELD_UPRIGHT = "which way is up: no floor was seen, the camera is taken to have been held upright"

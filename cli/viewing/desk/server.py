@@ -17,7 +17,7 @@ from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedSer
 
 HOST = "127.0.0.1"
 LARGEST_REQUEST = 200_000
-"""Bytes: a hundred things with long names, and a long note."""
+"""Largest request [bytes]: a hundred things with long names, and a long note."""
 HEADERS = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",

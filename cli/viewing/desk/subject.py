@@ -18,7 +18,7 @@ from scenewright.stages.edit.parameters import EditMapParameters
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 FITTING = Fitting(**EditMapParameters.model_validate({}).model_dump())
-"""As the steps take it unless they are told otherwise."""
+"""How edits are fitted, as the steps take it unless they are told otherwise."""
 Held = TypeVar("Held", bound=State)
 
 

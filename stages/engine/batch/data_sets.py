@@ -12,7 +12,7 @@ from scenewright.stages.engine.batch.names import distinct, matched_part, names_
 from scenewright.stages.engine.batch.spec import DataSpec
 
 LARGEST_LIST = 64 * 2**20
-"""Bytes of a list of paths."""
+"""Largest list of paths [bytes]."""
 
 
 def _absolute(text: str, base: Path) -> Path:

@@ -17,7 +17,7 @@ from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower
 REFRESH = 0.5
 """Time between two drawings of the table [s]."""
 LONGEST_TABLE = 30
-"""Rows of running scenes."""
+"""Most rows of running scenes."""
 
 
 class Count:

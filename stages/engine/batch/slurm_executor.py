@@ -51,7 +51,7 @@ def part_of(names: Sequence[str], index: int, count: int) -> list[str]:
 
 
 LARGEST_LIST = 64 * 2**20
-"""Bytes of the list of jobs."""
+"""Largest list of jobs [bytes]."""
 
 
 def parse_task(text: str) -> tuple[int, int]:

@@ -33,8 +33,8 @@ PAIR_NAMES = (("left.yaml", "right.yaml"), ("left.yml", "right.yml"), ("cam0/sen
 LARGEST_FILE = 256_000
 """Bytes of a calibration file: its parser is slow, and it holds some dozens of numbers."""
 LARGEST_BASELINE = 1.0
-"""Metres. OpenCV's stereo files have the unit of whoever calibrated; eyes further apart than this are taken to be
-stated in millimetres, and a note says so."""
+"""Largest distance of two eyes [m]. OpenCV's stereo files have the unit of whoever calibrated; eyes further apart than
+this are taken to be stated in millimetres, and a note says so."""
 OPENCV_TAG = re.compile(r"!!opencv-matrix\b")
 KITTI = re.compile(r"^P([0-3]):((?:\s+\S+){12})\s*$", re.MULTILINE)
 MIDDLEBURY_KEYS = ("cam0", "cam1", "doffs", "baseline")

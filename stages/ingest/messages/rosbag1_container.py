@@ -35,7 +35,7 @@ from scenewright.stages.kit.formats.bounded_unpacking import unpacked
 from scenewright.stages.kit.formats.chunk_cache import ChunkCache
 
 LARGEST_CHUNK = 1 << 30
-"""Unpacked bytes of one chunk that are accepted; what claims more is taken for a bomb."""
+"""Most unpacked bytes of a chunk; what claims more is taken for a bomb."""
 LARGEST_CONNECTION = 16 << 20
 """Bytes of one connection record that are accepted."""
 MOST_CONNECTIONS = 65_536

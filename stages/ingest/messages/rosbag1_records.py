@@ -17,7 +17,7 @@ MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 0x02, 0x03, 0x04, 0x
 """Values of `op` in a record's header (ROS bag format 2.0)."""
 COMPRESSIONS = (b"none", b"bz2", b"lz4")
 LARGEST_HEADER = 1 << 20
-"""Bytes of a record's header that are accepted."""
+"""Most bytes of a record's header; a bound against damaged files."""
 _USUAL_HEADER = 256
 """Bytes that are read first of a record's header: most are no longer."""
 _LENGTH = struct.Struct("<I")

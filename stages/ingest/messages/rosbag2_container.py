@@ -27,7 +27,7 @@ GREATEST_STATED_RATIO = 1000
 ALWAYS_ACCEPTED = 64 << 20
 """Bytes up to which a part is unpacked whatever its ratio; by eye."""
 MOST_OPEN = 8
-"""Parts that are open at a time."""
+"""Most parts that are open at a time."""
 Part = McapMessages | SqliteMessages
 
 

@@ -23,7 +23,7 @@ from scenewright.schemas.outside import file_text
 NAME = "metadata.yaml"
 KEY = "rosbag2_bagfile_information"
 LARGEST = 2 << 20
-"""Bytes of a metadata.yaml that are accepted; a bag of 1,000 parts has about a tenth of it."""
+"""Most bytes of a metadata.yaml; a bag of 1,000 parts has about a tenth of it."""
 DEEPEST = 20
 """Maps and lists within each other that are accepted."""
 PART_SUFFIXES = (".db3", ".mcap")

@@ -34,7 +34,7 @@ _MOST_TOPICS = 65_536
 _PAGE_SIZES = {1 << power for power in range(9, 17)}
 """Page sizes that SQLite allows (SQLite file format)."""
 LARGEST_MESSAGE = 512 << 20
-"""Bytes of one message that are accepted."""
+"""Most bytes of a message; a bound against damaged files."""
 _JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 _WAL_MAGICS = (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83")
 _ROWS = "SELECT rowid, topic_id, timestamp, {data} FROM messages WHERE rowid > ?"

@@ -22,7 +22,7 @@ SATURATED = 0.2
 COARSE_VALUES = 256
 """Depth with fewer values in every frame was 8-bit once."""
 COARSE_STEP = 0.02
-"""... and steps of at least this at that [m]."""
+"""Step [m] from which on such depth is called coarse."""
 HISTOGRAM_BINS = 48
 """Bars of the depth histogram; by eye."""
 

@@ -50,7 +50,7 @@ from scenewright.stages.ingest.stage import check_cameras
 from scenewright.stages.kit.stage import Progress
 
 LEAST_FRAMES = 12
-"""Looked at per camera, however many cameras there are."""
+"""Fewest frames that are looked at of a camera, however many cameras there are."""
 HEAVY_LOSS, LOSS = 0.5, 0.1
 """Shares of the frames that are lost from which a log is wasted, and doubtful."""
 NO_POSES = PoseReport(verdict="none", method="none", detail="the frames have no poses")

@@ -12,9 +12,9 @@ from scenewright.stages.ingest.preflight.reprojection import projected
 from scenewright.stages.kit.geometry.cameras import back_project
 
 JUMP = 0.5
-"""Metres between neighbours ..."""
+"""Distance of neighbouring poses [m] over which a step may be a jump."""
 JUMP_FACTOR = 12.0
-"""... and times the median step, that make a jump."""
+"""A jump is also longer than this many median steps."""
 REPEATED = 0.2
 """Share of poses equal to the one before worth a warning."""
 LITTLE_OVERLAP = 0.5

@@ -29,7 +29,7 @@ from scenewright.stages.ingest.preflight.views import (
 
 FOLDER = Path(__file__).resolve().parent
 SAMPLES = 6
-"""Frames that are shown."""
+"""Most frames that are shown."""
 
 
 @dataclass(frozen=True)

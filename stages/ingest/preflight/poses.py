@@ -24,9 +24,9 @@ FOCAL_FACTORS = (0.5, 0.6, 0.7, 0.8, 0.87, 0.93, 1.07, 1.15, 1.25, 1.4, 1.65, 2.
 LAGS = (-5, -4, -3, -2, -1, 1, 2, 3, 4, 5)
 """Lags between poses and pictures that are searched [frames]."""
 CLEARLY_BETTER = 0.75
-"""Cost over another's cost from which one is better, ..."""
+"""Ratio of costs up to which one candidate is clearly better than another."""
 MOST_PAIRS = 0.7
-"""... if it wins in this share of the pairs."""
+"""Share of the pairs in which a better candidate must win."""
 MOTION_RATIO = 0.8
 """Poses that agree must cost less than this share of no motion at all, or the pairs say nothing about them."""
 COMBINED_COST = 1.1

@@ -25,7 +25,7 @@ LEAST_EDGES = 80
 LARGEST_LAG = 5
 """Largest lag between colour and depth that is searched [frames]."""
 LARGEST_OFFSET = 24
-"""Pixels at 320 pixels width."""
+"""Largest offset of colour that is searched [px at 320 px width]."""
 ALIGNED = 1.4
 """Score from which colour and depth surely have something to do with each other."""
 UNRELATED = 1.2

@@ -10,7 +10,7 @@ LARGEST_IMAGE = 100_000_000
 JPEG_SIZE_MARKERS = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
 """Start of frame; the three left out are tables and an extension."""
 JPEG_BARE_MARKERS = frozenset({0x01, *range(0xD0, 0xD9)})
-"""Markers without a length."""
+"""JPEG markers without a length."""
 PNG_START = b"\x89PNG\r\n\x1a\n"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 """Samples a pixel by colour type (PNG specification, 11.2.2)."""

@@ -25,7 +25,7 @@ from scenewright.stages.kit.formats.chunk_cache import ChunkCache
 
 HINT = "make the artifact again; `scenewright verify` tells which file changed"
 LARGEST_CHUNK = 256 << 20
-"""Unpacked bytes of one chunk that are accepted; our writers close a chunk after 1 MiB and one message."""
+"""Most unpacked bytes of a chunk; our writers close a chunk after 1 MiB and one message."""
 _HEAD = struct.Struct("<BQ")
 """Opcode and length of a record."""
 _MESSAGE = struct.Struct("<HIQQ")

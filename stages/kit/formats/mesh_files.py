@@ -25,7 +25,7 @@ from scenewright.schemas.outside import file_content
 from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, image_size, may_be_decoded
 
 LARGEST_FILE = 4 * 2**30
-"""Bytes."""
+"""Largest mesh file [bytes]."""
 LARGEST_HEADER = 64 * 2**10
 """Bytes in which the end of a PLY or STL header is looked for; by eye."""
 MOST_TRIANGLES, MOST_VERTICES = 50_000_000, 150_000_000

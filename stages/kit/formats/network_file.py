@@ -11,7 +11,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.formats.safetensors_file import write_safetensors
 
 COUNTER = "num_batches_tracked"
-"""Of batch normalisation; not needed to use a network, and not written."""
+"""Name of a counter of batch normalisation; not needed to use a network, and not written."""
 
 
 def write_network(path: Path, network: torch.nn.Module, metadata: Mapping[str, str]) -> None:

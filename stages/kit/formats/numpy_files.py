@@ -14,7 +14,7 @@ from scenewright.schemas.outside import opened
 from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ARRAY = 8 * 2**30
-"""Bytes. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""
+"""Largest array [bytes]. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""
 LARGEST_HEADER = 10_000
 """Largest header of a .npy file [bytes]: numpy's own default."""
 PIECE = 1 << 24

@@ -22,7 +22,7 @@ _HEADER = (
 
 
 LARGEST_FILE = 4 * 2**30
-"""Bytes: a map of over a hundred million triangles."""
+"""Largest PLY file [bytes]: a map of over a hundred million triangles."""
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,9 @@ TYPES: dict[str, str] = {
 }
 """Types that are read; bfloat16 has no numpy type."""
 LARGEST_FILE = 64 * 2**30
-"""Bytes: more than any network that is read here."""
+"""Largest file [bytes]: more than any network that is read here."""
 LARGEST_HEADER = 100_000_000
-"""Bytes; the format's own limit."""
+"""Largest header [bytes]: the format's own limit."""
 METADATA = "__metadata__"
 _BROKEN = "the file is damaged or not a safetensors file; fetch or train it again"
 

@@ -11,7 +11,7 @@ from scenewright.schemas.errors import BadInput, MissingDependency
 from scenewright.schemas.outside import file_json
 
 LARGEST_CONFIG = 16 * 2**20
-"""Bytes."""
+"""Largest configuration of a model [bytes]."""
 
 
 def transformers_library() -> Any:

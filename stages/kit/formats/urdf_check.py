@@ -18,7 +18,7 @@ READ_MESHES = (".obj", ".stl", ".ply", ".glb")
 LARGEST_REACH = 1e5
 """Metres, of a mesh's vertices from its origin: engines compute in float32."""
 SMALLEST_EXTENT = 1e-9
-"""Metres."""
+"""Smallest extent of a shape [m]."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from scenewright.stages.kit.language.reply_schema import ReplySchema
 CHARACTERS_PER_TOKEN = 4
 """Rule of thumb for English and JSON, where a server does not count."""
 TOKENS_PER_IMAGE = 1000
-"""Likewise."""
+"""Rule of thumb for an image, where a server does not count."""
 
 
 @dataclass(frozen=True)

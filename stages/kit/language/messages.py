@@ -11,7 +11,7 @@ from scenewright.stages.kit.formats.image_headers import PNG_START, may_be_decod
 
 Role = Literal["system", "user", "assistant"]
 LARGEST_IMAGE_BYTES = 20 * 2**20
-"""Bytes of one image, as encoded."""
+"""Largest image, as encoded [bytes]."""
 JPEG_START = b"\xff\xd8"
 
 

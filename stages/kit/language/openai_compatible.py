@@ -19,9 +19,9 @@ from scenewright.stages.kit.services.connection import Answer, Connection, Given
 
 PATH = "/chat/completions"
 LARGEST_BODY = 8 * 2**20
-"""Bytes of an answer."""
+"""Largest answer [bytes]."""
 LONGEST_WAIT = 120.0
-"""Seconds that a server may ask to be left alone."""
+"""Longest time that a server may ask to be left alone [s]."""
 MOST_TOKENS = 10**9
 """Most tokens of one exchange: a larger count is no count."""
 NOT_UNDERSTOOD = frozenset({400, 422})

@@ -11,11 +11,11 @@ import re
 from typing import Any
 
 LONGEST_REPLY = 200_000
-"""Characters."""
+"""Longest reply that is read [characters]."""
 MOST_OBJECTS = 16
-"""Different objects in one reply."""
+"""Most different objects in one reply."""
 LONGEST_INTEGER = 300
-"""Digits: more are no double."""
+"""Longest integer [digits]: more are no double."""
 THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
 START = re.compile(r'\{\s*["}]')
 """How an object begins; braces in prose begin otherwise."""

@@ -20,7 +20,7 @@ from scenewright.stages.kit.language.backend import RawReply, Request, Usage, re
 from scenewright.stages.kit.language.messages import described
 
 LARGEST_TRANSCRIPT = 512 * 2**20
-"""Bytes."""
+"""Largest transcript [bytes]."""
 FIRST_KEY = b'{"backend": '
 """How a line of ours begins."""
 

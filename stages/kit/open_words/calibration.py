@@ -16,14 +16,14 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.open_words.encoder import Encoder
 
 FILE = "words/calibration.toml"
-"""Below data/."""
+"""File below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
 NAMED_SPLAT = "named splat"
 """Source of fits for splats whose pieces have classes of a panoptic map."""
 CLOSEST = 1e-4
 """Closest to 0 and 1 that a share may come, so that its log odds are finite."""
 SHORTEST = 0.01
-"""Edge of a region, at least [m]."""
+"""Shortest edge that a region counts with [m]."""
 
 
 @dataclass(frozen=True)

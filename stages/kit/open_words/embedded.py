@@ -16,7 +16,7 @@ from scenewright.stages.kit.open_words.two_towers import SIDE, WIDTH, TwoTowers,
 FORMAT = "scenewright two towers"
 VERSION = "2"
 FILE = "words/two_towers.safetensors"
-"""Below data/."""
+"""File below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
 BATCH = 512
 """Crops that pass the network at a time, which bounds the memory."""

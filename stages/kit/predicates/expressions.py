@@ -24,11 +24,11 @@ COMPARISONS = ("less", "at_most", "near")
 CONNECTIVES = ("and", "or")
 QUANTIFIERS = ("some", "every")
 WORDS = {*ARITHMETIC, *COMPARISONS, *CONNECTIVES, *QUANTIFIERS, "not", "is", "category"}
-"""Of every vocabulary."""
+"""Words that every vocabulary has."""
 DEEPEST = 24
 """Deepest nesting of an expression; a bound against damaged files."""
 LARGEST = 400
-"""Words of one expression."""
+"""Most words of one expression."""
 HINT = "docs/INTERPRET.md has the language of predicates"
 
 

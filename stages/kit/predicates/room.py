@@ -29,7 +29,7 @@ ROOM_WORDS = Vocabulary(
 )
 """Words that expressions may use of a room and its bodies."""
 TOUCH = 0.03
-"""What `near` allows [m]."""
+"""Largest distance that `near` allows [m]."""
 UNSEEN = ("wall", "ceiling", "surroundings")
 """Classes that nothing is said of."""
 REACHED = 0.95

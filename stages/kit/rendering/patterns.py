@@ -21,7 +21,7 @@ PATTERN, STRENGTH, PERIOD, GLOSS, SHARPNESS, SEED, TRANSFORM = range(7)
 SKIRTING = TRANSFORM + 12
 """Column of the skirting, behind the 12 of the transform."""
 ROW = SKIRTING + 2
-"""One column is spare."""
+"""Columns of the material table; one is spare."""
 
 
 @dataclass(frozen=True)

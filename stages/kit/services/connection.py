@@ -23,7 +23,8 @@ LONGEST_WAIT = 30.0
 LARGEST_BODY = 64 * 2**20
 """Bytes of an answer, unless the client says otherwise."""
 SHORTEST_SECRET = 8
-"""Characters; shorter ones (`none`, `EMPTY`, which local servers accept) would be hidden in the midst of words."""
+"""Shortest secret that is hidden [characters]; shorter ones (`none`, `EMPTY`, which local servers accept) would be
+hidden in the midst of words."""
 HIDDEN = "[key]"
 """Stands where a service says the key back."""
 LONGEST_EXCERPT = 200

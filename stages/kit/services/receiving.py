@@ -34,7 +34,7 @@ LINGER_SECONDS = 2.0
 LARGEST_HEAD = 32 * 2**10
 """Bytes of a request line and header."""
 LARGEST_BODY = 64 * 2**20
-"""Bytes of a request or an answer."""
+"""Largest request or answer [bytes]."""
 MOST_BODIES = 256 * 2**20
 """Bytes of all bodies that are held at a time."""
 MOST_CONNECTIONS = 64

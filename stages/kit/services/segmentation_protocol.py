@@ -29,11 +29,11 @@ PROTOCOL = "scenewright-segmentation/1"
 INFO_PATH, SEGMENT_PATH, HEALTH_PATH = "/v1/info", "/v1/segment", "/health"
 STREAMS = ("color", "depth", "pose")
 LARGEST_BODY = 64 * 2**20
-"""Bytes of a request or a reply."""
+"""Largest request or reply [bytes]."""
 MOST_SEGMENTS = 65536
 """Most segments of an answer; a bound, by eye."""
 LONGEST_TEXT = 200
-"""Characters of a name."""
+"""Longest name [characters]."""
 PART_HEADER_LIMIT = 4096
 """Longest header of a part [bytes]; a bound, by eye."""
 LARGEST_PART = 64 * 2**10

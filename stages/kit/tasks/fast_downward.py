@@ -22,7 +22,7 @@ from scenewright.stages.kit.tasks.task_planner import TaskPlan
 PACKAGE = "up_fast_downward"
 ALIAS = "lama-first"
 UNSOLVABLE = (10, 11, 12)
-"""Its exit codes for tasks without a plan."""
+"""Exit codes of Fast Downward for tasks without a plan."""
 LONGEST = 60.0
 """Time after which the planner is stopped [s]: a guard against a hang, not a budget."""
 INSTEAD = "take --planner builtin"

@@ -23,7 +23,7 @@ Heuristic = Literal["landmarks", "add", "max", "ff"]
 WEIGHTS = (5, 2, 1)
 """Weights of the heuristic in the searches that shorten the first plan."""
 IMPROVEMENT = 600
-"""Most states expanded in each of them."""
+"""Most states that are expanded in each search that shortens the first plan."""
 
 
 @dataclass(frozen=True)

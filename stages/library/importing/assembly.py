@@ -49,7 +49,7 @@ LIGHTEST, HEAVIEST = 5.0, 12000.0
 MOST_STATES_OF = 12
 """Joints that get states of their own."""
 MOST_PIECES = 1500
-"""Collision pieces of all parts."""
+"""Most collision pieces of all parts of a model."""
 MOST_SECTIONS, MOST_SECTIONS_CLOSED = 100_000, 30_000
 """Most sections of pieces with planes, in all states and in the closed one. An oven of 48 pieces and 20 states takes
 20,000."""

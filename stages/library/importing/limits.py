@@ -28,9 +28,9 @@ MOST_SHAPES = 20_000
 MOST_TRIANGLES_OF_A_FILE = 5 * MOST_TRIANGLES
 """Most triangles of all models that one description holds."""
 MOST_FINDINGS = 40
-"""What is said of one model."""
+"""Most findings that are kept of one model."""
 LONGEST_TEXT = 300
-"""Characters of a name or a finding."""
+"""Longest name or finding [characters]."""
 SIMPLIFY = f"simplify it to at most {MOST_TRIANGLES} triangles and {MOST_SHAPES} shapes, or split it"
 REFUSALS = (
     *(ArithmeticError, RecursionError, ValueError, QhullError, ShapelyError),

@@ -15,7 +15,7 @@ LARGEST_PICTURE = 64 * 2**20
 MOST_PIXELS = 400_000_000
 """Most pixels of all pictures of a mesh file, those that are decoded again counted again: two dozen of 4096 x 4096."""
 MOST_HELD = 400 * 2**20
-"""Bytes of decoded pictures."""
+"""Most bytes of decoded pictures that are held."""
 SAMPLES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=float)
 """Places in a triangle where its colour is looked up (barycentric): its centre and three points towards its corners."""
 PALETTE = 8

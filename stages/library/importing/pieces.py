@@ -42,7 +42,7 @@ WELD = 1e-5
 MOST_CORNERS = 64
 """Corners of one convex piece; rounder ones are drawn by their extremes in this many directions, twice over."""
 MOST_PIECES = 48
-"""Pieces of one part."""
+"""Most collision pieces of one part."""
 MOST_COMPONENTS = 1000
 """Connected components and solids of one part of which pieces are made: the largest."""
 MOST_DECOMPOSED = 24

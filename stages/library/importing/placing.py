@@ -25,7 +25,7 @@ from scenewright.stages.library.modelling import BODY
 from scipy.spatial.transform import Rotation
 
 MOST_PARTS = 500
-"""Parts of a model that move."""
+"""Most parts of a model that move."""
 FARTHEST = 1e5
 """Farthest from the origin of a model that anything may lie [m]; a bound, by eye."""
 LONGEST_SLIDE = 1e4

@@ -15,7 +15,7 @@ from scenewright.schemas.outside import file_content
 from scenewright.stages.kit.formats.xml_files import parse_xml
 
 LARGEST_FILE = 256 * 2**20
-"""Bytes of a mesh or a picture."""
+"""Largest mesh or picture [bytes]."""
 LARGEST_TEXT = 128 * 2**20
 """Bytes of a mesh that is text, which takes several times as much while it is read."""
 LARGEST_XML = 64 * 2**20
@@ -31,7 +31,7 @@ MOST_KEPT_NAMES = 20_000
 PIECE = 1 << 20
 """Characters of a text that are parsed at a time; by eye."""
 LONGEST_NUMBER = 4096
-"""Characters."""
+"""Longest number in a text [characters]."""
 LONGEST_ROW = 100_000
 """Characters of a row that is a size or a pose; what comes after them makes it the wrong number of numbers anyway."""
 BLANK = re.compile(r"\s")

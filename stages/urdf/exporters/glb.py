@@ -26,7 +26,7 @@ FLOAT, UNSIGNED_INT, UNSIGNED_SHORT = 5126, 5125, 5123
 VERTICES, INDICES = 34962, 34963
 """Targets of buffer views, ARRAY_BUFFER and ELEMENT_ARRAY_BUFFER (glTF 2.0)."""
 Y_UP_FROM_Z_UP = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
-"""Quaternion (x, y, z, w)."""
+"""Turn from z up to y up, a quaternion (x, y, z, w)."""
 
 
 def write_scene_glb(

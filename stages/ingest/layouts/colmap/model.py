@@ -45,7 +45,7 @@ LONGEST_NAME = 4096
 LARGEST_SIZE = 100_000
 """Largest width or height of a camera [px]; a bound against damaged files."""
 OBSERVATION = 24
-"""Bytes of x, y and the point's id."""
+"""Bytes of an observation in images.bin: x, y and the point's id."""
 
 
 @dataclass(frozen=True)

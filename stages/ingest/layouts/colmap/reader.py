@@ -36,7 +36,7 @@ from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, Sour
 IMAGE_FOLDERS = ("images", "image", "rgb", "color")
 DENSE_MAPS = "stereo/depth_maps"
 DENSE_ENDINGS = (".geometric.bin", ".photometric.bin")
-"""In the order in which they are preferred: geometric ones were checked against other views."""
+"""Endings of depth maps in the order in which they are preferred: geometric ones were checked against other views."""
 
 ONE_FOCAL_LENGTH = (
     "SIMPLE_PINHOLE",

@@ -27,7 +27,7 @@ from scenewright.stages.kit.viewing.page.packing import STEPS, Block, thinned_me
 
 FOLDER = Path(__file__).resolve().parent
 LARGEST_PAGE = 15_000_000
-"""Bytes."""
+"""Largest page [bytes]."""
 MOST_VERTICES = 240_000
 """Most vertices of all meshes together; more are thinned."""
 EDGES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.5, 1.0, 5.0)
