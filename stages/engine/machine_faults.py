@@ -46,14 +46,12 @@ def _places(error: OSError) -> list[str]:
     return [os.path.abspath(os.fsdecode(name)) for name in names if "\0" not in os.fsdecode(name)]
 
 
-def _names(word: str, place: str) -> bool:
+def _names(word: str, path: str) -> bool:
     """Whether a word of the command line is this place, or a folder above or below it."""
     value = word.partition("=")[2] if word.startswith("--") and "=" in word else word
     if not value or value.startswith("-") or "\0" in value:
         return False
     absolute = os.path.abspath(value)
     return (
-        absolute == place
-        or place.startswith(absolute.rstrip("/") + "/")
-        or absolute.startswith(place.rstrip("/") + "/")
+        absolute == path or path.startswith(absolute.rstrip("/") + "/") or absolute.startswith(path.rstrip("/") + "/")
     )

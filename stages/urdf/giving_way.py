@@ -117,9 +117,9 @@ def written_pieces(root: Path) -> dict[str, list[Piece]]:
     return pieces
 
 
-def _cut(own: dict[int, list[Piece]], others: Sequence[Piece]) -> None:
+def _cut(pieces_of_shape: dict[int, list[Piece]], others: Sequence[Piece]) -> None:
     """Cut what of a thing's pieces, by the number of their shape, lies in those of another, if any lies deep in it."""
-    pieces = [piece for cut_pieces in own.values() for piece in cut_pieces]
+    pieces = [piece for cut_pieces in pieces_of_shape.values() for piece in cut_pieces]
     if not pieces:
         return
     low, high = np.min([piece.low for piece in pieces], axis=0), np.max([piece.high for piece in pieces], axis=0)
@@ -128,8 +128,8 @@ def _cut(own: dict[int, list[Piece]], others: Sequence[Piece]) -> None:
     if max(depths, default=0.0) <= DEPTH:
         return
     for obstacle in (obstacle for obstacle, depth in zip(others, depths, strict=True) if depth > TOUCHING):
-        for number, cut_pieces in own.items():
-            own[number] = [
+        for number, cut_pieces in pieces_of_shape.items():
+            pieces_of_shape[number] = [
                 remainder
                 for piece in cut_pieces
                 for remainder in (piece.without(obstacle) if piece.depth(obstacle) > TOUCHING else [piece])

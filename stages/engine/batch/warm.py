@@ -97,17 +97,17 @@ class WarmScenes:
     """Runs scenes like `run_scene`, each thread with a worker."""
 
     def __init__(self) -> None:
-        self._own = threading.local()
+        self._local = threading.local()
         self._all: list[_Worker] = []
 
     def __call__(self, job: Job, cancelled: Callable[[], bool] = lambda: False, host: str = "") -> SceneResult | None:
         """Run a scene to its end, within its limits, and send what it made to the storage (scene_run.py)."""
-        worker, environment = getattr(self._own, "worker", None), scene_environment(job)
+        worker, environment = getattr(self._local, "worker", None), scene_environment(job)
         if worker is not None and worker.environment != environment:  # numeric libraries look at it when they load
             self._drop(worker)
             worker = None
         if worker is None:
-            worker = self._own.worker = _Worker(environment)
+            worker = self._local.worker = _Worker(environment)
             self._all.append(worker)
         try:
             result = worker.run(job, cancelled, host)
@@ -117,7 +117,7 @@ class WarmScenes:
         return None if result is None else stored(job, result)
 
     def _drop(self, worker: _Worker) -> None:
-        self._own.worker = None
+        self._local.worker = None
         self._all.remove(worker)
         worker.close()
 

@@ -89,7 +89,7 @@ def _resized(camera: Camera, size: tuple[int, int]) -> Camera:
     return camera.model_copy(update={"width": size[0], "height": size[1]}) if size != (0, 0) else camera
 
 
-def _lens(topic: str, content: LogContent, what: str, parameters: IngestParameters, where: str) -> Lens:
+def _lens(topic: str, content: LogContent, image_kind: str, parameters: IngestParameters, where: str) -> Lens:
     """Return the lens of a topic by its own calibration. Raises BadInput when there is none."""
     name = calibration_topic(topic, content)
     size = content.images[topic].size
@@ -99,7 +99,7 @@ def _lens(topic: str, content: LogContent, what: str, parameters: IngestParamete
             check_calibrated(content.calibrations[zeros[0]], f"{where}: topic {zeros[0]}")
         why = f"{where}: no camera calibration for {topic}{content.undecodable_calibrations()}"
         return Lens(camera_from_options(size, parameters, why), size)
-    lens = lens_of(content.calibrations[name], size, is_rectified(topic), f"{where}: topic {name}", what)
+    lens = lens_of(content.calibrations[name], size, is_rectified(topic), f"{where}: topic {name}", image_kind)
     notes = [f"intrinsics of {topic} from topic {name}", *lens.notes]
     if name in content.changed_calibrations:
         notes.append(f"the calibration {name} changes within the log; the first one is used")

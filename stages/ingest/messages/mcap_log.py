@@ -66,7 +66,7 @@ class McapLog:
         self.damage = DamageLines(self.path, salvage=salvage)
         self.message_counts: dict[int, int] | None = None
         """Channel id -> messages, where the file states them or had to be read for its channels."""
-        self._found: Counter[int] = Counter()
+        self._counts: Counter[int] = Counter()
         """Channel id -> messages in what was examined."""
         self._examined: set[int] = set()
         """Offsets of chunks that were read to their end."""
@@ -116,7 +116,7 @@ class McapLog:
                 message = self._loose_message(offset)
                 if message is not None and (wanted_ids is None or message.channel.id in wanted_ids):
                     yield message
-        stated, counted = self._structure.stated_messages, self._found.total()
+        stated, counted = self._structure.stated_messages, self._counts.total()
         if stated not in (None, counted) and not self.damage:
             self.damage.found(f"states {stated} messages and holds {counted}")
 
@@ -278,7 +278,7 @@ class McapLog:
         return self._file.exactly(offset + HEAD.size, length)
 
     def _take_counts(self, counts_here: Counter[int], short: int) -> None:
-        self._found.update(counts_here)
+        self._counts.update(counts_here)
         for channel_id, number in sorted(counts_here.items()):
             if channel_id not in self.channels:
                 self.damage.found(f"a message belongs to channel {channel_id}, which the file does not define", number)
@@ -301,14 +301,14 @@ class McapLog:
             raise Damaged("has a wrong checksum")
         return data
 
-    def _report_lost_chunk(self, index: int, fault: Damaged, read: int) -> None:
+    def _report_lost_chunk(self, index: int, fault: Damaged, messages_read: int) -> None:
         messages = self._structure.indexed_messages(index)
         count = "no index says how many messages" if messages is None else f"{messages} messages by its index"
-        consequence = f"all but its first {read} messages are lost" if read else "it is lost"
+        consequence = f"all but its first {messages_read} messages are lost" if messages_read else "it is lost"
         self.damage.found(f"chunk at byte {self._chunks[index]} ({count}) {fault}: {consequence}")
 
-    def _bad(self, what: str) -> BadInput:
-        return BadInput(f"{self.path}: {what}", hint=HINT)
+    def _bad(self, fault: str) -> BadInput:
+        return BadInput(f"{self.path}: {fault}", hint=HINT)
 
 
 def _records(data: bytes) -> Iterator[tuple[int, int, int]]:

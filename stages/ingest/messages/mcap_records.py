@@ -36,13 +36,13 @@ class _Fields:
 
     def __init__(self, body: bytes) -> None:
         self._body = body
-        self._place = 0
+        self._position = 0
 
     def take(self, length: int) -> bytes:
-        piece = self._body[self._place : self._place + length]
+        piece = self._body[self._position : self._position + length]
         if len(piece) != length:
             raise Damaged(f"claims a field of {length} bytes and has {len(piece)} left")
-        self._place += length
+        self._position += length
         return piece
 
     def number(self, size: int) -> int:
@@ -57,7 +57,7 @@ class _Fields:
     def texts(self) -> dict[str, str]:
         inside = _Fields(self.take(self.number(4)))
         text_of = {}
-        while inside._place < len(inside._body):
+        while inside._position < len(inside._body):
             key = inside.text()
             text_of[key] = inside.text()
         return text_of
@@ -101,7 +101,7 @@ def read_statistics(body: bytes) -> tuple[int, int, dict[int, int]]:
     fields.take(4 + 4 + 4 + 8 + 8)
     inside = _Fields(fields.take(fields.number(4)))
     counts = {}
-    while inside._place < len(inside._body):
+    while inside._position < len(inside._body):
         channel = inside.number(2)
         counts[channel] = inside.number(8)
     return messages, channels, counts

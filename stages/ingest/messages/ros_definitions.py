@@ -217,9 +217,9 @@ class _IdlReader:
         self._next: str = next(self._tokens, "")
         self._scope: list[str] = []
         self._constants: dict[str, int] = {}
-        self._named: dict[str, tuple[str, int | None]] = {}
+        self._type_of_name: dict[str, tuple[str, int | None]] = {}
         """Path of a typedef, enum or struct -> kind and count."""
-        self._found: Definitions = {}
+        self._definitions: Definitions = {}
 
     def read(self) -> Definitions:
         while self._next:
@@ -237,20 +237,20 @@ class _IdlReader:
             elif word == "typedef":
                 kind = self._kind()
                 for name, dimensioned in self._declarators(kind):
-                    self._named[self._path(name)] = dimensioned
+                    self._type_of_name[self._path(name)] = dimensioned
             elif word == "enum":
-                self._named[self._path(self._take())] = ("I", None)
+                self._type_of_name[self._path(self._take())] = ("I", None)
                 self._skip_to(";")
             elif word == "struct":
                 self._struct()
             else:
                 raise UnreadableDefinition(f"{word[:40]!r} in its definition is not understood")
-        return self._found
+        return self._definitions
 
     def _struct(self) -> None:
         path = self._path(self._take())
         name = short_name(path)
-        self._named[path] = (name, None)
+        self._type_of_name[path] = (name, None)
         self._expect("{")
         fields: list[Field] = []
         while self._next != "}":
@@ -262,7 +262,7 @@ class _IdlReader:
             fields += [Field(field.lower(), *dimensioned) for field, dimensioned in self._declarators(kind)]
         self._expect("}")
         self._expect(";")
-        self._found[name] = tuple(fields)
+        self._definitions[name] = tuple(fields)
 
     def _constant(self) -> None:
         words = []
@@ -301,8 +301,8 @@ class _IdlReader:
             raise UnreadableDefinition(f"{name[:40]!r} in its definition is no type")
         for depth in range(0 if name.startswith("::") else len(self._scope), -1, -1):
             candidate = "/".join([*self._scope[:depth], path])
-            if candidate in self._named:
-                return self._named[candidate]
+            if candidate in self._type_of_name:
+                return self._type_of_name[candidate]
         return (short_name(path) if "/" in path else short_name(self._path(path))), None
 
     def _declarators(self, kind: tuple[str, int | None]) -> list[tuple[str, tuple[str, int | None]]]:

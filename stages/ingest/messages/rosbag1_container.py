@@ -360,8 +360,8 @@ class Rosbag1Messages:
             raise Damaged(f"has {record.length} bytes, more than the {LARGEST_CONNECTION} that are accepted")
         return self._file.exactly(record.start, record.length)
 
-    def _bad(self, what: str) -> BadInput:
-        return BadInput(f"{self.path}: {what}", hint=HINT)
+    def _bad(self, fault: str) -> BadInput:
+        return BadInput(f"{self.path}: {fault}", hint=HINT)
 
 
 def open_rosbag1(path: Path, *, salvage: bool) -> Rosbag1Messages:

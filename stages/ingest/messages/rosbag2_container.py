@@ -49,7 +49,7 @@ class Rosbag2Messages:
         self.damage: list[str] = []
         self.notes: list[str] = []
         self._salvage = salvage
-        self._own = DamageLines(path, salvage=salvage)
+        self._lines = DamageLines(path, salvage=salvage)
         self._of_parts: dict[int, list[str]] = {}
         self._open: dict[int, Part] = {}
         self._in_use: list[int] = []
@@ -128,7 +128,7 @@ class Rosbag2Messages:
         except BadInput as error:
             if not self._salvage or "outside of the folder" in error.message:
                 raise
-            self._own.note(f"{error.message}: the parts are taken in the order of their names")
+            self._lines.note(f"{error.message}: the parts are taken in the order of their names")
             return BagMetadata(listed_parts(self.path))
 
     def _survey(self) -> None:
@@ -141,7 +141,7 @@ class Rosbag2Messages:
                 part = self._part(index)
             except BadInput as error:
                 reasons.append(f"{path.name}: {error.message.removeprefix(f'{path}: ')}")
-                self._own.found(f"part {reasons[-1]}")
+                self._lines.found(f"part {reasons[-1]}")
                 continue
             self._readable.append(index)
             self._of_parts[index] = list(part.damage)
@@ -172,14 +172,14 @@ class Rosbag2Messages:
     def _compare_counts(self) -> None:
         counts = [channel.count for channel in self.channels]
         stated = self._bag.message_count
-        if stated is None or None in counts or any(self._of_parts.values()) or self._own:
+        if stated is None or None in counts or any(self._of_parts.values()) or self._lines:
             return
         count_of_parts = sum(count or 0 for count in counts)
         if count_of_parts < stated:
-            self._own.found(f"{NAME} counts {stated} messages, the parts hold {count_of_parts}")
+            self._lines.found(f"{NAME} counts {stated} messages, the parts hold {count_of_parts}")
 
     def _refresh(self) -> None:
-        lines = list(self._own)
+        lines = list(self._lines)
         for index, of_part in sorted(self._of_parts.items()):
             prefix = f"{self._name(index)}: " if self.path.is_dir() else ""
             lines += [prefix + line for line in of_part]
@@ -247,7 +247,7 @@ class Rosbag2Messages:
                 limit = max(ALWAYS_ACCEPTED, ratio * path.stat().st_size)
                 unpack_file(packed, file, limit if stated is None else min(limit, stated))
         except ValueError as error:
-            self._own.found(f"part {path.name} {error}")
+            self._lines.found(f"part {path.name} {error}")
         except OSError as error:
             raise MachineFailure(
                 f"{path}: cannot be unpacked into {folder.name}: {error.strerror}", hint="free space, or set TMPDIR"

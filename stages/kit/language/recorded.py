@@ -18,7 +18,7 @@ class RecordedBackend:
 
     def __init__(self, transcript: Transcript, model: str) -> None:
         self._transcript, self._model = transcript, model
-        self._asked: Counter[str] = Counter()
+        self._occurrences: Counter[str] = Counter()
 
     @property
     def label(self) -> str:
@@ -27,11 +27,11 @@ class RecordedBackend:
 
     def ask(self, request: Request) -> RawReply:
         """Return the recorded reply. Raises LanguageFailed (`not_recorded`) saying which prompt and how to record."""
-        digest, occurrence = request.digest, self._asked[request.digest]
+        digest, occurrence = request.digest, self._occurrences[request.digest]
         exchange = self._transcript.find(digest, occurrence)
         if exchange is None:
             raise _missing(self._transcript, request, occurrence)
-        self._asked[digest] += 1
+        self._occurrences[digest] += 1
         return exchange.raw
 
 
@@ -41,7 +41,7 @@ class RecordingBackend:
 
     def __init__(self, asked: Backend, file: TranscriptFile, earlier: Transcript | None = None) -> None:
         self._backend, self._file, self._earlier = asked, file, earlier
-        self._asked: Counter[str] = Counter()
+        self._occurrences: Counter[str] = Counter()
 
     @property
     def label(self) -> str:
@@ -51,9 +51,9 @@ class RecordingBackend:
     def ask(self, request: Request) -> RawReply:
         """Return the reply, out of the file or of the backend. Raises what that raises."""
         digest = request.digest
-        occurrence = self._asked[digest]
+        occurrence = self._occurrences[digest]
         raw = self._answer(request, digest, occurrence)
-        self._asked[digest] += 1
+        self._occurrences[digest] += 1
         return raw
 
     def _answer(self, request: Request, digest: str, occurrence: int) -> RawReply:

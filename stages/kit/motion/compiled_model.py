@@ -42,7 +42,7 @@ class CompiledModel:
         self._group_body: list[str] = []
         self._group_range: dict[str, range] = {}
         self._bodies: list[LoadedBody] | None = None
-        self._seen: tuple[int, str | None] = (-1, None)
+        self._revision_and_carried: tuple[int, str | None] = (-1, None)
         self._seen_body: dict[str, int] = {}
         self._rules: tuple[object, ...] | None = None
         self._robot_state: tuple[object, ...] | None = None
@@ -71,14 +71,14 @@ class CompiledModel:
             self._bodies = bodies
             self._build_scene()
             rebuilt = True
-        elif (self.world.revision, carried) != self._seen:
+        elif (self.world.revision, carried) != self._revision_and_carried:
             for name, body_range in self._group_range.items():
                 changed = max(self.world.revisions.get(name, 0), self.world.stepped)
                 # What is carried is looked at again once it is put down.
                 if changed > self._seen_body[name] and name != carried:
                     self._place(name, body_range)
                     self._seen_body[name] = changed
-        self._seen = (self.world.revision, carried)
+        self._revision_and_carried = (self.world.revision, carried)
         rules = (carried, touchable, tuple(rest_on))
         if rebuilt or rules != self._rules:
             self._allow(carried, touchable, rest_on)

@@ -19,7 +19,7 @@ class Evaluator:
 
     def __init__(self, state: Perceived, predicates: Mapping[str, Predicate]) -> None:
         self.state, self.predicates = state, predicates
-        self._known: dict[Atom, bool] = {}
+        self._truth_by_atom: dict[Atom, bool] = {}
         self._steps = 0
 
     def holds(self, atom: Atom) -> bool:
@@ -46,10 +46,12 @@ class Evaluator:
         return frozenset(holding)
 
     def _atom(self, atom: Atom) -> bool:
-        if atom not in self._known:
+        if atom not in self._truth_by_atom:
             predicate = self.predicates[atom[0]]
-            self._known[atom] = self._truth(predicate.means, dict(zip(predicate.variables, atom[1:], strict=True)))
-        return self._known[atom]
+            self._truth_by_atom[atom] = self._truth(
+                predicate.means, dict(zip(predicate.variables, atom[1:], strict=True))
+            )
+        return self._truth_by_atom[atom]
 
     def _truth(self, tree: Tree, binding: dict[str, str]) -> bool:
         self._steps += 1

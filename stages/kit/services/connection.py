@@ -97,7 +97,7 @@ class Connection:
         self.repeats = 0
         self._key, self._refused_hint, self._now = key, refused_hint, now
         self._largest_body, self._longest_wait = largest_body, longest_wait
-        self._parts = urlsplit(address)
+        self._url = urlsplit(address)
         self._timeout, self._retries, self._retry_wait, self._sleep = timeout, retries, retry_wait, sleep
         self._open: http.client.HTTPConnection | None = None
 
@@ -162,7 +162,7 @@ class Connection:
                 headers["Authorization"] = f"Bearer {self._key}"
             if body is not None:
                 headers["Content-Type"] = content_type
-            connection.request(method, self._parts.path + path, body, headers)
+            connection.request(method, self._url.path + path, body, headers)
             response = connection.getresponse()
             data = self._read(response)
         except (OSError, http.client.HTTPException, ValueError) as error:
@@ -221,9 +221,9 @@ class Connection:
 
     def _connect(self) -> http.client.HTTPConnection:
         if self._open is None:
-            assert self._parts.hostname is not None
-            kind = http.client.HTTPSConnection if self._parts.scheme == "https" else http.client.HTTPConnection
-            self._open = kind(self._parts.hostname, self._parts.port, timeout=self._timeout)
+            assert self._url.hostname is not None
+            kind = http.client.HTTPSConnection if self._url.scheme == "https" else http.client.HTTPConnection
+            self._open = kind(self._url.hostname, self._url.port, timeout=self._timeout)
             self._open.connect()
             if self._open.sock is not None:  # small packets go at once
                 self._open.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

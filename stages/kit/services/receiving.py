@@ -63,7 +63,7 @@ class BoundedServer(ThreadingHTTPServer):
         self._host = host.lower()
         self._slots = threading.BoundedSemaphore(self.most_connections)
         self._expecting: dict[socket.socket, None] = {}
-        self._held = 0
+        self._held_bytes = 0
         self._lock = threading.Lock()
         if ":" in host:
             self.address_family = socket.AF_INET6
@@ -155,9 +155,9 @@ class BoundedServer(ThreadingHTTPServer):
     def hold(self, size: int) -> bool:
         """Count bytes of bodies that are held (negative: no longer); False, and nothing counted, for too many."""
         with self._lock:
-            if self._held + size > self.most_bodies:
+            if self._held_bytes + size > self.most_bodies:
                 return False
-            self._held += size
+            self._held_bytes += size
             return True
 
 
@@ -316,17 +316,17 @@ class BoundedHandler(BaseHTTPRequestHandler):
                     self.close_connection = True
                     return None  # the client is gone
             held_bytes, received = received, 0
-            self._kept = held_bytes
+            self._held_for_request = held_bytes
             return b"".join(pieces)
         finally:
             self.server.hold(-received)
 
-    _kept = 0
+    _held_for_request = 0
 
     def done(self) -> None:
         """Say that the body is held no longer."""
-        self.server.hold(-self._kept)
-        self._kept = 0
+        self.server.hold(-self._held_for_request)
+        self._held_for_request = 0
 
     def _refuse_unread(self, status: int, reason: str, headers: Mapping[str, str] | None = None) -> None:
         """Refuse a request whose body may still come: the connection ends with it."""

@@ -63,7 +63,7 @@ class Allowance:
         self, where: str, *, triangles: int = MOST_TRIANGLES, vertices: int = MOST_VERTICES, shapes: int = MOST_SHAPES
     ) -> None:
         self._where, self._bounds = where, (triangles, vertices, shapes)
-        self._left = list(self._bounds)
+        self._remaining = list(self._bounds)
 
     def take(self, surfaces: Sequence[Surface]) -> None:
         """Count surfaces. Raises BadInput."""
@@ -73,8 +73,8 @@ class Allowance:
     def take_counts(self, triangles: int, vertices: int, shapes: int = 1) -> None:
         """Count triangles and vertices of shapes before they are made. Raises BadInput."""
         for k, count in enumerate((triangles, vertices, shapes)):
-            self._left[k] -= count
-            if self._left[k] < 0:
+            self._remaining[k] -= count
+            if self._remaining[k] < 0:
                 counted = ("triangles", "vertices", "shapes")[k]
                 raise BadInput(f"{self._where}: more than {self._bounds[k]} {counted} in all", hint=SIMPLIFY)
 

@@ -27,20 +27,20 @@ class Pictures:
 
     def __init__(self, folder: SourceFolder, path: Path, findings: list[str]) -> None:
         self._folder, self._path, self._findings = folder, path, findings
-        self._held: dict[str, np.ndarray | None] = {}
-        self._left = MOST_PIXELS
+        self._decoded: dict[str, np.ndarray | None] = {}
+        self._remaining_pixels = MOST_PIXELS
 
     def picture(self, name: str) -> np.ndarray | None:
         """Return a picture (H, W, 3) uint8 RGB, or None when it is not there, or none, or there are too many."""
-        if name not in self._held:
+        if name not in self._decoded:
             picture = self._read(name)
-            while picture is not None and self._held and picture.size + self._held_bytes() > MOST_HELD:
-                del self._held[next(iter(self._held))]
-            self._held[name] = picture
-        return self._held[name]
+            while picture is not None and self._decoded and picture.size + self._decoded_bytes() > MOST_HELD:
+                del self._decoded[next(iter(self._decoded))]
+            self._decoded[name] = picture
+        return self._decoded[name]
 
-    def _held_bytes(self) -> int:
-        return sum(picture.size for picture in self._held.values() if picture is not None)
+    def _decoded_bytes(self) -> int:
+        return sum(picture.size for picture in self._decoded.values() if picture is not None)
 
     def _read(self, name: str) -> np.ndarray | None:
         label = f"{self._path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60}"
@@ -50,8 +50,8 @@ class Pictures:
             data = self._folder.read(file, LARGEST_PICTURE)
             size = image_size(data)
             if size is not None and may_be_decoded(data):
-                self._left -= size[0] * size[1]
-                if self._left < 0:
+                self._remaining_pixels -= size[0] * size[1]
+                if self._remaining_pixels < 0:
                     self._findings.append(f"{label} is left out: more than {MOST_PIXELS} pixels in all")
                     return None
                 with suppress(cv2.error):  # a decoder that gives up

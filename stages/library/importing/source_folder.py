@@ -45,7 +45,7 @@ class SourceFolder:
         self.root = Path(root).resolve()
         self.kept_meshes: dict[Path, Any] = {}
         """What mesh_reading.py keeps of files that are named again and again."""
-        self._found: dict[tuple[str, tuple[Path, ...]], Path | None] = {}
+        self._file_of: dict[tuple[str, tuple[Path, ...]], Path | None] = {}
         self.read_bytes_of: set[Path] = set()
         """Files that were read; what no description names may be a model by itself."""
 
@@ -100,11 +100,11 @@ class SourceFolder:
         """
         if len(name) > 1000 or "\0" in name:
             return None
-        if len(self._found) > MOST_KEPT_NAMES:
-            self._found.clear()
-        if (name, bases) not in self._found:
-            self._found[name, bases] = self._search(name, bases)
-        return self._found[name, bases]
+        if len(self._file_of) > MOST_KEPT_NAMES:
+            self._file_of.clear()
+        if (name, bases) not in self._file_of:
+            self._file_of[name, bases] = self._search(name, bases)
+        return self._file_of[name, bases]
 
     def _search(self, name: str, bases: tuple[Path, ...]) -> Path | None:
         plain = SCHEME.sub("", name.strip().replace("\\", "/"))

@@ -51,7 +51,7 @@ class _Writer:
         self.scene = scene
         self.renamed: dict[str, str] = {}
         self._paths: dict[str, str] = {}
-        self._taken: set[str] = set()
+        self._used_names: set[str] = set()
         self._surface_materials: dict[float, UsdShade.Material] = {}
 
     def add_body(self, body: BodyToExport) -> None:
@@ -74,10 +74,10 @@ class _Writer:
     def _path(self, parent: str, name: str) -> str:
         plain = Tf.MakeValidIdentifier(name)
         number, candidate = 1, plain
-        while f"{parent}/{candidate}" in self._taken:
+        while f"{parent}/{candidate}" in self._used_names:
             number += 1
             candidate = f"{plain}_{number}"
-        self._taken.add(f"{parent}/{candidate}")
+        self._used_names.add(f"{parent}/{candidate}")
         if candidate != name:
             self.renamed[candidate] = name
         return f"{parent}/{candidate}"

@@ -72,7 +72,7 @@ class GpuDrawn:
     def __init__(
         self, leaves: dict[str, torch.Tensor], twist: torch.Tensor, image: torch.Tensor, alpha: torch.Tensor, told: Any
     ) -> None:
-        self._leaves, self._twist, self._image, self._alpha, self._told = leaves, twist, image, alpha, told
+        self._leaves, self._twist, self._image, self._alpha, self._details = leaves, twist, image, alpha, told
         pixels = image.detach().cpu().numpy()
         self.visible = (told["radii"][0] > 0).reshape(len(leaves["means"]), -1).all(dim=1).cpu().numpy()
         self.picture = Picture(pixels[..., :3], pixels[..., -1], alpha.detach().cpu().numpy(), pixels[..., 3:-1])
@@ -89,6 +89,6 @@ class GpuDrawn:
 
         return GaussianGradients(
             **{name: of(leaf) for name, leaf in self._leaves.items()},
-            centers=of(self._told["means2d"])[0],
+            centers=of(self._details["means2d"])[0],
             twist=of(self._twist),
         )

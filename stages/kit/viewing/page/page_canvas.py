@@ -74,7 +74,7 @@ class PageCanvas:
         self._meshes: list[_Mesh] = []
         self._pictures: list[tuple[str, float | None, bytes]] = []
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
-        self._said: dict[str, list[Any]] = {
+        self._entries: dict[str, list[Any]] = {
             kind: [] for kind in ("lines", "points", "boxes", "transforms", "documents", "views", "joints", "moments")
         }
         self._graph: dict[str, Any] | None = None
@@ -104,7 +104,7 @@ class PageCanvas:
 
     def view(self, name: str, *hidden: str) -> None:
         """See Canvas."""
-        self._said["views"].append({"name": name, "hidden": list(hidden)})
+        self._entries["views"].append({"name": name, "hidden": list(hidden)})
 
     def mesh(
         self,
@@ -132,7 +132,7 @@ class PageCanvas:
         entry = {**self._entry(path), **self._block.positions(points[::every]), "radius": float(radius)}
         if colors is not None and np.asarray(colors).ndim == 2:
             entry["colors"] = self._block.put(np.asarray(colors)[::every, :3].astype(np.uint8))
-        self._said["points"].append(entry)
+        self._entries["points"].append(entry)
 
     def line(
         self,
@@ -146,7 +146,7 @@ class PageCanvas:
         arrays = [np.asarray(strip, dtype=float).reshape(-1, 3) for strip in strips]
         if not sum(map(len, arrays)):
             return
-        self._said["lines"].append(
+        self._entries["lines"].append(
             {
                 **self._entry(path),
                 **self._block.positions(np.concatenate(arrays)),
@@ -163,18 +163,18 @@ class PageCanvas:
         if boxes:
             corners = np.concatenate([box_corners(box) for box in boxes])
             rows = {"labels": labels, "colors": [bytes_of(color) for color in colors]}
-            self._said["boxes"].append({**self._entry(path), **self._block.positions(corners), **rows})
+            self._entries["boxes"].append({**self._entry(path), **self._block.positions(corners), **rows})
 
     def transform(self, path: str, parent_from_child: np.ndarray, scale: float = 1.0) -> None:
         """See Canvas."""
         matrix = np.asarray(parent_from_child, dtype=float).copy()
         matrix[:3, :3] *= scale
         rows = [round(float(value), 6) for value in matrix[:3].ravel()]
-        self._said["transforms"].append({**self._entry(path), "rows": rows})
+        self._entries["transforms"].append({**self._entry(path), "rows": rows})
 
     def joints(self, links: Sequence[JointedLink]) -> None:
         """See Canvas."""
-        self._said["joints"] += [
+        self._entries["joints"] += [
             {**vars(link), "parent_from_link": np.asarray(link.parent_from_link)[:3].ravel().tolist()} for link in links
         ]
 
@@ -217,11 +217,11 @@ class PageCanvas:
 
     def moment(self, seconds: float, text: str, *, bad: bool = False) -> None:
         """See Canvas."""
-        self._said["moments"].append({"time": float(seconds), "text": cleaned(text), "bad": bad})
+        self._entries["moments"].append({"time": float(seconds), "text": cleaned(text), "bad": bad})
 
     def document(self, path: str, markdown: str) -> None:
         """See Canvas."""
-        self._said["documents"].append({**self._entry(path), "text": cleaned(markdown)})
+        self._entries["documents"].append({**self._entry(path), "text": cleaned(markdown)})
 
     def _entry(self, path: str) -> dict[str, Any]:
         return {"path": path, "time": self._time}
@@ -273,18 +273,18 @@ class PageCanvas:
             "graph": self._graph,
             "trust": self._trust,
             "left_out": sorted(self._left_out),
-            **self._said,
+            **self._entries,
         }
 
     def _enclose_everything(self) -> None:
         """Keep all in sight where it is first placed, but for what cameras see."""
         bounds = [(mesh.path, mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) for mesh in self._meshes]
-        for entry in (entry for kind in ("points", "lines", "boxes") for entry in self._said[kind]):
+        for entry in (entry for kind in ("points", "lines", "boxes") for entry in self._entries[kind]):
             if entry["at"][1] and entry["path"] not in self._pyramids:
                 low = np.array(entry["low"])
                 bounds.append((entry["path"], low, low + STEPS * np.array(entry["step"])))
         placed: dict[str, np.ndarray] = {}
-        for entry in self._said["transforms"]:
+        for entry in self._entries["transforms"]:
             placed.setdefault(entry["path"], np.array([*entry["rows"], 0, 0, 0, 1]).reshape(4, 4))
         for path, low, high in bounds:
             names, world = path.split("/"), np.eye(4)
