@@ -47,33 +47,40 @@ def batch(
         raise UsageError(f"--retry {retry!r}: not one of {', '.join(RETRY)}", hint="see --help")
     silent = quiet or json_output
     say = (lambda text: None) if silent else _say
-    read = read_batch(spec)
+    batch_to_run = read_batch(spec)
     if dry_run:
-        planned = session.plan_batch(read, out, retry=retry, force=force)
+        planned = session.plan_batch(batch_to_run, out, retry=retry, force=force)
         for job, reason in planned:
             say(f"{'would run' if reason else 'up to date':11} {job.name:32} {reason or ''}")
         return _report({"batch": str(out), "scenes": {job.name: reason for job, reason in planned}}, json_output, 0)
     if task is not None:
         index, count = parse_task(task)
-        end = session.run_task(read, out, index, count, force=force, retry=retry, say=say, quiet=silent)
+        end = session.run_task(batch_to_run, out, index, count, force=force, retry=retry, say=say, quiet=silent)
     elif collect:
-        end = session.collect_tasks(read, out)
-    elif read.spec.executor.kind == "slurm":
-        scripts = session.write_array(read, out, jobs=jobs, force=force, retry=retry)
+        end = session.collect_tasks(batch_to_run, out)
+    elif batch_to_run.spec.executor.kind == "slurm":
+        scripts = session.write_array(batch_to_run, out, jobs=jobs, force=force, retry=retry)
         if scripts is None:
             say("no scene has to run; --retry all runs them again")
-            return _ended(session.collect_tasks(read, out), out, say, json_output)
+            return _report_end(session.collect_tasks(batch_to_run, out), out, say, json_output)
         say(f"{scripts.scenes} scenes in {scripts.tasks} array tasks; submit them with: {scripts.submit}")
         return _report({"batch": str(out), "submit": str(scripts.submit)}, json_output, 0)
     else:
         with contextlib.redirect_stdout(sys.stderr):  # Ray prints what it notices about nodes; that is no data
             end = session.run_batch(
-                read, out, jobs=jobs, force=force, retry=retry, say=say, terminal=sys.stderr.isatty(), quiet=silent
+                batch_to_run,
+                out,
+                jobs=jobs,
+                force=force,
+                retry=retry,
+                say=say,
+                terminal=sys.stderr.isatty(),
+                quiet=silent,
             )
-    return _ended(end, out, say, json_output)
+    return _report_end(end, out, say, json_output)
 
 
-def _ended(end: BatchEnd, out: Path, say: Callable[[str], None], json_output: bool) -> int:
+def _report_end(end: BatchEnd, out: Path, say: Callable[[str], None], json_output: bool) -> int:
     """Say what became of every scene, and return the exit code of the worst."""
     say(", ".join(f"{count} {name}" for name, count in end.counts().items()))
     scenes = {job.name: end.latest[job.name].model_dump(mode="json") for job in end.jobs if job.name in end.latest}

@@ -61,7 +61,7 @@ def _lines(items: list[Any], gone: list[Any], stayed: list[Any], delete: bool) -
     ready = sum(item.bytes for item in items if item.collectable)
     lines.append(f"--delete frees {ready / 1e6:.1f} MB")
     for category in ("superseded", "intermediate"):
-        more = sum(item.bytes for item in items if item.category == category and not item.collectable)
-        if more:
-            lines.append(f"--{category} may add up to {more / 1e6:.1f} MB")
+        further_bytes = sum(item.bytes for item in items if item.category == category and not item.collectable)
+        if further_bytes:
+            lines.append(f"--{category} may add up to {further_bytes / 1e6:.1f} MB")
     return lines

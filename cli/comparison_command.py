@@ -11,7 +11,9 @@ import typer
 from scenewright.cli.output import out
 
 LISTED_FILES = 6
+"""Most changed files that are named unless all are asked for."""
 MEGABYTE = 1e6
+"""Bytes a megabyte."""
 
 
 def diff(
@@ -24,25 +26,25 @@ def diff(
     """Say what two runs differ in: parameters, versions, inputs, outcomes, measures, files, sizes, times."""
     from scenewright.stages.engine.comparison import compare
 
-    found = compare(first, second)
+    comparisons = compare(first, second)
     if json_output:
-        counts = Counter(item.status for item in found)
+        counts = Counter(item.status for item in comparisons)
         document = {
             "first": str(first),
             "second": str(second),
             "counts": dict(sorted(counts.items())),
-            "artifacts": [item.as_json() for item in found],
+            "artifacts": [item.as_json() for item in comparisons],
         }
         out(json.dumps(document, sort_keys=True))
     else:
-        out("\n".join(_lines(found, everything)))
+        out("\n".join(_lines(comparisons, everything)))
     return 0
 
 
-def _lines(found: list[Any], everything: bool) -> list[str]:
-    common = _common_changes(found)
+def _lines(comparisons: list[Any], everything: bool) -> list[str]:
+    common = _common_changes(comparisons)
     lines = [f"everywhere: {_change_text(change)}" for change in common]
-    for item in found:
+    for item in comparisons:
         lines.append(f"{item.status:15} {item.name:22} {_cost_text(item.costs)}".rstrip())
         if item.status == "same" and not everything:
             continue
@@ -51,20 +53,20 @@ def _lines(found: list[Any], everything: bool) -> list[str]:
         if item.measures and item.equal_measures:
             lines.append(f"  measure: {item.equal_measures} others are equal")
         lines += [f"  {text}" for text in _file_texts(item.files, everything)]
-    counts = Counter(item.status for item in found)
+    counts = Counter(item.status for item in comparisons)
     lines.append(", ".join(f"{count} {status}" for status, count in counts.most_common()))
     return lines
 
 
-def _common_changes(found: list[Any]) -> list[Any]:
+def _common_changes(comparisons: list[Any]) -> list[Any]:
     """Versions that changed in the same way in every artifact that both have: said once."""
-    both = [item for item in found if item.costs]
-    if len(both) < 2:
+    with_costs = [item for item in comparisons if item.costs]
+    if len(with_costs) < 2:
         return []
     return [
         change
-        for change in both[0].changes
-        if change.group == "version" and all(change in item.changes for item in both)
+        for change in with_costs[0].changes
+        if change.group == "version" and all(change in item.changes for item in with_costs)
     ]
 
 
@@ -105,8 +107,8 @@ def _cost_text(costs: tuple[Any, ...]) -> str:
 def _file_texts(files: Any, everything: bool) -> list[str]:
     lines = []
     for name, paths in vars(files).items():
-        shown = paths if everything else paths[:LISTED_FILES]
-        rest = f", ... ({len(paths)} files; --all lists them)" if len(paths) > len(shown) else ""
+        listed = paths if everything else paths[:LISTED_FILES]
+        and_more = f", ... ({len(paths)} files; --all lists them)" if len(paths) > len(listed) else ""
         if paths:
-            lines.append(f"{name}: {', '.join(shown)}{rest}")
+            lines.append(f"{name}: {', '.join(listed)}{and_more}")
     return lines

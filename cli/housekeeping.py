@@ -47,8 +47,8 @@ def _settings(pairs: list[str] | None) -> dict[str, str]:
     return values
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(is_wanted: bool) -> None:
+    if is_wanted:
         from scenewright.stages.kit.library_versions import library_version
 
         _out(library_version("scenewright"))
@@ -89,7 +89,7 @@ def run(
     from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
 
     flags = {"--force": force, "--dry-run": dry_run, "--quiet": quiet, "--debug": debug}
-    extra = tuple(flag for flag, given in flags.items() if given)
+    extra = tuple(flag for flag, is_set in flags.items() if is_set)
     if max_memory is not None:
         parse_limit(max_memory)
         extra += ("--max-memory", max_memory)
@@ -155,22 +155,24 @@ def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int
     from scenewright.stages.engine.verification import Finding
     from scenewright.stages.engine.verification import verify as verify_artifact
 
-    seen: dict[Path, Finding] = {}
+    findings_by_path: dict[Path, Finding] = {}
     for path in paths:
-        verify_artifact(path, seen)
-    for finding in seen.values():
+        verify_artifact(path, findings_by_path)
+    for finding in findings_by_path.values():
         _say(f"{'damaged' if finding.problems else 'sound':8} {finding.kind:18} {finding.path}")
         for line in (*finding.problems, *finding.notes):
             _say(f"{'':8} {line}")
-    damaged = [finding for finding in seen.values() if finding.problems]
+    damaged = [finding for finding in findings_by_path.values() if finding.problems]
     if json_output:
         rows = [
             {"path": str(f.path), "kind": f.kind, "problems": list(f.problems), "notes": list(f.notes)}
-            for f in seen.values()
+            for f in findings_by_path.values()
         ]
         _out(json.dumps({"sound": not damaged, "artifacts": rows}, sort_keys=True))
     if damaged:
-        raise BadInput(f"{len(damaged)} of {len(seen)} artifacts are damaged", hint="make them again with --force")
+        raise BadInput(
+            f"{len(damaged)} of {len(findings_by_path)} artifacts are damaged", hint="make them again with --force"
+        )
     return 0
 
 
@@ -235,8 +237,8 @@ def models(
         _out(f"{model.name}: {model.purpose}\n  {model.file}, {model.licence}, {model.source}\n  {model.sha256}")
     _out(f"cache {cache_folder()}: {len(cached)} files, {sum(c.bytes for c in cached) / 1e6:.1f} MB")
     for entry in cached:
-        what = entry.known.name if entry.known else "not listed in data/models.toml"
-        _out(f"  {entry.name} ({what}), {entry.bytes / 1e6:.1f} MB, {entry.path.name}")
+        known_name = entry.known.name if entry.known else "not listed in data/models.toml"
+        _out(f"  {entry.name} ({known_name}), {entry.bytes / 1e6:.1f} MB, {entry.path.name}")
     return 0
 
 

@@ -56,16 +56,21 @@ def inspect(
         pass  # whoever looks for a log says what it expects
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror}", hint="give an artifact folder or a log") from None
-    given = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "depth_scale": depth_scale}
-    settings = [*(settings or ()), *(f"{name}={value:.17g}" for name, value in given.items() if value is not None)]
+    option_values = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "depth_scale": depth_scale}
+    settings = [
+        *(settings or ()),
+        *(f"{name}={value:.17g}" for name, value in option_values.items() if value is not None),
+    ]
     progress = progress_for(sys.stderr.isatty(), quiet=quiet or json_output)
     if not os.path.exists(path / MANIFEST_NAME):
         if frames < 2:
             raise UsageError(f"--frames {frames}: a log is judged by its frames", hint="give at least 2")
-        found = inspect_log(path, ingest_parameters(settings), frames, progress, keep_pictures=html is not None)
-        found = replace(found, report=found.report.model_copy(update={"command": _command(found.report, settings)}))
-        _show(found, html, json_output, {})
-        return _exit_code(found.report, expect, found.report.verdict)
+        inspection = inspect_log(path, ingest_parameters(settings), frames, progress, keep_pictures=html is not None)
+        inspection = replace(
+            inspection, report=inspection.report.model_copy(update={"command": _command(inspection.report, settings)})
+        )
+        _show(inspection, html, json_output, {})
+        return _exit_code(inspection.report, expect, inspection.report.verdict)
     if settings:
         raise UsageError("--set is for logs", hint="an artifact has the options it was made with")
     artifact = open_artifact(path)
@@ -75,11 +80,11 @@ def inspect(
             raise UsageError("--html is for logs and sequences", hint="`scenewright report` makes a page of a run")
         out(artifact.manifest.model_dump_json() if json_output else _manifest_text(artifact).removesuffix("\n"))
         return 4 if expect is not None and artifact.outcome != expect else 0
-    found = inspect_sequence(artifact, frames, progress, keep_pictures=html is not None)
+    inspection = inspect_sequence(artifact, frames, progress, keep_pictures=html is not None)
     if not json_output:
         out(_manifest_text(artifact))
-    _show(found, html, json_output, artifact.manifest.model_dump(mode="json"))
-    return _exit_code(found.report, expect, artifact.outcome)
+    _show(inspection, html, json_output, artifact.manifest.model_dump(mode="json"))
+    return _exit_code(inspection.report, expect, artifact.outcome)
 
 
 def _command(report: Any, settings: Sequence[str]) -> str:
@@ -93,10 +98,10 @@ def _command(report: Any, settings: Sequence[str]) -> str:
     if report.verdict == "wasted" or "depth" not in streams or not streams & {"pose", "color"}:
         return ""
     name = "reconstruct" if "pose" in streams else "reconstruct-without-poses"
-    known = read_pipeline(pipeline_path(name)).variables
-    given = [pair.partition("=") for pair in (f"log={report.path}", *settings)]
-    pairs = {key.strip().lstrip("-").replace("-", "_"): value for key, _, value in given}
-    words = [word for key, value in pairs.items() if key in known for word in ("--set", f"{key}={value}")]
+    variables = read_pipeline(pipeline_path(name)).variables
+    assignments = [pair.partition("=") for pair in (f"log={report.path}", *settings)]
+    pairs = {key.strip().lstrip("-").replace("-", "_"): value for key, _, value in assignments}
+    words = [word for key, value in pairs.items() if key in variables for word in ("--set", f"{key}={value}")]
     folder = Path(report.path).resolve().stem or "run"
     return shlex.join([*_program(), "run", name, *words, "--out", f"outputs/{folder}"])
 
@@ -109,16 +114,16 @@ def _program() -> list[str]:
     return [os.path.relpath(script)] if script.is_file() else [os.path.relpath(sys.executable), "-m", "scenewright"]
 
 
-def _show(found: Any, html: Path | None, json_output: bool, manifest: dict[str, Any]) -> None:
+def _show(inspection: Any, html: Path | None, json_output: bool, manifest: dict[str, Any]) -> None:
     from scenewright.stages.ingest.preflight.text import as_text
 
     if html is not None:
         from scenewright.stages.ingest.preflight.page import write_page
 
-        write_page(found, html)
-    report = found.report.model_dump(mode="json")
+        write_page(inspection, html)
+    report = inspection.report.model_dump(mode="json")
     document = {**manifest, "preflight": report} if manifest else report
-    out(json.dumps(document, sort_keys=True) if json_output else as_text(found.report).removesuffix("\n"))
+    out(json.dumps(document, sort_keys=True) if json_output else as_text(inspection.report).removesuffix("\n"))
     sys.stdout.flush()
 
 
@@ -131,7 +136,7 @@ def _exit_code(report: Any, expect: str | None, outcome: str) -> int:
 def _manifest_text(artifact: Artifact) -> str:
     manifest = artifact.manifest
     assert manifest is not None
-    made = manifest.provenance
+    provenance = manifest.provenance
     lines: list[tuple[str, Any]] = [
         ("kind", f"{manifest.kind} version {manifest.schema_version}"),
         ("outcome", manifest.outcome),
@@ -142,7 +147,7 @@ def _manifest_text(artifact: Artifact) -> str:
         *(("parameter", f"{name} = {value}") for name, value in manifest.parameters.items()),
         ("content", manifest.content_digest),
         ("files", f"{len(manifest.files)}, {sum(f.bytes for f in manifest.files) / 1e6:.1f} MB"),
-        ("took", f"{made.seconds:.1f} s, {made.peak_memory_bytes / 2**20:.0f} MiB, {made.started}"),
-        ("command", " ".join(made.command)),
+        ("took", f"{provenance.seconds:.1f} s, {provenance.peak_memory_bytes / 2**20:.0f} MiB, {provenance.started}"),
+        ("command", " ".join(provenance.command)),
     ]
     return "".join(f"{label:10} {value}\n" for label, value in lines)

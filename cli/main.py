@@ -80,8 +80,8 @@ def run(arguments: list[str]) -> int:
             raise
         if not is_machines(error, arguments):
             return _say_bug(error)
-        place, what = getattr(error, "filename", None), getattr(error, "strerror", None)
-        say_error(f"{f'{place}: ' if place else ''}{what or str(error) or 'out of memory'} (the machine failed)")
+        path, reason = getattr(error, "filename", None), getattr(error, "strerror", None)
+        say_error(f"{f'{path}: ' if path else ''}{reason or str(error) or 'out of memory'} (the machine failed)")
         return MachineFailure.exit_code
     except Exception as error:
         if debug:

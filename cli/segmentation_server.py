@@ -30,6 +30,7 @@ _BLANK = SegmentRequest(
     Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5),
     seed=0,
 )
+"""Empty request with which a backend is tried before it serves."""
 
 
 def open_server(
@@ -52,7 +53,7 @@ def open_server(
     declared = backend_for(parameters.backend)
     if declared.address:
         raise UsageError("a service cannot be served", hint="serve the backend behind it")
-    resolved = {role: _resolved(role, path) for role, path in files.items()}
+    resolved = {role: _resolve(role, path) for role, path in files.items()}
     device = choose_device(device)
     backend = choose_backend(
         BackendRequest(
@@ -81,7 +82,7 @@ def open_server(
     return SegmentationServer(host, port, backend, geometric_settings(parameters), revision=revision, required=required)
 
 
-def _resolved(role: str, path: Path) -> Path:
+def _resolve(role: str, path: Path) -> Path:
     declared = STAGE.reads[role]
     assert isinstance(declared, Optionally) and isinstance(declared.what, External)
     return resolve_weights(path) if declared.what.weights else path

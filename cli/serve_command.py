@@ -43,10 +43,10 @@ def serve(
     """
     from scenewright.cli.segmentation_server import open_server
 
-    given = {"backend": backend, "words": words, "score_threshold": score_threshold}
+    option_values = {"backend": backend, "words": words, "score_threshold": score_threshold}
     files = {"weights": weights, "mask_weights": mask_weights, "labels": labels, "sidecar": sidecar}
     server = open_server(
-        {name: value for name, value in given.items() if value is not None},
+        {name: value for name, value in option_values.items() if value is not None},
         {role: path for role, path in files.items() if path is not None},
         config=config,
         host=host,

@@ -30,8 +30,8 @@ _BOUNDS = (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below
 def _bare_type(annotation: Any) -> Any:
     """Strip None from a union."""
     if get_origin(annotation) in (Union, UnionType):
-        rest = [item for item in get_args(annotation) if item is not NoneType]
-        return rest[0] if len(rest) == 1 else str
+        others = [item for item in get_args(annotation) if item is not NoneType]
+        return others[0] if len(others) == 1 else str
     return annotation
 
 
@@ -79,8 +79,8 @@ def _input_options(stage: Stage) -> list[inspect.Parameter]:
     options = []
     for role, declared in stage.reads.items():
         optional = isinstance(declared, Optionally)
-        what = declared.what if isinstance(declared, Optionally) else declared
-        text = what.description if isinstance(what, External) else f"Artifact {what.kind}: {what.description}"
+        kind = declared.what if isinstance(declared, Optionally) else declared
+        text = kind.description if isinstance(kind, External) else f"Artifact {kind.kind}: {kind.description}"
         flag = "--" + role.replace("_", "-")
         optional = optional or role == stage.argument
         annotation = Optional[Path] if optional else Path  # noqa: UP045

@@ -15,6 +15,7 @@ from scenewright.schemas.errors import MachineFailure, ScenewrightError
 from scenewright.schemas.plain_text import cleaned
 
 INTERRUPTED = 130
+"""Exit code of an interrupted command (docs/ARCHITECTURE.md, "Exit codes")."""
 
 
 class ReaderLeft(ScenewrightError):
@@ -38,17 +39,17 @@ class Stream(io.TextIOWrapper):
 
     def write(self, text: str) -> int:
         """Write text. Raises ReaderLeft, MachineFailure."""
-        with self._told():
+        with self._note_broken_pipe():
             super().write(cleaned(text) if self.clean else text)
         return len(text)
 
     def flush(self) -> None:
         """Write what is held back. Raises ReaderLeft, MachineFailure."""
-        with self._told():
+        with self._note_broken_pipe():
             super().flush()
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _note_broken_pipe(self) -> Iterator[None]:
         try:
             yield
         except BrokenPipeError:

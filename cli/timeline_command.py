@@ -35,7 +35,7 @@ def timeline(
         return [
             *(f"+ {name}" for name in changes.appeared),
             *(f"- {name}" for name in changes.vanished),
-            *(f"- {name}, now part of {whole}" for name, whole in changes.merged.items()),
+            *(f"- {name}, now part of {merged_step}" for name, merged_step in changes.merged.items()),
             *(f"~ {name} was taken for {before}" for name, before in changes.renamed.items()),
             *(
                 f"~ {c.node}: {c.parent} {c.relation} it, before {c.before_parent} {c.before_relation}"

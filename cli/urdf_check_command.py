@@ -10,6 +10,7 @@ import typer
 from scenewright.cli.output import out
 
 BAD_INPUT = 3
+"""Exit code of a broken file (docs/ARCHITECTURE.md, "Exit codes")."""
 
 
 def urdf_check(
@@ -39,10 +40,10 @@ def urdf_check(
             for p in resting_penetrations(file, penetration)
         ]
     if json_output:
-        told = {"findings": problems, "advice": advised}
+        document = {"findings": problems, "advice": advised}
         rows = {
-            name: [{"kind": p.kind, "element": p.element, "message": p.message} for p in found]
-            for name, found in told.items()
+            name: [{"kind": p.kind, "element": p.element, "message": p.message} for p in problems_of_kind]
+            for name, problems_of_kind in document.items()
         }
         out(json.dumps({"file": str(file), "sound": not problems, **rows}))
     else:

@@ -48,8 +48,8 @@ def view(
     from scenewright.cli.viewing.desk.server import DeskServer
 
     with DeskServer(Desk(path, edit, read_only=read_only), port) as server:
-        what = f"; what you put right is kept in {edit}" if edit is not None and not read_only else ""
-        sys.stderr.write(f"open this address in a browser{what}; Ctrl-C ends it\n")
+        edits_note = f"; what you put right is kept in {edit}" if edit is not None and not read_only else ""
+        sys.stderr.write(f"open this address in a browser{edits_note}; Ctrl-C ends it\n")
         sys.stdout.write(server.page_address + "\n")
         sys.stdout.flush()
         server.serve_forever(poll_interval=0.2)

@@ -12,8 +12,9 @@ Point = tuple[Coordinate, Coordinate]
 Label = Annotated[str, Field(min_length=1, max_length=80)]
 """A class, or what somebody wrote in its place: data, never an instruction."""
 MOST_ROOMS, MOST_FURNITURE, MOST_THINGS = 12, 60, 300
+"""Most rooms, furniture and things of an apartment; bounds, by eye."""
 LARGEST_SIDE = 30.0
-"""Of a whole apartment [m]."""
+"""Largest side of a whole apartment [m]."""
 
 
 class Room(Model):
@@ -77,17 +78,17 @@ class Apartment(Model):
     @model_validator(mode="after")
     def _fits_together(self) -> Apartment:
         rooms = {room.name for room in self.rooms}
-        bodies = [piece.name for piece in self.furniture] + [thing.name for thing in self.things]
+        bodies = [piece.name for piece in self.furniture] + [item.name for item in self.things]
         for name in bodies:
             if bodies.count(name) > 1:
                 raise ValueError(f"two things are called {name!r}")
         for door in self.doors:
             if not set(door.rooms) <= rooms:
                 raise ValueError(f"a door leads to a room that is none of {', '.join(sorted(rooms))}")
-        carriers = {body.name for body in self.furniture} | {thing.name for thing in self.things if thing.carries}
-        for thing in self.things:
-            if thing.on not in carriers or thing.on == thing.name:
-                raise ValueError(f"{thing.name!r} is on {thing.on!r}, which carries nothing")
+        carriers = {body.name for body in self.furniture} | {item.name for item in self.things if item.carries}
+        for item in self.things:
+            if item.on not in carriers or item.on == item.name:
+                raise ValueError(f"{item.name!r} is on {item.on!r}, which carries nothing")
         self._check_chains()
         for axis, name in enumerate("xy"):
             extent = max(r.high[axis] for r in self.rooms) - min(r.low[axis] for r in self.rooms)
@@ -100,11 +101,11 @@ class Apartment(Model):
 
     def _check_chains(self) -> None:
         """Raise ValueError where things carry each other in a circle."""
-        above = {thing.name: thing.on for thing in self.things}
+        above = {item.name: item.on for item in self.things}
         for name in above:
-            seen, at = {name}, above[name]
+            passed, at = {name}, above[name]
             while at in above:
-                if at in seen:
+                if at in passed:
                     raise ValueError(f"{name!r} carries itself")
-                seen.add(at)
+                passed.add(at)
                 at = above[at]

@@ -65,10 +65,11 @@ def as_vector(values: np.ndarray) -> Vector3:
 
 
 SMALLEST_INT32, LARGEST_INT32 = -(2**31), 2**31 - 1
+"""Range of a signed 32-bit integer."""
 LARGEST_NUMBER = 1e12
 """Size of the numbers of a payload: metres, seconds since 1970, kilograms; their squares fit into a float32."""
 LARGEST_SEED = 2**31 - 1
-"""Of a command; those that follow from it are larger by a few."""
+"""Largest seed of a command; those that follow from it are larger by a few."""
 Seed = Annotated[int, Field(ge=0, le=2**53)]
 Count = Annotated[int, Field(ge=0, le=LARGEST_INTEGER)]
 """Of bytes and the like, which no array of 32 bits has to hold."""

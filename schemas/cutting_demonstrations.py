@@ -48,15 +48,15 @@ class DemonstrationRecord(Model):
 
     @model_validator(mode="after")
     def _cuts_are_of_pieces_that_lie_there(self) -> DemonstrationRecord:
-        there = set(range(len(self.families)))
-        pieces = len(there)
+        pieces_there = set(range(len(self.families)))
+        pieces = len(pieces_there)
         for number, cut in enumerate(self.cuts):
-            if cut.piece not in there:
+            if cut.piece not in pieces_there:
                 raise ValueError(f"cut {number} is of piece {cut.piece}, which does not lie there")
-            there.remove(cut.piece)
-            there |= set(range(pieces, pieces + len(cut.shifts)))
+            pieces_there.remove(cut.piece)
+            pieces_there |= set(range(pieces, pieces + len(cut.shifts)))
             pieces += len(cut.shifts)
-        if not set(self.categories) <= there:
+        if not set(self.categories) <= pieces_there:
             raise ValueError("a category names a piece that is not left in the end")
         return self
 

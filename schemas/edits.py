@@ -17,8 +17,9 @@ from scenewright.schemas.vocabulary import load_vocabulary
 
 FORMAT = "scenewright-edits"
 MOST_EDITS = 10_000
+"""Most edits of a file; a bound, by eye."""
 LONGEST_TEXT = 10_000
-"""Letters of a name or a note."""
+"""Longest name or note [letters]."""
 
 Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
 

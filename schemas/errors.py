@@ -53,5 +53,5 @@ class MachineFailure(ScenewrightError):
 def first_problem(error: ValidationError, whole: str = "document") -> str:
     """Return `place: message` of the first wrong one of values from outside; `whole`: what they are together."""
     first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"]) or whole
-    return f"{place:.{LONGEST_PART}}: {str(first['msg']).removeprefix('Value error, '):.{LONGEST_PART}}"
+    location = ".".join(str(part) for part in first["loc"]) or whole
+    return f"{location:.{LONGEST_PART}}: {str(first['msg']).removeprefix('Value error, '):.{LONGEST_PART}}"

@@ -8,7 +8,7 @@ from pydantic import Field
 from scenewright.schemas.base import Model
 
 LARGEST_LENGTH = 1e4
-"""Metres: nothing stands farther from the origin, or is larger."""
+"""Largest length [m]: nothing stands farther from the origin, or is larger."""
 
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Edge = Annotated[float, Field(gt=0, le=LARGEST_LENGTH)]

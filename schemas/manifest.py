@@ -29,8 +29,9 @@ CONVENTIONS: dict[str, str] = {
 
 
 MOST_INPUTS = 1000
+"""Most inputs of an artifact; a bound, by eye."""
 LONGEST_PATH = 4096
-"""Letters; no system opens longer ones."""
+"""Longest path [letters]; no system opens longer ones."""
 
 
 def _check_path(path: str) -> str:

@@ -29,8 +29,9 @@ LARGEST_SETTINGS = 4 * 2**20
 DEEPEST = 64
 """Lists and tables within each other."""
 MOST_VALUES = 5_000_000
-"""Values of a document."""
+"""Most values of a document."""
 LARGEST_INTEGER = 2**63 - 1
+"""Largest integer of a file from outside: what 64 bits hold."""
 
 _MACHINE = (errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 _KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
@@ -42,7 +43,7 @@ _DEEP_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}[ \t]*+\.[ \t]*+){{{DEEPES
 
 
 @contextmanager
-def _told(path: Path | str, error: type[ScenewrightError], hint: str) -> Iterator[None]:
+def _translate_errors(path: Path | str, error: type[ScenewrightError], hint: str) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError:
@@ -60,7 +61,7 @@ def opened(path: Path | str, *, error: type[ScenewrightError] = BadInput, hint: 
 
     Raises MachineFailure when the machine is at fault.
     """
-    with _told(path, error, hint):
+    with _translate_errors(path, error, hint):
         _check_regular(os.stat(path).st_mode, path, error, hint)  # first: opening a device may do something
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
@@ -79,7 +80,7 @@ def _check_regular(mode: int, path: Path | str, error: type[ScenewrightError], h
 
 def file_content(path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> bytes:
     """Return the bytes of a regular file of at most `largest` bytes. Raises `error`, MachineFailure."""
-    with opened(path, error=error, hint=hint) as file, _told(path, error, hint):
+    with opened(path, error=error, hint=hint) as file, _translate_errors(path, error, hint):
         size = os.fstat(file.fileno()).st_size
         if size <= largest:
             data = file.read(size + 1)

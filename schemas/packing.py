@@ -13,6 +13,7 @@ Side = Annotated[float, Field(ge=0.01, le=0.4)]
 Height = Annotated[float, Field(ge=0.02, le=0.4)]
 Coordinate = Annotated[float, Field(ge=-1.5, le=1.5)]
 MOST_BOXES, MOST_OBSTACLES = 16, 16
+"""Most boxes and obstacles; bounds, by eye."""
 TABLE_TOP, BASKET_TOP = 0.005, 0.007
 """World z [m] of the table's surface and of the basket's, as in the published environment."""
 BASKET_SLAB = 0.01

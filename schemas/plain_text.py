@@ -8,6 +8,7 @@ UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069
 """Controls but tab and line feed, what ends lines or turns the direction of writing, and halves of characters: names
 that are no UTF-8 reach Python as such halves."""
 LONGEST_LINE = 2000
+"""Longest line of text from outside [letters]."""
 
 
 def cleaned(text: str) -> str:
@@ -15,7 +16,7 @@ def cleaned(text: str) -> str:
 
     JSON stays the same document.
     """
-    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return UNPRINTABLE.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def one_line(text: str) -> str:

@@ -85,5 +85,5 @@ class Sequence(Artifact):
     def pictures(self) -> tuple[int, float]:
         """Return the number of frames, and the megapixels of all of them."""
         sizes = [camera.camera.width * camera.camera.height / 1e6 for camera in self.info.cameras]
-        known = sum(size * camera.frame_count for size, camera in zip(sizes, self.info.cameras, strict=True))
-        return self.info.frame_count, known or self.info.frame_count * sizes[0]
+        pixels = sum(size * camera.frame_count for size, camera in zip(sizes, self.info.cameras, strict=True))
+        return self.info.frame_count, pixels or self.info.frame_count * sizes[0]

@@ -16,6 +16,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence
 
 MOST_VIEWS = 2000
+"""Most views of a scene; a bound, by eye."""
 Holder = Literal["air", "left", "right", "both", "tissue"]
 Place = Literal["wound", "left", "right", "high", "corner"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]

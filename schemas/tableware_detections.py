@@ -14,6 +14,7 @@ DetectedKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Length = Annotated[float, Field(ge=0.0, le=2.0)]
 MOST_DETECTIONS = 500
+"""Most items or outlines; a bound, by eye."""
 
 
 class DetectedSize(Model):

@@ -8,8 +8,8 @@ from pydantic import Field, model_validator
 from scenewright.schemas.base import Model
 
 
-def _between(low: float, high: float, what: str) -> object:
-    return Field(ge=low, le=high, description=what)
+def _between(low: float, high: float, description: str) -> object:
+    return Field(ge=low, le=high, description=description)
 
 
 class DishSize(Model):
@@ -60,13 +60,13 @@ class TablewareDishes(Model):
 
     @model_validator(mode="after")
     def _can_be_told_apart(self) -> TablewareDishes:
-        there = [(name, dish) for name in ("cup", "bowl", "plate") if (dish := getattr(self, name)) is not None]
-        for (name, dish), (other_name, other) in zip(there, there[1:], strict=False):
-            if dish.rim_radius >= other.rim_radius:
+        dishes = [(name, dish) for name in ("cup", "bowl", "plate") if (dish := getattr(self, name)) is not None]
+        for (name, dish), (other_name, smaller) in zip(dishes, dishes[1:], strict=False):
+            if dish.rim_radius >= smaller.rim_radius:
                 raise ValueError(f"a {name} is narrower than a {other_name}: name them by their width")
         if (self.fork is None) != (self.spoon is None):
             raise ValueError("fork and spoon are told apart by their outlines: give the sizes of both, or of neither")
-        if not there and self.fork is None and self.gripper is None:
+        if not dishes and self.fork is None and self.gripper is None:
             raise ValueError("it says nothing: give [cup], [bowl], [plate], [fork] with [spoon], or [gripper]")
         return self
 

@@ -106,9 +106,9 @@ class TablewareAction(Model):
 
     @model_validator(mode="after")
     def _one_field_is_set(self) -> TablewareAction:
-        given = [field for field in FIELD_OF.values() if getattr(self, field) is not None]
-        if given != [FIELD_OF[self.name]]:
-            raise ValueError(f"a {self.name} has {FIELD_OF[self.name]} and nothing else, here: {given or 'nothing'}")
+        filled = [field for field in FIELD_OF.values() if getattr(self, field) is not None]
+        if filled != [FIELD_OF[self.name]]:
+            raise ValueError(f"a {self.name} has {FIELD_OF[self.name]} and nothing else, here: {filled or 'nothing'}")
         return self
 
     @classmethod

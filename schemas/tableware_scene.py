@@ -13,6 +13,7 @@ from scenewright.schemas.tableware_dishes import TablewareDishes
 
 TablewareKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
 MOST_ITEMS = 60
+"""Most items of a table; a bound, by eye."""
 
 
 class TablewareItem(Model):
@@ -37,14 +38,14 @@ def check_carriers(items: Iterable[TablewareItem]) -> None:
             raise ValueError(f"two items are called {item.name!r}")
         carrier[item.name] = item.on
     for name in carrier:
-        seen = {name}
+        passed = {name}
         below = carrier[name]
         while below is not None:
             if below not in carrier:
                 raise ValueError(f"{name!r} stands on {below!r}, which is not there")
-            if below in seen:
+            if below in passed:
                 raise ValueError(f"{name!r} stands on itself in the end")
-            seen.add(below)
+            passed.add(below)
             below = carrier[below]
 
 

@@ -12,6 +12,7 @@ from scenewright.schemas.errors import BadInput
 
 VOCABULARY_FILE = Path(__file__).resolve().parent.parent / "data" / "vocabulary.toml"
 VOID = 0
+"""Id of points and pixels without a class."""
 UNNAMED = "object"
 """The class of things that were found and not recognised."""
 NodeType = Literal["layout", "rigid", "articulated"]

@@ -9,6 +9,7 @@ from scenewright.stages.kit.geometry.boxes import box_from_bounds
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 ROOM, SURFACE, GRASP = (90, 170, 220), (110, 190, 100), (220, 120, 40)
+"""Colours of inner rooms, carrying surfaces and grasps (sRGB, of 255)."""
 HEADER = "| model | carried | opens | knobs, levers | contains [l] | carries [m²] | grasps |"
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 EYE_DIRECTION = np.array([-0.45, -0.75, 0.95])
-"""From the middle of the scene to the eye: high enough to look into a room over the walls."""
+"""Direction from the middle of the scene to the eye: high enough to look into a room over the walls."""
 
 SIDE_BY_SIDE = 2
-"""More views than these are tabs."""
+"""Most views beside each other; more become tabs."""
 
 
 @dataclass

@@ -10,7 +10,9 @@ from scenewright.stages.kit.formats.numpy_files import read_arrays
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 BEFORE, AFTER, AXIS = (0.12, 0.47, 0.71), (1.0, 0.5, 0.05), (0.84, 0.15, 0.16)
+"""Colours of the outlines before and after, and of the axis (sRGB, 0 to 1)."""
 CHANGED = np.array([150, 150, 150], np.uint8)
+"""Colour of changed points (sRGB, of 255)."""
 AXIS_LENGTH = 0.3
 """Half of what is drawn of an axis [m]."""
 

@@ -23,7 +23,7 @@ CANDIDATES = "candidates"
 MAP = "map"
 """What the scene was made from: hidden at first, to be compared."""
 DRAWN_CANDIDATES = 3
-"""Of each object, beside the chosen one."""
+"""Most candidates that are drawn of each object, beside the chosen one."""
 
 
 def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:

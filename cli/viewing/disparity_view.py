@@ -21,10 +21,10 @@ def draw_disparity(disparity: Disparity, canvas: Canvas) -> None:
         every = max(1, -(-len(reader) // MAXIMUM_FRAMES))
         stamps = reader.stamps
         for frame in reader.frames((), every=every):
-            found = maps.read(int(stamps[frame.index]))
+            disparity_map = maps.read(int(stamps[frame.index]))
             canvas.time(frame.time)
-            canvas.picture(f"{frame.camera_name}/disparity", encode_jpeg(disparity_colors(found.disparity)))
-            canvas.picture(f"{frame.camera_name}/confidence", encode_jpeg(confidence_colors(found.confidence)))
+            canvas.picture(f"{frame.camera_name}/disparity", encode_jpeg(disparity_colors(disparity_map.disparity)))
+            canvas.picture(f"{frame.camera_name}/confidence", encode_jpeg(confidence_colors(disparity_map.confidence)))
     canvas.always()
     canvas.document("rows", rows_text(disparity.matching))
 
@@ -33,12 +33,12 @@ def rows_text(file: DisparityFile) -> str:
     """Return how the pairs were matched and whether they were rectified, in Markdown."""
     lines = [file.detail, ""]
     for row in file.rows:
-        said = f"**{row.camera}**: {row.verdict.replace('_', ' ')}, {row.matches} matched features"
+        row_text = f"**{row.camera}**: {row.verdict.replace('_', ' ')}, {row.matches} matched features"
         if row.row_error is not None:
-            said += f", rows {row.row_error:.2f} px apart (90 %: {row.row_error_90:.2f} px)"
+            row_text += f", rows {row.row_error:.2f} px apart (90 %: {row.row_error_90:.2f} px)"
         if row.verdict in ("corrected", "not_rectified"):
-            said += f"; with a small turn of the right eye {row.corrected_row_error:.2f} px"
-        lines.append(f"- {said}")
+            row_text += f"; with a small turn of the right eye {row.corrected_row_error:.2f} px"
+        lines.append(f"- {row_text}")
     if file.left_out:
         lines.append(f"- left out: {', '.join(f'{count} {reason}' for reason, count in sorted(file.left_out.items()))}")
     return "\n".join(lines)

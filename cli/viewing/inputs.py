@@ -19,9 +19,9 @@ def input_artifact(artifact: Artifact, kind: type[Kind]) -> Kind | None:
     for record in artifact.manifest.inputs:
         if issubclass(KINDS.get(record.kind, Artifact), kind):
             try:
-                found = open_artifact(artifact.root / record.path, kind)
+                candidate = open_artifact(artifact.root / record.path, kind)
             except BadInput:
                 return None
-            unchanged = found.manifest is not None and found.manifest.content_digest == record.digest
-            return found if unchanged and isinstance(found, kind) else None
+            unchanged = candidate.manifest is not None and candidate.manifest.content_digest == record.digest
+            return candidate if unchanged and isinstance(candidate, kind) else None
     return None

@@ -12,8 +12,9 @@ from scenewright.stages.kit.open_words.vectors import read_vectors
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 FEWEST_LOOKS = 1
+"""Fewest looks of a region that is drawn."""
 MOST_BOXES = 300
-"""Of a splat's pieces, the largest."""
+"""Most boxes that are drawn of a splat's pieces, the largest."""
 
 
 def draw_language_map(language: LanguageMap, canvas: Canvas) -> None:
@@ -31,14 +32,14 @@ def draw_language_map(language: LanguageMap, canvas: Canvas) -> None:
     vectors = read_vectors(language)
     if len(vectors.means):
         coarse = vectors.pieces[-1] if len(vectors.pieces) else np.zeros(len(vectors.means), int)
-        canvas.points("pieces", vectors.means, _painted(coarse), 0.012)
-    seen = [(k, region) for k, region in enumerate(info.regions) if region.looks >= FEWEST_LOOKS]
-    seen = sorted(seen, key=lambda each: -max(each[1].box.size))[:MOST_BOXES]
+        canvas.points("pieces", vectors.means, _colors_of(coarse), 0.012)
+    looked_at = [(k, region) for k, region in enumerate(info.regions) if region.looks >= FEWEST_LOOKS]
+    looked_at = sorted(looked_at, key=lambda each: -max(each[1].box.size))[:MOST_BOXES]
     canvas.boxes(
         "places",
-        [region.box for _, region in seen],
-        [f"{region.class_name or 'piece'} {region.instance or k}" for k, region in seen],
-        [instance_color(k + 1) for k, _ in seen],
+        [region.box for _, region in looked_at],
+        [f"{region.class_name or 'piece'} {region.instance or k}" for k, region in looked_at],
+        [instance_color(k + 1) for k, _ in looked_at],
         show_labels=False,
     )
 
@@ -62,7 +63,7 @@ def draw_answers(answers: Answers, canvas: Canvas) -> None:
     )
 
 
-def _painted(numbers: np.ndarray) -> np.ndarray:
+def _colors_of(numbers: np.ndarray) -> np.ndarray:
     palette = np.array([instance_color(k) for k in range(int(numbers.max(initial=0)) + 2)])
     return np.round(255 * palette[numbers + 1]).astype(np.uint8)
 

@@ -12,7 +12,9 @@ from scenewright.stages.kit.geometry.transforms import transform_from
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 GAP = 0.4
+"""Gap between two models [m]; by eye."""
 SWING_STEPS = 12
+"""Steps in which a joint is shown to move."""
 
 
 def draw_cad_library(library: CadLibrary, canvas: Canvas) -> None:

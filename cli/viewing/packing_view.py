@@ -25,12 +25,14 @@ PICTURES = ("layout", "attempts", "scene")
 PERIOD = 0.05
 """Time from one row of the trajectory to the next [s]; it has no times of its own."""
 BASKET_COLOR, BLOCK_COLOR = (0.85, 0.75, 0.55), (0.4, 0.4, 0.4)
+"""Colours of the basket and of blocks (sRGB, 0 to 1)."""
 START_COLOR, PACKED_COLOR = (0.6, 0.7, 0.85), (0.2, 0.55, 0.35)
+"""Colours of boxes at the start and packed (sRGB, 0 to 1)."""
 
 
 def draw_packing(packing: Packing, canvas: Canvas) -> None:
     """Draw the problem, the places of the last plan, the pictures of the step, and every plan as text."""
-    instance, found = packing.instance, packing.info
+    instance, result = packing.instance, packing.info
     canvas.document("plans", packing_text(packing))
     for name in PICTURES:
         path = packing.path(f"{name}.png")
@@ -49,10 +51,10 @@ def draw_packing(packing: Packing, canvas: Canvas) -> None:
     names = [box.name for box in instance.boxes]
     canvas.boxes("start", starts, names, [START_COLOR] * len(starts))
     by_name = {box.name: box for box in instance.boxes}
-    places = [step for step in found.attempts[-1].steps if placed(step, by_name)] if found.attempts else []
+    places = [step for step in result.attempts[-1].steps if placed(step, by_name)] if result.attempts else []
     if places:
         solids = [standing_box(by_name[p.box], p.x or 0.0, p.y or 0.0, p.yaw or 0.0, BASKET_TOP) for p in places]
-        canvas.boxes("packed", solids, [place.box for place in places], [PACKED_COLOR] * len(places))
+        canvas.boxes("packed", solids, [packed_step.box for packed_step in places], [PACKED_COLOR] * len(places))
         for number, solid in enumerate(solids):
             draw_solid(f"packed/{number}", solid, PACKED_COLOR, canvas)
     urdf = draw_robot(canvas)
@@ -68,20 +70,20 @@ def placed(step: PackingStep, boxes: dict[str, PackingBox]) -> bool:
 
 def packing_text(packing: Packing) -> str:
     """Return every proposed plan with the reason at the action that ended it, in Markdown."""
-    found = packing.info
-    outcome = "packed" if found.success else "not packed"
-    rows = [f"**{outcome}**: {found.name} by {found.proposer}; {found.proposer_calls} proposals, "]
-    rows[0] += f"{found.motion_planner_calls} motion-planner calls"
-    for number, attempt in enumerate(found.attempts, 1):
+    result = packing.info
+    outcome = "packed" if result.success else "not packed"
+    rows = [f"**{outcome}**: {result.name} by {result.proposer}; {result.proposer_calls} proposals, "]
+    rows[0] += f"{result.motion_planner_calls} motion-planner calls"
+    for number, attempt in enumerate(result.attempts, 1):
         rows += ["", f"Plan {number}", ""]
         for step in attempt.steps:
             where = "" if step.x is None else f" at {step.x:.3f}, {step.y or 0.0:.3f}, yaw {step.yaw or 0.0:.2f}"
-            said = "not tried" if not step.tried else "ok" if step.failure is None else step.failure.message
-            rows.append(f"- {step.name} {step.box}{where}: {said}")
+            result_text = "not tried" if not step.tried else "ok" if step.failure is None else step.failure.message
+            rows.append(f"- {step.name} {step.box}{where}: {result_text}")
         if attempt.task is not None:
             rows.append(f"- {attempt.task.message}")
-    if found.stopped is not None:
-        rows += ["", f"Stopped: {found.stopped.message}"]
+    if result.stopped is not None:
+        rows += ["", f"Stopped: {result.stopped.message}"]
     return "\n".join(rows)
 
 

@@ -47,15 +47,15 @@ def moments(plan: Plan) -> list[tuple[float, str, bool]]:
     time, action = (arrays.get(f"executed_{name}", np.zeros(0)).ravel() for name in ("time", "action"))
     if len(time) != len(action) or not len(time):
         return []
-    found: list[tuple[float, str, bool]] = []
+    rows: list[tuple[float, str, bool]] = []
     for number in np.unique(action[(action >= 0) & (action < len(actions))]):
-        said = actions[int(number)]
+        started_action = actions[int(number)]
         begins = float(time[np.flatnonzero(action == number)[0]])
-        found.append((begins, f"{int(number) + 1}. {said.name} {', '.join(said.arguments)}", False))
+        rows.append((begins, f"{int(number) + 1}. {started_action.name} {', '.join(started_action.arguments)}", False))
     end = float(time[-1])
-    found += [(end, f"{failure.kind}: {failure.message}", True) for failure in plan.info.failures]
-    found += [(end, f"not so: {c.condition} ({c.detail})", True) for c in plan.info.checks if not c.holds]
-    return sorted(found, key=lambda row: (row[0], row[2]))
+    rows += [(end, f"{failure.kind}: {failure.message}", True) for failure in plan.info.failures]
+    rows += [(end, f"not so: {c.condition} ({c.detail})", True) for c in plan.info.checks if not c.holds]
+    return sorted(rows, key=lambda row: (row[0], row[2]))
 
 
 def plan_text(plan: Plan) -> str:
@@ -88,8 +88,8 @@ def _animate(log: IndexedMcap, canvas: Canvas) -> None:
     transforms, images = _topics(log, "foxglove.FrameTransforms"), _topics(log, "foxglove.CompressedImage")
     try:
         messages = [(*entry, channel) for channel in transforms | images for entry in log.indexed(channel)]
-        for _, place, channel in sorted(messages, key=lambda message: (message[1].chunk, message[1].offset)):
-            data = log.fetch(place)
+        for _, location, channel in sorted(messages, key=lambda message: (message[1].chunk, message[1].offset)):
+            data = log.fetch(location)
             if channel in transforms:
                 for transform in FrameTransforms.FromString(data).transforms:
                     canvas.time(stamp_nanoseconds(transform) * 1e-9)

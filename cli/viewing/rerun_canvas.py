@@ -243,5 +243,5 @@ class RerunCanvas:
         if group not in self._arrangement.pictures:
             self._arrangement.pictures.append(group)
 
-    def _log(self, path: str, *what: Any) -> None:
-        self._recording.log(path, *what, static=self._static)
+    def _log(self, path: str, *archetypes: Any) -> None:
+        self._recording.log(path, *archetypes, static=self._static)

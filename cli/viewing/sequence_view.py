@@ -13,11 +13,15 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 MAXIMUM_FRAMES = 150
-"""More frames than this are thinned out, so that a recording stays in the tens of megabytes."""
+"""Most frames of a recording: more are thinned out, so that it stays in the tens of megabytes."""
 CLOUD_FRAMES = 40
+"""Most frames that a cloud is made of; by eye."""
 CLOUD_GRID = 0.02
+"""Edge of the cells of which a cloud has one point each [m]; by eye."""
 CLOUD_DEPTH = 4.0
+"""Largest depth of a cloud's points [m]; by eye."""
 PATH_COLOR = (0.95, 0.55, 0.1)
+"""Colour of the camera's path (sRGB, 0 to 1)."""
 
 
 def draw_sequence(sequence: Sequence, canvas: Canvas) -> None:
@@ -82,9 +86,9 @@ def accumulated_cloud(reader: FrameReader) -> tuple[np.ndarray, np.ndarray] | No
     for frame in reader.frames(("color", "depth"), every=every):
         if frame.world_from_camera is None or frame.depth is None or frame.color is None:
             continue
-        seen = back_project(frame.depth, reader.cameras[frame.camera_name])[::4, ::4].reshape(-1, 3)
-        valid = (seen[:, 2] > 0) & (seen[:, 2] < CLOUD_DEPTH)
-        points.append(apply(frame.world_from_camera, seen[valid]))
+        camera_points = back_project(frame.depth, reader.cameras[frame.camera_name])[::4, ::4].reshape(-1, 3)
+        valid = (camera_points[:, 2] > 0) & (camera_points[:, 2] < CLOUD_DEPTH)
+        points.append(apply(frame.world_from_camera, camera_points[valid]))
         colors.append(frame.color[::4, ::4].reshape(-1, 3)[valid])
     if not points:
         return None

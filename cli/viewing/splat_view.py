@@ -21,10 +21,11 @@ FAINT = 0.15
 MOMENTS = 24
 """Pictures that say when a Gaussian was first seen, evenly spread over those learned."""
 LOOKED_WITH = 96
-"""Width in which it is looked for there [px]."""
+"""Width of the pictures in which it is looked for when a Gaussian was first seen [px]."""
 BEHIND = (0.1, 0.05)
 """A Gaussian is seen unless it lies farther behind what is shown than this [m], and this share of it."""
 RADII = (0.004, 0.03)
+"""Smallest and largest radius of a drawn Gaussian [m]; by eye."""
 
 
 def draw_splat(splat: Splat, canvas: Canvas) -> None:
@@ -46,11 +47,14 @@ def draw_splat(splat: Splat, canvas: Canvas) -> None:
     for number, k in enumerate(learned):
         canvas.time(float(times[k]) - float(times[learned[0]]))
         canvas.transform("camera", poses[k])
-        own = first == number
-        if own.any():
-            radius = float(np.clip(np.median(sizes[own]), *RADII))
+        of_view = first == number
+        if of_view.any():
+            radius = float(np.clip(np.median(sizes[of_view]), *RADII))
             canvas.points(
-                f"gaussians/{number:02d}", gaussians.means[own], np.round(255 * colors[own]).astype(np.uint8), radius
+                f"gaussians/{number:02d}",
+                gaussians.means[of_view],
+                np.round(255 * colors[of_view]).astype(np.uint8),
+                radius,
             )
     canvas.always()
     if cameras:
@@ -62,7 +66,7 @@ def first_seen(gaussians: Gaussians, views: list[View]) -> np.ndarray:
     first = np.full(len(gaussians), -1)
     for number, view in enumerate(views):
         picture = CompiledRasterizer().draw(gaussians, view).picture
-        shown = np.where(picture.alpha > 0.5, picture.depth / np.maximum(picture.alpha, 1e-6), np.inf)
+        drawn_depth = np.where(picture.alpha > 0.5, picture.depth / np.maximum(picture.alpha, 1e-6), np.inf)
         local = apply(view.camera_from_world, gaussians.means.astype(float))
         z = np.maximum(local[:, 2], 1e-6)
         columns = np.rint(view.camera.fx * local[:, 0] / z + view.camera.cx)
@@ -70,8 +74,8 @@ def first_seen(gaussians: Gaussians, views: list[View]) -> np.ndarray:
         inside = (local[:, 2] > 0) & (columns >= 0) & (columns < view.camera.width)
         inside &= (rows >= 0) & (rows < view.camera.height) & (first < 0)
         at = np.flatnonzero(inside)
-        there = shown[rows[at].astype(int), columns[at].astype(int)]
-        first[at[z[at] < there * (1 + BEHIND[1]) + BEHIND[0]]] = number
+        depth_there = drawn_depth[rows[at].astype(int), columns[at].astype(int)]
+        first[at[z[at] < depth_there * (1 + BEHIND[1]) + BEHIND[0]]] = number
     return np.maximum(first, 0)
 
 

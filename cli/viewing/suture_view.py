@@ -17,17 +17,23 @@ from scenewright.stages.kit.viewing.canvas import Canvas
 from scenewright.stages.kit.viewing.meshes import draw_solid
 
 STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
+"""Colours of estimated needle, thread and tip, and of the truth (sRGB, 0 to 1)."""
 ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))
-"""Right, left."""
+"""Colours of the right and the left arm (sRGB, 0 to 1)."""
 PAD = (0.12, 0.12, 0.004)
+"""Size of the pad [m]."""
 RIDGE = (0.005, 0.05, 0.005)
 """Half its width, half its length, its height [m]: half an ellipse across, as the simulator has it."""
 REMOTE_CENTRES = ((-0.12, 0.0, 0.15), (0.12, 0.0, 0.15))
-"""Of the right and the left arm [m]: every shaft goes through its own."""
+"""Remote centres of the right and the left arm [m]: every shaft goes through its own."""
 NEEDLE_RADIUS = 0.012
+"""Radius of the needle's arc in a trial [m]."""
 JAW = 0.0102
+"""Distance of the wrist from the tip of the jaws [m]."""
 WIRE, LINE = 0.0005, 0.0003
+"""Radii of the drawn needle and thread [m]."""
 ARC = np.linspace(0.0, np.pi, 40)
+"""Angles on a half circle, of the needle and the ridge [rad]."""
 
 
 def arc_points(pose: np.ndarray, radius: float) -> np.ndarray:
@@ -54,13 +60,13 @@ def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
     """Draw poses in the left camera's frame over time, with the pictures."""
     file = needle.info
     rows = [f"{file.statement}", f"masks: {file.masks_from}; estimator {file.estimator}; filter {file.filter}"]
-    rows += [f"- frame {one.frame}: {one.estimate.abstained or 'known'}" for one in file.frames]
+    rows += [f"- frame {each.frame}: {each.estimate.abstained or 'known'}" for each in file.frames]
     canvas.document("needle", "\n\n".join(rows))
     _eyes(file.rig, canvas)
-    for one in file.frames:
-        canvas.time(one.time)
-        _pose("needle", one.estimate, file.needle_radius, canvas)
-        path = needle.path(f"pictures/{one.frame:06d}.png")
+    for each in file.frames:
+        canvas.time(each.time)
+        _pose("needle", each.estimate, file.needle_radius, canvas)
+        path = needle.path(f"pictures/{each.frame:06d}.png")
         if path.is_file():
             canvas.picture("eyes/needle", file_content(path, LARGEST_SHOWN))
     if file.filtered is not None:
@@ -70,15 +76,15 @@ def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
 def draw_suture_thread(thread: SutureThread, canvas: Canvas) -> None:
     """Draw the curves in the left camera's frame over time, with the pictures."""
     file = thread.info
-    rows = [f"- frame {one.frame}: {one.status}" for one in file.frames]
+    rows = [f"- frame {each.frame}: {each.status}" for each in file.frames]
     canvas.document("thread", "\n\n".join([file.statement, f"masks: {file.masks_from}", *rows]))
     _eyes(file.rig, canvas)
-    for one in file.frames:
-        canvas.time(one.time)
-        if one.points:
-            (points,) = read_arrays(thread.path("threads.npz"), f"points_{one.frame:06d}")
+    for each in file.frames:
+        canvas.time(each.time)
+        if each.points:
+            (points,) = read_arrays(thread.path("threads.npz"), f"points_{each.frame:06d}")
             canvas.line("thread", [points], [THREAD], radius=LINE)
-        path = thread.path(f"pictures/{one.frame:06d}.png")
+        path = thread.path(f"pictures/{each.frame:06d}.png")
         if path.is_file():
             canvas.picture("eyes/thread", file_content(path, LARGEST_SHOWN))
 
@@ -99,14 +105,14 @@ def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
         canvas.time(float(seconds[row]))
         _driver(int(arms[row]), tools[row], canvas)
         _needle(needles[row], canvas)
-    at, both, held, threads = read_arrays(
+    at, driver_poses, needle_poses, threads = read_arrays(
         trial.path("frames.npz"), "seconds", "world_from_tool", "world_from_needle", "thread"
     )
     for event, moment in enumerate(at):
         canvas.time(float(moment))
         for arm in (0, 1):
-            _driver(arm, both[event, arm], canvas)
-        _needle(held[event], canvas)
+            _driver(arm, driver_poses[event, arm], canvas)
+        _needle(needle_poses[event], canvas)
         canvas.line("thread", [threads[event]], [THREAD], radius=LINE)
 
 

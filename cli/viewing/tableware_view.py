@@ -17,8 +17,9 @@ from scenewright.stages.kit.viewing.meshes import draw_solid
 TABLE = (0.78, 0.61, 0.03)
 """Extents of the table top [m]; its surface is at z = 0."""
 TABLE_COLOR = (0.84, 0.83, 0.8)
+"""Colour of the table (sRGB, 0 to 1)."""
 BIN_AT, BIN_PITCH, BIN_COLUMNS = (0.62, -0.4), 0.2, 5
-"""Where what came to the bin is shown: beside the table, in rows."""
+"""Where what came to the bin is shown [m]: beside the table, in rows."""
 
 
 def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
@@ -35,15 +36,15 @@ def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
 
 def draw_tableware_detections(found: TablewareDetections, canvas: Canvas) -> None:
     """Show what was seen: the statement, the picture, and every item as a point at its lip, green by confidence."""
-    told = found.info
-    canvas.document("seen", "\n\n".join([told.statement, *told.notes]))
+    file = found.info
+    canvas.document("seen", "\n\n".join([file.statement, *file.notes]))
     canvas.picture("overlay", file_content(found.path("overlay.png"), LARGEST_SHOWN))
     _table(canvas)
-    for number, item in enumerate(told.items, start=1):
+    for number, item in enumerate(file.items, start=1):
         share = item.confidence if item.kind is not None else 0.0
         color = np.array([[round(255 * (1.0 - share)), round(200 * share), 40]], np.uint8)
-        place = np.array([[item.position[0], item.position[1], item.lip]])
-        canvas.points(f"items/{number}_{item.kind or 'unknown'}", place, color, radius=0.01)
+        center = np.array([[item.position[0], item.position[1], item.lip]])
+        canvas.points(f"items/{number}_{item.kind or 'unknown'}", center, color, radius=0.01)
 
 
 def draw_tableware_plan(plan: TablewarePlan, canvas: Canvas) -> None:

@@ -13,6 +13,7 @@ import time
 from scenewright.schemas.errors import MachineFailure
 
 HOST, PORT = "127.0.0.1", 9876
+"""Address of the viewer: this machine, and Rerun's own port."""
 LONGEST_START = 20.0
 """Seconds until the window has to be there."""
 

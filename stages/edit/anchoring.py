@@ -99,80 +99,88 @@ def shares(anchor: Anchor, where: Where, fitting: Fitting) -> dict[int, float]:
 
 def find(anchor: Anchor, where: Where, fitting: Fitting, also: Sequence[str] = ()) -> Thing:
     """Return the one thing that fits an anchor, of its class or one of `also`. Raises Conflict."""
-    box, classes, things = upright_box(anchor.box), (anchor.class_name, *also, NAMELESS), where.things()
-    found = shares(anchor, where, fitting)
-    if found:
-        return _by_surface(anchor, things, found, fitting, classes)
-    there = sorted(
-        ((fitting.overlap(box, thing.box), thing) for thing in things if passes(thing, anchor, fitting)),
+    box, classes, candidates = upright_box(anchor.box), (anchor.class_name, *also, NAMELESS), where.things()
+    share_of = shares(anchor, where, fitting)
+    if share_of:
+        return _by_surface(anchor, candidates, share_of, fitting, classes)
+    by_overlap = sorted(
+        (
+            (fitting.overlap(box, candidate.box), candidate)
+            for candidate in candidates
+            if passes(candidate, anchor, fitting)
+        ),
         key=lambda pair: (-pair[0], pair[1].instance),
     )
-    good = [(overlap, thing) for overlap, thing in there if overlap >= fitting.minimum_overlap]
-    named = [(overlap, thing) for overlap, thing in good if _may_be(thing, anchor, classes)]
-    if not named and not good:
-        good = named = [pair for pair in there if _is_part(pair, anchor, things, fitting, classes)]
-    if not named:
-        raise Conflict(_why_none(anchor, there, good))
-    rivals = [thing for overlap, thing in good if overlap >= fitting.clear_share * named[0][0]]
+    good = [(overlap, candidate) for overlap, candidate in by_overlap if overlap >= fitting.minimum_overlap]
+    of_class = [(overlap, candidate) for overlap, candidate in good if _may_be(candidate, anchor, classes)]
+    if not of_class and not good:
+        good = of_class = [pair for pair in by_overlap if _is_part(pair, anchor, candidates, fitting, classes)]
+    if not of_class:
+        raise Conflict(_why_none(anchor, by_overlap, good))
+    rivals = [candidate for overlap, candidate in good if overlap >= fitting.clear_share * of_class[0][0]]
     if len(rivals) > 1:
-        both = ", ".join(f"{thing.name} ({overlap:.2f})" for overlap, thing in good[:2])
-        raise Conflict(f"{_place(anchor)} more than one thing fits: {both}")
-    return named[0][1]
+        two_best = ", ".join(f"{candidate.name} ({overlap:.2f})" for overlap, candidate in good[:2])
+        raise Conflict(f"{_place(anchor)} more than one thing fits: {two_best}")
+    return of_class[0][1]
 
 
 def _by_surface(
-    anchor: Anchor, things: Sequence[Thing], found: Mapping[int, float], fitting: Fitting, classes: Sequence[str]
+    anchor: Anchor, candidates: Sequence[Thing], share_of: Mapping[int, float], fitting: Fitting, classes: Sequence[str]
 ) -> Thing:
     """Return the thing that most of the anchor's surface is called, of those that lie mostly in the anchor's box: what
     a thing stands on or in takes of its fringe, and is none of its size. It must be of its class, and none other have
     a like share. Raises Conflict."""
     box, inside = upright_box(anchor.box), {}
-    for thing in things:
-        if thing.instance in found:
-            assert thing.surface is not None  # of a map
-            inside[thing.instance] = float(points_in_box(box, np.asarray(thing.surface.data), fitting.margin).mean())
-    there = sorted(
-        ((found[thing.instance], thing) for thing in things if thing.instance in found),
+    for candidate in candidates:
+        if candidate.instance in share_of:
+            assert candidate.surface is not None  # of a map
+            inside[candidate.instance] = float(
+                points_in_box(box, np.asarray(candidate.surface.data), fitting.margin).mean()
+            )
+    by_share = sorted(
+        ((share_of[candidate.instance], candidate) for candidate in candidates if candidate.instance in share_of),
         key=lambda pair: (-pair[0], pair[1].instance),
     )
-    if not there:
+    if not by_share:
         raise Conflict(f"{_place(anchor)} lies no thing")
-    within = [(share, thing) for share, thing in there if inside[thing.instance] >= fitting.minimum_inside]
+    within = [
+        (share, candidate) for share, candidate in by_share if inside[candidate.instance] >= fitting.minimum_inside
+    ]
     if not within:
-        best = there[0][1]
+        best = by_share[0][1]
         if not _may_be(best, anchor, classes):
             raise Conflict(f"{_place(anchor)} lies {best.name}, which is no {anchor.class_name}")
-        here = 100 * inside[best.instance]
-        raise Conflict(f"{_place(anchor)} lies {best.name}, of which {here:.0f} % is where it was")
+        percent_inside = 100 * inside[best.instance]
+        raise Conflict(f"{_place(anchor)} lies {best.name}, of which {percent_inside:.0f} % is where it was")
     share, best = within[0]
     nameless = best.class_name == NAMELESS != anchor.class_name
     least = fitting.minimum_share if nameless else fitting.minimum_part  # its name says nothing for it
-    if share < least or share < fitting.minimum_share * sum(other for other, _ in within):
+    if share < least or share < fitting.minimum_share * sum(other_share for other_share, _ in within):
         raise Conflict(f"{_place(anchor)} {best.name} has {100 * share:.0f} % of its surface, and nothing has more")
     if not _may_be(best, anchor, classes):
         raise Conflict(f"{_place(anchor)} lies {best.name}, which is no {anchor.class_name}")
     alike = max(fitting.minimum_overlap, fitting.clear_share * fitting.overlap(box, best.box))
-    rivals = {thing.instance for other, thing in within if other >= fitting.rival_share * share}
-    for thing in things:
-        same = thing.instance in rivals
-        if thing.instance != best.instance and (same or fitting.overlap(box, thing.box) >= alike):
-            raise Conflict(f"{_place(anchor)} more than one thing fits: {best.name}, {thing.name}")
+    rivals = {candidate.instance for other_share, candidate in within if other_share >= fitting.rival_share * share}
+    for candidate in candidates:
+        same = candidate.instance in rivals
+        if candidate.instance != best.instance and (same or fitting.overlap(box, candidate.box) >= alike):
+            raise Conflict(f"{_place(anchor)} more than one thing fits: {best.name}, {candidate.name}")
     return best
 
 
-def _may_be(thing: Thing, anchor: Anchor, classes: Sequence[str]) -> bool:
-    return thing.class_name in classes or anchor.class_name == NAMELESS
+def _may_be(candidate: Thing, anchor: Anchor, classes: Sequence[str]) -> bool:
+    return candidate.class_name in classes or anchor.class_name == NAMELESS
 
 
 def _is_part(
-    pair: tuple[float, Thing], anchor: Anchor, things: Sequence[Thing], fitting: Fitting, classes: Sequence[str]
+    pair: tuple[float, Thing], anchor: Anchor, candidates: Sequence[Thing], fitting: Fitting, classes: Sequence[str]
 ) -> bool:
     """Whether a thing is what a map that saw less has of the anchor's, and nothing else could be more of it."""
-    (overlap, thing), box = pair, upright_box(anchor.box)
-    if not _may_be(thing, anchor, classes) or overlap < fitting.minimum_part:
+    (overlap, candidate), box = pair, upright_box(anchor.box)
+    if not _may_be(candidate, anchor, classes) or overlap < fitting.minimum_part:
         return False
-    inside = [k for k in things if _may_be(k, anchor, classes) and fitting.within(k.box, box) >= MOSTLY_WITHIN]
-    return [k.instance for k in inside] == [thing.instance]
+    inside = [k for k in candidates if _may_be(k, anchor, classes) and fitting.within(k.box, box) >= MOSTLY_WITHIN]
+    return [k.instance for k in inside] == [candidate.instance]
 
 
 def passes(thing: Thing, anchor: Anchor, fitting: Fitting) -> bool:
@@ -190,8 +198,8 @@ def _why_none(anchor: Anchor, fits: list[tuple[float, Thing]], good: list[tuple[
     if good:
         return f"{_place(anchor)} lies {good[0][1].name}, which is no {anchor.class_name}"
     if fits:
-        overlap, thing = fits[0]
-        return f"{_place(anchor)} lies {thing.name}, whose box is another one (overlap {overlap:.2f})"
+        overlap, candidate = fits[0]
+        return f"{_place(anchor)} lies {candidate.name}, whose box is another one (overlap {overlap:.2f})"
     return f"{_place(anchor)} lies no thing"
 
 
@@ -201,21 +209,21 @@ def anchor_of(state: MapState, instance: int) -> Anchor:
     Its point is the vertex with most of the thing's own surface around it and least of others', so that it stays on
     the thing when borders and fringes move.
     """
-    thing = next((thing for thing in state.things() if thing.instance == instance), None)
-    if thing is None:
+    anchored = next((anchored for anchored in state.things() if anchored.instance == instance), None)
+    if anchored is None:
         raise KeyError(instance)
-    assert thing.surface is not None  # of a map
-    points = np.asarray(thing.surface.data)
+    assert anchored.surface is not None  # of a map
+    points = np.asarray(anchored.surface.data)
     tried = points[:: -(-len(points) // MOST_TRIED)]
-    near = thing.surface.query_ball_point(tried, AROUND, return_length=True)
+    neighbour_count = anchored.surface.query_ball_point(tried, AROUND, return_length=True)
     others = state.surface.vertices[state.instance != instance].astype(float)
-    others = others[points_in_box(thing.box, others, AROUND)]
+    others = others[points_in_box(anchored.box, others, AROUND)]
     if len(others):
-        near = near - cKDTree(others).query_ball_point(tried, AROUND, return_length=True)
-    spread = [tried[int(np.argmax(near))], *tried[_spread(tried, near)]]
-    point, *surface = (tuple(round(float(value), MILLIMETRES) for value in place) for place in spread)
-    said = {"class": thing.class_name, "box": written_box(thing.box), "point": point, "surface": tuple(surface)}
-    return Anchor.model_validate(said)
+        neighbour_count = neighbour_count - cKDTree(others).query_ball_point(tried, AROUND, return_length=True)
+    spread = [tried[int(np.argmax(neighbour_count))], *tried[_spread(tried, neighbour_count)]]
+    point, *surface = (tuple(round(float(value), MILLIMETRES) for value in chosen_point) for chosen_point in spread)
+    fields = {"class": anchored.class_name, "box": written_box(anchored.box), "point": point, "surface": tuple(surface)}
+    return Anchor.model_validate(fields)
 
 
 def _spread(points: np.ndarray, worth: np.ndarray) -> list[int]:

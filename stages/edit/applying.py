@@ -39,14 +39,14 @@ def apply_edits(state: Edited, edits: Iterable[AnyEdit], fitting: Fitting, table
     for number, edit in enumerate(edits, 1):
         if type(edit) not in table:
             continue
-        asked = AppliedEdit(
+        record = AppliedEdit(
             number=number, what=edit.what, status="conflict", by=edit.by, when=edit.when, note=edit.note
         )
         try:
             done = table[type(edit)](state, edit, fitting)
         except Conflict as conflict:
-            records.append(asked.model_copy(update={"reason": str(conflict)}))
+            records.append(record.model_copy(update={"reason": str(conflict)}))
             continue
         names = tuple(state.name_of(k) for k in done.instances)
-        records.append(asked.model_copy(update={"status": done.status, "things": names, "reason": done.reason}))
+        records.append(record.model_copy(update={"status": done.status, "things": names, "reason": done.reason}))
     return records

@@ -21,12 +21,12 @@ def run(contact_graph: ContactGraph, edits: Path, *, parameters: EditMapParamete
     The outcome is `conflicts` when an edit was not applied. The timeline is left out: it is of before.
     Raises BadInput when the edits or the graph are broken.
     """
-    asked = read_edits(edits)
+    edits_file = read_edits(edits)
     state = GraphState(contact_graph.info)
     with context.progress.step("apply the edits"):
-        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()), GRAPH_EDITS)
+        records = apply_edits(state, edits_file.edits, Fitting(**parameters.model_dump()), GRAPH_EDITS)
     state.graph.write(context.output / "graph.json")
-    summary = write_records(records, len(asked.edits), context)
+    summary = write_records(records, len(edits_file.edits), context)
     summary |= {
         "nodes": len(state.graph.nodes) - 1,
         "pinned": sum(record.what == "support" and record.status != "conflict" for record in records),

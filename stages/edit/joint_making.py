@@ -31,6 +31,7 @@ from scipy.spatial import QhullError
 FINEST = 0.05
 """Triangles are cut to edges of this length before they are told apart [m]."""
 FEWEST_FACES = 8
+"""Fewest faces on either side of a cut; by eye."""
 THINNEST = 5e-3
 """A piece that is flatter is made a box of this thickness [m]."""
 BODY = "body"
@@ -78,8 +79,8 @@ def with_new_joint(state: SceneState, node: GraphNode, edit: AddJoint) -> str:
         model, folder, pose = state.model_of(node)
         scale, joints, values = node.scale or 1.0, model.joints, dict(node.joints)
         closed = part_transforms(model, {})
-        parts = load_visual_parts(folder)
-        for part, mesh in parts.items():
+        meshes = load_visual_parts(folder)
+        for part, mesh in meshes.items():
             mesh.apply_transform(closed[part])
         body = model.parts[0]
     else:
@@ -87,13 +88,13 @@ def with_new_joint(state: SceneState, node: GraphNode, edit: AddJoint) -> str:
         assert node.box is not None  # it was found by it
         pose = transform_from_yaw(box_yaw(node.box), np.array([*node.box.center[:2], bottom(node.box)]))
         mesh.apply_transform(inverse(pose))
-        parts = {body: mesh}
-    rest, moving = _cut(parts[body], edit, pose, scale, node.id)
+        meshes = {body: mesh}
+    remainder, moving = _cut(meshes[body], edit, pose, scale, node.id)
     name = next(f"hand_{k}" for k in range(1, 1000) if f"hand_{k}" not in {joint.name for joint in joints})
     to_model = inverse(pose)
     length = scale if edit.type == "prismatic" else 1.0
     axis = to_model[:3, :3] @ np.array(edit.axis, dtype=float)
-    new = Joint(
+    new_joint = Joint(
         name=name,
         type=edit.type,
         part=name,
@@ -107,10 +108,10 @@ def with_new_joint(state: SceneState, node: GraphNode, edit: AddJoint) -> str:
     target = state.output / "models" / model_id
     planes = moved_planes(node.planes, to_model[:3, :3], to_model[:3, 3])
     planes = moved_planes(planes, np.eye(3), np.zeros(3), 1.0 / scale)
-    whole = {**parts, body: rest, name: moving}
-    _write(target, model_id, node, whole, body, (*joints, new), planes)
+    all_meshes = {**meshes, body: remainder, name: moving}
+    _write(target, model_id, node, all_meshes, body, (*joints, new_joint), planes)
     before = state.replacements.get(node.id)
-    known = (
+    evidence = (
         {}
         if before is None
         else before.joint_evidence or {joint.name: JointEvidence(grounds=("user",)) for joint in joints}
@@ -125,14 +126,14 @@ def with_new_joint(state: SceneState, node: GraphNode, edit: AddJoint) -> str:
             reason="a person gave it a joint",
             chosen=CadCandidate(
                 model_id=model_id,
-                joints={**values, name: max(0.0, new.lower)},
+                joints={**values, name: max(0.0, new_joint.lower)},
                 scale=scale,
                 world_from_model=as_transform(pose),
                 matching_error=0.0,
                 alignment_error=0.0,
             ),
             part_colors={} if before is None else before.part_colors,
-            joint_evidence={**known, name: JointEvidence(grounds=("user",))},
+            joint_evidence={**evidence, name: JointEvidence(grounds=("user",))},
         ),
     )
     return name
@@ -162,7 +163,7 @@ def _write(
     folder: Path,
     model_id: str,
     node: GraphNode,
-    parts: Mapping[str, trimesh.Trimesh],
+    meshes: Mapping[str, trimesh.Trimesh],
     body: str,
     joints: tuple[Joint, ...],
     planes: tuple,
@@ -173,15 +174,15 @@ def _write(
     ordered = [body, *(joint.part for joint in joints)]
     geometries = []
     for name in ordered:
-        mesh = parts[name].copy()
+        mesh = meshes[name].copy()
         mesh.apply_translation(-origins.get(name, np.zeros(3)))
         solids = [_solid(piece) for piece in convex_pieces(mesh.vertices, mesh.faces)]
         red, green, blue = (int(value) for value in colored(mesh).colors.mean(axis=0))
-        shown = colored(mesh)
+        drawn_mesh = colored(mesh)
         properties = mass_properties(solids, [density] * len(solids))
         tint = (red, green, blue)
-        geometries.append(PartGeometry(name, solids, [tint] * len(solids), properties, [shown], [tint]))
-    points = np.concatenate([np.asarray(mesh.vertices) for mesh in parts.values()])
+        geometries.append(PartGeometry(name, solids, [tint] * len(solids), properties, [drawn_mesh], [tint]))
+    points = np.concatenate([np.asarray(mesh.vertices) for mesh in meshes.values()])
     state = ModelState(
         joints={joint.name: 0.0 for joint in joints},
         box_minimum=as_vector(points.min(axis=0)),

@@ -30,12 +30,12 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
     The outcome is `conflicts` when an edit was not applied. Snapshots are left out: they are maps of before.
     Raises BadInput when the edits or the map are broken.
     """
-    asked = read_edits(edits)
+    edits_file = read_edits(edits)
     with context.progress.step("read the map"):
         state, info = read_state(panoptic_map)
     with context.progress.step("apply the edits"):
         vertices_before = len(state.surface.vertices)
-        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()), MAP_EDITS)
+        records = apply_edits(state, edits_file.edits, Fitting(**parameters.model_dump()), MAP_EDITS)
         entities, meshes = state.finished()
     with context.progress.step("write the map"):
         root = context.output
@@ -58,7 +58,7 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
         for name in KEPT if state.turned is None else KEPT[:1]:  # voxels lie along the axes of before
             if panoptic_map.path(name).is_file():
                 shutil.copyfile(panoptic_map.path(name), root / name)
-    summary = write_records(records, len(asked.edits), context)
+    summary = write_records(records, len(edits_file.edits), context)
     summary |= {"entities": len(entities), "vertices": len(state.surface.vertices)}
     return PanopticMap(root, outcome=outcome_of(records), summary=summary)
 

@@ -19,6 +19,7 @@ from scenewright.stages.kit.geometry.transforms import apply
 from scipy.spatial import cKDTree
 
 GREY = 128
+"""Grey value, of 255, of surfaces without a colour."""
 HINT = "make the panoptic map again"
 
 

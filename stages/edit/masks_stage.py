@@ -23,7 +23,7 @@ from scenewright.stages.kit.stage import Context
 
 LABEL = "masks drawn from a map"
 LARGEST_ID = 0xFFFFFF
-"""Of a panoptic picture."""
+"""Largest id of a panoptic picture: 24 bits."""
 
 
 def run(
@@ -35,8 +35,8 @@ def run(
     that its ray meets first. So is every pixel whose ray meets a thing that a person drew (`edit add --drawn`: glass)
     before what the camera measured. Frames without a pose are left out. Raises BadInput when no frame has one.
     """
-    state, known = read_state(panoptic_map)
-    turned = np.eye(4) if known.world_from_sequence is None else np.array(known.world_from_sequence)
+    state, map_info = read_state(panoptic_map)
+    turned = np.eye(4) if map_info.world_from_sequence is None else np.array(map_info.world_from_sequence)
     if max(state.entities, default=0) > LARGEST_ID:
         raise BadInput(f"{panoptic_map.root}: an instance is beyond {LARGEST_ID}", hint="make the map again")
     info, caster = sequence.info, _RayCaster(state)
@@ -60,14 +60,14 @@ def run(
     SegmentsFile(
         backend="map", label=LABEL, width=info.camera.width, height=info.camera.height, frames=tuple(annotations)
     ).write(context.output / "segments.json")
-    named = sum(len(frame.segments) for frame in annotations)
+    segment_count = sum(len(frame.segments) for frame in annotations)
     summary = {
         "label": LABEL,
         "frames": len(annotations),
         "without_pose": len(reader) - len(annotations),
-        "segments_per_frame": round(named / len(annotations), 2),
+        "segments_per_frame": round(segment_count / len(annotations), 2),
     }
-    return Segments(context.output, outcome="ok" if named else "empty", summary=summary)
+    return Segments(context.output, outcome="ok" if segment_count else "empty", summary=summary)
 
 
 class _RayCaster:
@@ -105,21 +105,21 @@ def frame_ids(frame: Frame, camera: Camera, state: MapState, caster: _RayCaster,
     labels = np.append(state.instance, 0)
     ids = np.where(met, labels[np.where(met, vertex, -1)], 0).astype(np.int32)
     drawn = np.array(sorted(k for k, entity in state.entities.items() if not entity.observations), int)
-    seen = (depth > 0) & ~(np.isin(ids, drawn) & (distance < depth))
-    points = apply(frame.world_from_camera, back_project(depth, camera)[seen].astype(float))
-    ids[seen] = np.maximum(state.called(points, reach), 0)
+    on_map = (depth > 0) & ~(np.isin(ids, drawn) & (distance < depth))
+    points = apply(frame.world_from_camera, back_project(depth, camera)[on_map].astype(float))
+    ids[on_map] = np.maximum(state.called(points, reach), 0)
     return ids
 
 
 def _segments(ids: np.ndarray, state: MapState) -> tuple[FrameSegment, ...]:
     vocabulary = load_vocabulary()
-    found = []
+    segments = []
     for number, area in zip(*(array.tolist() for array in np.unique(ids, return_counts=True)), strict=True):
         if number in state.entities:
             entry = vocabulary.by_name(state.entities[number].class_name)
-            found.append(
+            segments.append(
                 FrameSegment(
                     id=number, class_id=entry.id, instance=number, is_thing=entry.kind == "thing", score=1.0, area=area
                 )
             )
-    return tuple(found)
+    return tuple(segments)

@@ -31,7 +31,7 @@ def run(
     The library has the models that an edit may choose, the map the meshes of what no model is to stand for. The outcome
     is `conflicts` when an edit was not applied. Raises BadInput when the edits or the scene are broken.
     """
-    asked, before = read_edits(edits), cad_scene.info
+    edits_file, before = read_edits(edits), cad_scene.info
     state = SceneState(
         cad_scene.graph,
         {entry.node: entry for entry in before.replacements},
@@ -41,13 +41,13 @@ def run(
         context.output,
     )
     with context.progress.step("apply the edits"):
-        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()), SCENE_EDITS)
+        records = apply_edits(state, edits_file.edits, Fitting(**parameters.model_dump()), SCENE_EDITS)
     with context.progress.step("write the scene"):
         state.write(context.output)
         replacements = tuple(state.replacements.values())
         before.model_copy(update={"replacements": replacements}).write(context.output / "scene.json")
         state.graph.write(context.output / "graph.json")
-    summary = write_records(records, len(asked.edits), context)
+    summary = write_records(records, len(edits_file.edits), context)
     decisions = [entry.decision for entry in replacements]
     summary |= {
         "cad": decisions.count("cad"),

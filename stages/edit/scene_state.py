@@ -23,6 +23,7 @@ from scenewright.stages.kit.geometry.planes import moved_planes
 from scenewright.stages.kit.geometry.transforms import apply, transform_from
 
 GREY = 128
+"""Grey value, of 255, of surfaces without a colour."""
 HINT = "run `cad` again"
 
 
@@ -51,7 +52,7 @@ class SceneState(GraphState):
         assert self.scene is not None
         places = [self.made.get(model_id), self.scene.path("models") / model_id]
         places += [] if self.library is None else [self.library / model_id]
-        return next((place for place in places if place is not None and place.is_dir()), None)
+        return next((candidate for candidate in places if candidate is not None and candidate.is_dir()), None)
 
     def model_of(self, node: GraphNode) -> tuple[CadModel, Path, np.ndarray]:
         """Return the model of a node, its folder, and (4, 4) world_from_model without the scale. Raises Conflict, when

@@ -90,9 +90,9 @@ def survey(
             raise BadInput(f"{root}: no such folder", hint="give run folders, or a folder of runs")
     leftovers, folders = _find(roots)
     artifacts = _read_artifacts(folders, roots)
-    items = [_leftover_item(target, found) for target, found in sorted(leftovers.items())]
+    items = [_leftover_item(target, leftover_paths) for target, leftover_paths in sorted(leftovers.items())]
     chosen = {
-        path: _classified(path, artifacts, superseded=superseded, intermediate=intermediate, keep=keep)
+        path: _classify(path, artifacts, superseded=superseded, intermediate=intermediate, keep=keep)
         for path, artifact in sorted(artifacts.items())
         if artifact.ours
     }
@@ -161,7 +161,7 @@ def _read_artifacts(folders: set[Path], roots: list[Path]) -> dict[Path, _Artifa
             except BadInput as error:
                 artifact.odd = str(error)
                 continue
-            owner = next((place for place in (path, *path.parents) if place in artifacts), None)
+            owner = next((ancestor for ancestor in (path, *path.parents) if ancestor in artifacts), None)
             artifact.inputs.append((record, path, owner))
             if owner is not None:
                 artifacts[owner].users.add(artifact.path)
@@ -171,12 +171,12 @@ def _read_artifacts(folders: set[Path], roots: list[Path]) -> dict[Path, _Artifa
 
 def _neighbours(roots: list[Path]) -> set[Path]:
     """Artifacts in sibling folders of the roots, two levels deep: other runs that may read these."""
-    found: set[Path] = set()
+    siblings: set[Path] = set()
     for parent in {root.parent for root in roots}:
         for pattern in (f"*/{MANIFEST_NAME}", f"*/*/{MANIFEST_NAME}"):
             with contextlib.suppress(OSError):
-                found |= {path.parent for path in parent.glob(pattern)}
-    return found
+                siblings |= {path.parent for path in parent.glob(pattern)}
+    return siblings
 
 
 def folder_bytes(path: Path) -> int:
@@ -209,19 +209,19 @@ def is_locked(target: Path) -> bool:
 # --- what can go -----------------------------------------------------------------------------------------------
 
 
-def _leftover_item(target: Path, found: list[Path]) -> Item:
-    size = sum(folder_bytes(path) for path in found)
+def _leftover_item(target: Path, paths: list[Path]) -> Item:
+    size = sum(folder_bytes(path) for path in paths)
     if is_locked(target):
         return Item(target, "leftover", "", size, "a run is writing it now")
     reason = "left by a run that was killed"
-    if any(path.name.endswith(".journal") for path in found):
+    if any(path.name.endswith(".journal") for path in paths):
         if not target.exists():
             size = 0  # one of them becomes the artifact
         reason = "a replacement was interrupted; it is completed first"
     return Item(target, "leftover", "", size, reason, collectable=True)
 
 
-def _classified(
+def _classify(
     path: Path, artifacts: dict[Path, _Artifact], *, superseded: bool, intermediate: bool, keep: Collection[str]
 ) -> Item:
     artifact = artifacts[path]
@@ -253,9 +253,9 @@ def _follow_inputs(artifacts: dict[Path, _Artifact]) -> None:
     for first in sorted(artifacts):
         path = {} if first in done else {first: iter(artifacts[first].inputs)}
         while path:
-            current, rest = next(reversed(path.items()))
+            current, following = next(reversed(path.items()))
             artifact = artifacts[current]
-            for _, _, owner in rest:
+            for _, _, owner in following:
                 if owner is None:
                     continue
                 if owner in path:
@@ -272,35 +272,35 @@ def _follow_inputs(artifacts: dict[Path, _Artifact]) -> None:
 
 def _note_inputs(artifact: _Artifact, artifacts: dict[Path, _Artifact], external: dict[Path, str]) -> None:
     """Note what the inputs of an artifact, which have been noted before, say about it."""
-    for record, place, owner in artifact.inputs:
+    for record, input_path, owner in artifact.inputs:
         if owner is None or owner == artifact.path:
             continue
-        made = artifacts[owner]
-        if made.odd and not artifact.odd:
-            artifact.odd = _made_from(owner, made.odd)
+        owner_artifact = artifacts[owner]
+        if owner_artifact.odd and not artifact.odd:
+            artifact.odd = _made_from(owner, owner_artifact.odd)
         if artifact.stale:
             continue
-        if _digest_now(record, place, made, external) != record.digest:
+        if _digest_now(record, input_path, owner_artifact, external) != record.digest:
             artifact.stale = f"{owner.name} was made again with another result since"
-        elif made.stale:
-            artifact.stale = _made_from(owner, made.stale)
+        elif owner_artifact.stale:
+            artifact.stale = _made_from(owner, owner_artifact.stale)
 
 
 def _made_from(owner: Path, reason: str) -> str:
     return f"made from {owner.name}: {reason}" if len(reason) < LONGEST_REASON else reason
 
 
-def _digest_now(record: InputRecord, place: Path, owner: _Artifact, external: dict[Path, str]) -> str | None:
+def _digest_now(record: InputRecord, input_path: Path, owner: _Artifact, external: dict[Path, str]) -> str | None:
     """Digest of an input as its artifact states it now; None when it is no longer there."""
-    if place == owner.path:
+    if input_path == owner.path:
         if record.kind != "external":
             return owner.manifest.content_digest
-        if place not in external:
-            external[place] = external_digest(place)
-        return external[place]
-    name = place.relative_to(owner.path).as_posix()
-    known = {file.path: file.sha256 for file in owner.manifest.files}
-    return known.get(name, record.digest if place.is_dir() else None)
+        if input_path not in external:
+            external[input_path] = external_digest(input_path)
+        return external[input_path]
+    name = input_path.relative_to(owner.path).as_posix()
+    digest_of = {file.path: file.sha256 for file in owner.manifest.files}
+    return digest_of.get(name, record.digest if input_path.is_dir() else None)
 
 
 def _cannot_be_remade(artifact: _Artifact) -> str:
@@ -323,7 +323,9 @@ def _cannot_be_remade(artifact: _Artifact) -> str:
         return f"its parameters are not those of today ({str(error).splitlines()[0]})"
     if key != manifest.key:
         return "libraries or data files have changed since"
-    gone = next((place for _, place, owner in artifact.inputs if owner is None and not place.exists()), None)
+    gone = next(
+        (input_path for _, input_path, owner in artifact.inputs if owner is None and not input_path.exists()), None
+    )
     return f"its input {gone} is gone" if gone else ""
 
 
@@ -350,9 +352,11 @@ def _remove(item: Item) -> None:
             raise MachineFailure(f"{item.path} was made again meanwhile", hint="look again")
         if item.category == "intermediate":
             for record in manifest.inputs:
-                place = (item.path / record.path).resolve()
-                if record.kind == "external" and place.exists() and external_digest(place) != record.digest:
-                    raise BadInput(f"{item.path}: its input {place} is another one now", hint="it could not be remade")
+                input_path = (item.path / record.path).resolve()
+                if record.kind == "external" and input_path.exists() and external_digest(input_path) != record.digest:
+                    raise BadInput(
+                        f"{item.path}: its input {input_path} is another one now", hint="it could not be remade"
+                    )
         hidden = item.path.with_name(f".{item.path.name}.old-{secrets.token_hex(4)}")
         os.rename(item.path, hidden)
         store.sync_folder(item.path.parent)

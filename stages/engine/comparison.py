@@ -128,12 +128,12 @@ def compare(first: Path, second: Path) -> list[ArtifactComparison]:
             hint="give two run folders, or two artifact folders",
         )
     before, after = artifacts_of(first), artifacts_of(second)
-    found = [_compare_one(name, before.get(name), after.get(name)) for name in sorted(set(before) | set(after))]
-    order = {name: _started(path) for name, path in (after | before).items()}
-    return sorted(found, key=lambda item: (order[item.name], item.name))
+    comparisons = [_compare_one(name, before.get(name), after.get(name)) for name in sorted(set(before) | set(after))]
+    order = {name: _start_time(path) for name, path in (after | before).items()}
+    return sorted(comparisons, key=lambda item: (order[item.name], item.name))
 
 
-def _started(path: Path) -> str:
+def _start_time(path: Path) -> str:
     try:
         return read_manifest(path).provenance.started
     except BadInput:
@@ -151,9 +151,9 @@ def _compare_one(name: str, first: Path | None, second: Path | None) -> Artifact
         return ArtifactComparison(name, "unknown", "unreadable", tuple(problems))
     before, after = manifests
     if before is None or after is None:
-        known = before or after
-        assert known is not None
-        return ArtifactComparison(name, known.kind, "only in second" if before is None else "only in first")
+        either = before or after
+        assert either is not None
+        return ArtifactComparison(name, either.kind, "only in second" if before is None else "only in first")
     assert first is not None and second is not None
     changes = list(_changes(before, after))
     try:
@@ -179,20 +179,20 @@ def _compare_one(name: str, first: Path | None, second: Path | None) -> Artifact
 
 def _changes(before: Manifest, after: Manifest) -> list[Change]:
     """List what differs in how the two were made and in what they say of themselves."""
-    found = []
+    changes = []
     for field in ("stage", "code", "schema_version", "seed", "device_kind"):
-        found += _differences("stage", {field: getattr(before, field)}, {field: getattr(after, field)})
+        changes += _differences("stage", {field: getattr(before, field)}, {field: getattr(after, field)})
     for group, field in (("parameter", "parameters"), ("library", "libraries"), ("data file", "data_files")):
-        found += _differences(group, getattr(before, field), getattr(after, field))
-    found += _differences(
+        changes += _differences(group, getattr(before, field), getattr(after, field))
+    changes += _differences(
         "accepted code",
         *({a.step: f"{a.made_with:.12} -> {a.accepted:.12}" for a in m.accepted_code} for m in (before, after)),
     )
-    found += _differences("input", *({record.role: record.digest for record in m.inputs} for m in (before, after)))
-    found += _differences("version", *({f: getattr(m.provenance, f) for f in VERSIONS} for m in (before, after)))
-    found += _differences("outcome", {"outcome": before.outcome}, {"outcome": after.outcome})
-    found += _differences("summary", before.summary, after.summary)
-    return found
+    changes += _differences("input", *({record.role: record.digest for record in m.inputs} for m in (before, after)))
+    changes += _differences("version", *({f: getattr(m.provenance, f) for f in VERSIONS} for m in (before, after)))
+    changes += _differences("outcome", {"outcome": before.outcome}, {"outcome": after.outcome})
+    changes += _differences("summary", before.summary, after.summary)
+    return changes
 
 
 def _edits(root: Path) -> dict[str, str]:
@@ -228,20 +228,26 @@ def _measures(first: Path, second: Path) -> tuple[list[Figure], list[Change]]:
 
 
 def _file_changes(before: Manifest, after: Manifest) -> FileChanges:
-    old = {record.path: record.sha256 for record in before.files if record.digested}
-    new = {record.path: record.sha256 for record in after.files if record.digested}
+    digests_before = {record.path: record.sha256 for record in before.files if record.digested}
+    digests_after = {record.path: record.sha256 for record in after.files if record.digested}
     return FileChanges(
-        changed=tuple(sorted(path for path in old.keys() & new.keys() if old[path] != new[path])),
-        removed=tuple(sorted(old.keys() - new.keys())),
-        added=tuple(sorted(new.keys() - old.keys())),
+        changed=tuple(
+            sorted(
+                path
+                for path in digests_before.keys() & digests_after.keys()
+                if digests_before[path] != digests_after[path]
+            )
+        ),
+        removed=tuple(sorted(digests_before.keys() - digests_after.keys())),
+        added=tuple(sorted(digests_after.keys() - digests_before.keys())),
     )
 
 
 def _costs(before: Manifest, after: Manifest) -> tuple[Figure, ...]:
     def values(manifest: Manifest) -> dict[str, float]:
-        made = manifest.provenance
+        provenance = manifest.provenance
         total = math.fsum(record.bytes for record in manifest.files)
-        return {"bytes": total, "seconds": made.seconds, "peak_memory_bytes": float(made.peak_memory_bytes)}
+        return {"bytes": total, "seconds": provenance.seconds, "peak_memory_bytes": float(provenance.peak_memory_bytes)}
 
-    old, new = values(before), values(after)
-    return tuple(Figure(name, old[name], new[name]) for name in old)
+    values_before, values_after = values(before), values(after)
+    return tuple(Figure(name, values_before[name], values_after[name]) for name in values_before)

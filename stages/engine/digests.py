@@ -13,13 +13,13 @@ from scenewright.stages.kit.digests import sha256_of_file, sha256_of_text
 
 def payload_files(root: Path) -> list[Path]:
     """Return every file under `root` but the manifest, sorted by POSIX path. Raises BadInput for links."""
-    found = []
+    files = []
     for path in sorted(root.rglob("*"), key=lambda p: p.relative_to(root).as_posix()):
         if path.is_symlink():
             raise BadInput(f"{path}: a link inside an artifact", hint="artifacts hold plain files only")
         if path.is_file() and path != root / MANIFEST_NAME:
-            found.append(path)
-    return found
+            files.append(path)
+    return files
 
 
 def record_files(root: Path, undigested: Sequence[str]) -> tuple[FileRecord, ...]:

@@ -102,22 +102,26 @@ class RunEstimate:
     @property
     def total(self) -> Estimate:
         """What is not there yet, all together, and the most memory that one step uses."""
-        coming = [found for name, found in self.steps.items() if found is not None and name not in self.there]
-        memory = max((found.mebibytes for found in coming), default=0.0)
-        return Estimate(sum(found.megabytes for found in coming), sum(found.lower for found in coming), memory)
+        coming = [estimate for name, estimate in self.steps.items() if estimate is not None and name not in self.there]
+        memory = max((estimate.mebibytes for estimate in coming), default=0.0)
+        return Estimate(
+            sum(estimate.megabytes for estimate in coming), sum(estimate.lower for estimate in coming), memory
+        )
 
     def lines(self) -> list[str]:
         """Say it, step by step."""
         rows = [
-            f"{name:24} {'is there' if name in self.there else found or 'nothing is known'}"
-            for name, found in self.steps.items()
+            f"{name:24} {'is there' if name in self.there else estimate or 'nothing is known'}"
+            for name, estimate in self.steps.items()
         ]
         return [*rows, f"{'to write':24} {self.total}"]
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures in bytes, for --json."""
-        known = {name: e.as_json() for name, e in self.steps.items() if e is not None and name not in self.there}
-        return {"total": self.total.as_json(), "steps": known}
+        step_estimates = {
+            name: e.as_json() for name, e in self.steps.items() if e is not None and name not in self.there
+        }
+        return {"total": self.total.as_json(), "steps": step_estimates}
 
 
 def estimate_pipeline(
@@ -126,16 +130,16 @@ def estimate_pipeline(
     """Estimate every step that would run. `values` are the variables of the pipeline."""
     holds: dict[str, Estimate] = {}
     steps: dict[str, Estimate | None] = {}
-    there = frozenset(step.name for step in pipeline.step if (run_folder / step.name / MANIFEST_NAME).is_file())
+    present = frozenset(step.name for step in pipeline.step if (run_folder / step.name / MANIFEST_NAME).is_file())
     for step in pipeline.step:
         expected = _estimate_in_pipeline(step, values, holds)
-        if step.name in there:
+        if step.name in present:
             holds[step.name] = measured(run_folder / step.name)
         elif expected is not None:
             holds[step.name] = expected
         if not only or step.name in only:
             steps[step.name] = expected
-    return RunEstimate(steps, there)
+    return RunEstimate(steps, present)
 
 
 def _estimate_in_pipeline(
@@ -147,18 +151,18 @@ def _estimate_in_pipeline(
     inputs = {}
     for role, source in step.inputs.items():
         declared = stage.reads[role]
-        what = declared.what if isinstance(declared, Optionally) else declared
-        if isinstance(what, External) and what.weights:
+        kind = declared.what if isinstance(declared, Optionally) else declared
+        if isinstance(kind, External) and kind.weights:
             continue  # perhaps a name in the cache; no output depends on its size
         if not source.startswith("$"):
             inputs[role] = holds.get(source.split("/")[0], Estimate(0.0, 0.0))
-        elif (given := values[source[1:]]) is not None:
-            if not Path(given).exists():
+        elif (value_of_variable := values[source[1:]]) is not None:
+            if not Path(value_of_variable).exists():
                 return None
-            inputs[role] = measured(Path(given))
-    asked = {name: _value(value, values) for name, value in step.parameters.items()}
+            inputs[role] = measured(Path(value_of_variable))
+    settings = {name: _value(value, values) for name, value in step.parameters.items()}
     try:
-        parameters = stage.parameters(**{name: value for name, value in asked.items() if value is not None})
+        parameters = stage.parameters(**{name: value for name, value in settings.items() if value is not None})
     except ValidationError:
         return None  # the step itself says what is wrong
     return stage.estimate(parameters, inputs)

@@ -135,12 +135,12 @@ def _exit_code(end: SystemExit) -> int:
 def _tell(before: set[str]) -> None:
     if _learned is None:
         return
-    own = [
+    own_modules = [
         name
         for name, module in list(sys.modules.items())
         if name not in before and getattr(getattr(module, "__spec__", None), "name", None) == name
     ]
-    _learned.write("".join(f"{name}\n" for name in own).encode())
+    _learned.write("".join(f"{name}\n" for name in own_modules).encode())
 
 
 def run_forked(command: Sequence[str], environment: dict[str, str]) -> tuple[int, str]:
@@ -148,8 +148,8 @@ def run_forked(command: Sequence[str], environment: dict[str, str]) -> tuple[int
 
     Raises KeyboardInterrupt as `subprocess` would, when the fork has ended.
     """
-    found = module_words(command)
-    assert found is not None, command
+    module_and_words = module_words(command)
+    assert module_and_words is not None, command
     sys.stdout.flush()
     sys.stderr.flush()
     reading, writing = os.pipe()
@@ -159,7 +159,7 @@ def run_forked(command: Sequence[str], environment: dict[str, str]) -> tuple[int
         os.close(reading)
         os.dup2(writing, 1)
         os.close(writing)
-        become(*found)
+        become(*module_and_words)
     os.close(writing)
     try:
         with open(reading, encoding="utf-8", errors="replace") as output:
@@ -192,9 +192,9 @@ class ForkedProcess:
                 os.close(descriptor)
             sys.stdin, sys.stdout, sys.stderr = (os.fdopen(n, mode) for n, mode in ((0, "r"), (1, "w"), (2, "w")))
             os.environ.update(environment)
-            found = module_words(command)
-            assert found is not None, command
-            become(*found)
+            module_and_words = module_words(command)
+            assert module_and_words is not None, command
+            become(*module_and_words)
         except BaseException:
             traceback.print_exc()
         finally:

@@ -20,9 +20,9 @@ def given_inputs(pipeline: Pipeline, only: tuple[str, ...] = ()) -> Iterator[tup
         reads = stage_by_name(step.stage).reads
         for role, source in step.inputs.items():
             declared = reads[role]
-            what = declared.what if isinstance(declared, Optionally) else declared
-            if source.startswith("$") and isinstance(what, External):
-                yield source[1:], what
+            kind = declared.what if isinstance(declared, Optionally) else declared
+            if source.startswith("$") and isinstance(kind, External):
+                yield source[1:], kind
 
 
 def check_given_inputs(pipeline: Pipeline, values: Mapping[str, str | None], only: tuple[str, ...] = ()) -> None:
@@ -30,11 +30,11 @@ def check_given_inputs(pipeline: Pipeline, values: Mapping[str, str | None], onl
 
     `values` are the variables of the pipeline, defaults included.
     """
-    for variable, what in given_inputs(pipeline, only):
+    for variable, kind in given_inputs(pipeline, only):
         value = values[variable]
         if value is None:
             continue
-        if what.weights:
+        if kind.weights:
             resolve_weights(Path(value))
         elif not _exists(Path(value)):
             raise BadInput(f"{variable} = {value}: no such file or folder", hint="check the path; nothing was run")

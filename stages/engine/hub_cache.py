@@ -31,9 +31,9 @@ def home_folder() -> Path:
 
 def hub_folder() -> Path:
     """Return the cache; it need not exist."""
-    given = os.environ.get("HF_HUB_CACHE")
-    if given:
-        return Path(given)
+    cache = os.environ.get("HF_HUB_CACHE")
+    if cache:
+        return Path(cache)
     home = os.environ.get("HF_HOME")
     return (Path(home) if home else home_folder() / ".cache" / "huggingface") / "hub"
 
@@ -56,8 +56,8 @@ def find_in_hub_cache(name: str) -> Path:
     folder = root / "snapshots" / commit
     if re.fullmatch(r"[\w.-]+", commit, re.ASCII) and commit not in (".", "..") and folder.is_dir():
         return folder
-    wanted = f" --revision {revision}" if match["revision"] else ""
+    revision_option = f" --revision {revision}" if match["revision"] else ""
     raise MissingDependency(
         f"{name}: no such folder, and not in the cache {hub_folder()}",
-        hint=f"fetch it with: hf download {model}{wanted}",
+        hint=f"fetch it with: hf download {model}{revision_option}",
     )

@@ -19,8 +19,9 @@ from types import FrameType
 PARENT_VARIABLE = "SCENEWRIGHT_PARENT"
 """Environment variable: process that started this one as a step of its chain."""
 SET_PARENT_DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of Linux."""
+"""Linux: PR_SET_PDEATHSIG of prctl."""
 REPEAT_SECONDS = 1.0
+"""Time after which an unheeded interruption is repeated [s]."""
 _requested = False
 _insists = False
 _waits = False

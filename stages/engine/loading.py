@@ -49,9 +49,9 @@ def load_run(path: Path | str) -> dict[str, Artifact]:
 
     Raises BadInput when there are none, or for the first that cannot be opened.
     """
-    found: dict[str, Artifact] = {name: load(folder) for name, folder in artifacts_of(Path(path)).items()}
-    started = {name: artifact.manifest.provenance.started for name, artifact in found.items() if artifact.manifest}
-    return dict(sorted(found.items(), key=lambda item: (started[item[0]], item[0])))
+    artifacts: dict[str, Artifact] = {name: load(folder) for name, folder in artifacts_of(Path(path)).items()}
+    started = {name: artifact.manifest.provenance.started for name, artifact in artifacts.items() if artifact.manifest}
+    return dict(sorted(artifacts.items(), key=lambda item: (started[item[0]], item[0])))
 
 
 @overload
@@ -72,8 +72,8 @@ def payload(artifact: Artifact, name: str) -> Any:
     path = artifact.file(name)
     for pattern, (module, reader) in READERS.items():
         if fnmatch.fnmatch(path.name, pattern):
-            read = getattr(importlib.import_module(f"scenewright.stages.kit.formats.{module}"), reader)
-            return read(path, may_be_empty=True) if reader == "read_mesh" else read(path)
+            read_file = getattr(importlib.import_module(f"scenewright.stages.kit.formats.{module}"), reader)
+            return read_file(path, may_be_empty=True) if reader == "read_mesh" else read_file(path)
     raise BadInput(f"{path}: has no reader", hint="open it yourself: .file(name) is its path")
 
 

@@ -23,8 +23,8 @@ OUT_OF_MEMORY = re.compile(
 
 def first_cause(error: OSError) -> tuple[int | None, str]:
     """Return number and words of what the system said; copying a folder gathers them as text."""
-    if error.errno is None and (found := re.search(r"\[Errno (\d+)\] ([^:\"']+)", str(error))):
-        return int(found[1]), found[2]
+    if error.errno is None and (match := re.search(r"\[Errno (\d+)\] ([^:\"']+)", str(error))):
+        return int(match[1]), match[2]
     return error.errno, error.strerror or str(error)
 
 
@@ -46,10 +46,12 @@ def _places(error: OSError) -> list[str]:
     return [os.path.abspath(os.fsdecode(name)) for name in names if "\0" not in os.fsdecode(name)]
 
 
-def _names(word: str, place: str) -> bool:
+def _names(word: str, path: str) -> bool:
     """Whether a word of the command line is this place, or a folder above or below it."""
     value = word.partition("=")[2] if word.startswith("--") and "=" in word else word
     if not value or value.startswith("-") or "\0" in value:
         return False
-    given = os.path.abspath(value)
-    return given == place or place.startswith(given.rstrip("/") + "/") or given.startswith(place.rstrip("/") + "/")
+    absolute = os.path.abspath(value)
+    return (
+        absolute == path or path.startswith(absolute.rstrip("/") + "/") or absolute.startswith(path.rstrip("/") + "/")
+    )

@@ -49,10 +49,10 @@ def makefile_for(pipeline: Pipeline) -> str:
         elif not variable.optional:
             lines.append(f"$(if $({upper}),,$(error {pipeline.name} needs {upper}=... ({variable.description})))")
     raw = dict(given_inputs(pipeline))
-    for given, what in raw.items():
-        if not what.weights:  # those may be the name of cached ones
-            reference = f"$({given.upper()})"
-            missing = f"$(error {given.upper()}={reference}: no such file or folder)"
+    for input_name, kind in raw.items():
+        if not kind.weights:  # those may be the name of cached ones
+            reference = f"$({input_name.upper()})"
+            missing = f"$(error {input_name.upper()}={reference}: no such file or folder)"
             lines.append(f"$(if {reference},$(if $(wildcard {reference}),,{missing}))")
     lines += [".PHONY: all", "all: " + " ".join(f"$(FOLDER)/{step.name}/manifest.json" for step in pipeline.step), ""]
     for step in pipeline.step:

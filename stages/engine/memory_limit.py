@@ -22,8 +22,11 @@ from types import FrameType
 from scenewright.schemas.errors import MachineFailure, UsageError
 
 SECONDS_BETWEEN_LOOKS = 0.1
+"""Time between two looks at the memory in use [s]."""
 SECONDS_BETWEEN_SIGNALS = 5.0
+"""Time between two signals to a step over the limit [s]."""
 GRACE_SECONDS = 30.0
+"""Time that a step over the limit gets to stop before it is ended [s]."""
 HINT = "use fewer frames, larger voxels or smaller images, or raise the limit"
 
 

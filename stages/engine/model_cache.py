@@ -27,6 +27,7 @@ logger = logging.getLogger("scenewright")
 
 ENVIRONMENT = "SCENEWRIGHT_MODELS"
 PREFIX_LENGTH = 16
+"""Hexadecimal digits of a sha256 in the name of a cached file."""
 CACHED_NAME = re.compile(rf"(?P<prefix>[0-9a-f]{{{PREFIX_LENGTH}}})-(?P<name>[^/]+)")
 
 
@@ -46,24 +47,26 @@ class CachedModel:
 
 def cache_folder() -> Path:
     """Return the folder; it need not exist yet."""
-    given = os.environ.get(ENVIRONMENT)
-    if given:
-        return Path(given)
+    folder = os.environ.get(ENVIRONMENT)
+    if folder:
+        return Path(folder)
     return Path(os.environ.get("XDG_CACHE_HOME") or home_folder() / ".cache") / "scenewright" / "models"
 
 
 def cached_models() -> tuple[CachedModel, ...]:
     """List the cache by name; other files in the folder are passed over."""
-    known = {model.sha256[:PREFIX_LENGTH]: model for model in known_models()}
-    found = []
+    model_of_prefix = {model.sha256[:PREFIX_LENGTH]: model for model in known_models()}
+    models = []
     folder = cache_folder()
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
         match = CACHED_NAME.fullmatch(path.name)
         if match and path.is_file():
-            found.append(
-                CachedModel(path, match["name"], match["prefix"], path.stat().st_size, known.get(match["prefix"]))
+            models.append(
+                CachedModel(
+                    path, match["name"], match["prefix"], path.stat().st_size, model_of_prefix.get(match["prefix"])
+                )
             )
-    return tuple(sorted(found, key=lambda model: (model.name, model.prefix)))
+    return tuple(sorted(models, key=lambda model: (model.name, model.prefix)))
 
 
 def add_model(path: Path) -> CachedModel:
@@ -119,8 +122,8 @@ def resolve_weights(path: Path) -> Path:
         return path
     name = str(path)
     cached = cached_models()
-    found = [model for model in cached if name in _names(model)]
-    if not found:
+    matching = [model for model in cached if name in _names(model)]
+    if not matching:
         if is_hub_id(name):
             return find_in_hub_cache(name)
         listed = next((model for model in known_models() if path.name in (model.name, model.file)), None)
@@ -128,12 +131,12 @@ def resolve_weights(path: Path) -> Path:
             hint = f"get {listed.file} from {listed.source}, then: scenewright models --add {listed.file}"
             raise MissingDependency(f"{name}: not in the cache {cache_folder()}", hint=hint)
         raise MissingDependency(f"{path}: no such weight file", hint="see: scenewright models")
-    if len(found) > 1:
-        paths = ", ".join(str(model.path) for model in found)
-        raise BadInput(f"{name}: {len(found)} cached models have this name", hint=f"give one of: {paths}")
-    if sha256_of_file(found[0].path)[:PREFIX_LENGTH] != found[0].prefix:
-        raise BadInput(f"{found[0].path}: damaged, its sha256 is another one", hint="delete it and add it again")
-    return found[0].path
+    if len(matching) > 1:
+        paths = ", ".join(str(model.path) for model in matching)
+        raise BadInput(f"{name}: {len(matching)} cached models have this name", hint=f"give one of: {paths}")
+    if sha256_of_file(matching[0].path)[:PREFIX_LENGTH] != matching[0].prefix:
+        raise BadInput(f"{matching[0].path}: damaged, its sha256 is another one", hint="delete it and add it again")
+    return matching[0].path
 
 
 def with_usual_models(reads: Mapping[str, object], parameters: object, given: Mapping[str, Path]) -> dict[str, Path]:

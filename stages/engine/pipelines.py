@@ -65,10 +65,10 @@ def pipeline_path(name_or_path: str) -> Path:
     for candidate in (Path(name_or_path), PIPELINES_FOLDER / f"{name_or_path}.toml"):
         if os.path.isfile(candidate):
             return candidate
-    known = ", ".join(sorted(p.stem for p in PIPELINES_FOLDER.glob("*.toml")))
+    names = ", ".join(sorted(p.stem for p in PIPELINES_FOLDER.glob("*.toml")))
     if os.path.exists(name_or_path):
         raise UsageError(f"{name_or_path}: not a regular file", hint="a pipeline is a TOML file")
-    raise UsageError(f"no pipeline {name_or_path!r:.200}", hint=f"give a TOML file or one of: {known}")
+    raise UsageError(f"no pipeline {name_or_path!r:.200}", hint=f"give a TOML file or one of: {names}")
 
 
 def read_pipeline(path: Path) -> Pipeline:
@@ -122,8 +122,8 @@ def resolve_variables(pipeline: Pipeline, given: Mapping[str, str]) -> dict[str,
     """Fill in defaults. Raises UsageError for unknown or missing variables."""
     unknown = sorted(set(given) - set(pipeline.variables))
     if unknown:
-        known = ", ".join(pipeline.variables) or "none"
-        raise UsageError(f"pipeline {pipeline.name} has no variable {unknown[0]!r}", hint=f"it has: {known}")
+        variables = ", ".join(pipeline.variables) or "none"
+        raise UsageError(f"pipeline {pipeline.name} has no variable {unknown[0]!r}", hint=f"it has: {variables}")
     values: dict[str, str | None] = {}
     for name, variable in pipeline.variables.items():
         value = given.get(name) or variable.default

@@ -36,16 +36,16 @@ def read_manifest(root: Path) -> Manifest:
 def input_place(root: Path, path: str) -> Path:
     """Return where an input stood that the manifest at `root` names. Raises BadInput for what can be no place."""
     try:
-        place = (root / path).resolve()
-        os.stat(place)
+        resolved = (root / path).resolve()
+        os.stat(resolved)
     except (FileNotFoundError, NotADirectoryError):
         pass  # no longer there, which is no fault
     except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, a loop of links
         reason = getattr(error, "strerror", None) or "a loop of links"
         raise BadInput(f"{root}: input {path!r:.80}: {reason}", hint="make the artifact again") from None
-    if place == Path(root).resolve():
+    if resolved == Path(root).resolve():
         raise BadInput(f"{root}: names itself as its input", hint="make the artifact again")
-    return place
+    return resolved
 
 
 def check_version(root: Path, manifest: Manifest) -> type[Artifact]:
@@ -112,8 +112,8 @@ def open_artifact(root: Path, expected: type[Artifact] | None = None) -> Artifac
     """
     root = Path(root)
     manifest = read_manifest(root)
-    known = KINDS.get(manifest.kind)
-    if expected is not None and known is not None and not issubclass(known, expected):
+    kind_class = KINDS.get(manifest.kind)
+    if expected is not None and kind_class is not None and not issubclass(kind_class, expected):
         raise BadInput(
             f"{root}: holds a {manifest.kind!r} artifact, {expected.kind!r} is needed", hint="give another folder"
         )

@@ -20,11 +20,11 @@ def artifacts_of(run: Path) -> dict[str, Path]:
     """Return name -> folder of the artifacts directly in a run folder, by name. Raises BadInput when there are none."""
     if not os.path.isdir(run):
         raise BadInput(f"{run}: no such run folder", hint="give the --out of `scenewright run`")
-    found = {
+    folders = {
         entry.name: entry
         for entry in sorted(run.iterdir())
         if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith(".") and is_artifact(entry)
     }
-    if not found:
+    if not folders:
         raise BadInput(f"{run}: holds no artifacts", hint="give the --out of `scenewright run`, or an artifact folder")
-    return found
+    return folders

@@ -19,6 +19,7 @@ from scenewright.stages.engine.reading import check_hashes, check_sizes, read_ma
 from scenewright.stages.kit.stage import Stage
 
 KEY_LENGTH = 16
+"""Hexadecimal digits of a key in the name of a shared artifact."""
 KEPT = 4
 """Entries of a step in a shared folder; the oldest go."""
 
@@ -53,9 +54,9 @@ def keep(folder: Path, stage: Stage, key: str, made: Path) -> None:
         with store.locked(entry), store.partial_folder(entry) as partial:
             shutil.copytree(made, partial, dirs_exist_ok=True, copy_function=_link)
             store.take_place(partial, entry)
-        kept = sorted(folder.glob(f"{_prefix(stage)}*"), key=lambda path: path.stat().st_mtime_ns)
-        for old in kept[:-KEPT]:
-            shutil.rmtree(old, ignore_errors=True)
+        shared = sorted(folder.glob(f"{_prefix(stage)}*"), key=lambda path: path.stat().st_mtime_ns)
+        for oldest in shared[:-KEPT]:
+            shutil.rmtree(oldest, ignore_errors=True)
     except (MachineFailure, OSError):
         return
 

@@ -26,9 +26,11 @@ from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
 from scenewright.schemas.outside import file_content, json_of
 
 LARGEST_JOURNAL = 2**20
-"""Bytes."""
+"""Largest journal [bytes]."""
 AT_FDCWD = -100
+"""Linux: paths are relative to the working directory (fcntl.h)."""
 RENAME_EXCHANGE = 2
+"""Linux: flag of renameat2 that lets two names change places (fs.h)."""
 TIMINGS_NAME = "timings.json"
 """The runner writes it into every artifact."""
 MOST_BY_ONE = 50
@@ -94,19 +96,19 @@ def exchange(first: Path, second: Path) -> bool:
     raise OSError(code, os.strerror(code), str(second))
 
 
-def _journalled_replace(partial: Path, target: Path) -> None:
-    journal, old = _beside(target, "journal"), _beside(target, f"old-{secrets.token_hex(4)}")
-    text = json.dumps({"partial": partial.name, "old": old.name})
+def _replace_by_journal(partial: Path, target: Path) -> None:
+    journal, aside = _beside(target, "journal"), _beside(target, f"old-{secrets.token_hex(4)}")
+    text = json.dumps({"partial": partial.name, "old": aside.name})
     with journal.open("w") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
     sync_folder(target.parent)
-    os.rename(target, old)
+    os.rename(target, aside)
     os.rename(partial, target)
     sync_folder(target.parent)
     journal.unlink()
-    shutil.rmtree(old, ignore_errors=True)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def recover(target: Path) -> None:
@@ -119,15 +121,15 @@ def recover(target: Path) -> None:
         plan = json_of(text, str(journal))
         if not all(_ours(target).fullmatch(plan[role]) for role in ("partial", "old")):
             raise ValueError("names what is not ours")
-        partial, old = (target.with_name(plan[role]) for role in ("partial", "old"))
+        partial, aside = (target.with_name(plan[role]) for role in ("partial", "old"))
     except (BadInput, ValueError, TypeError, KeyError):
         journal.unlink()  # killed while writing it: nothing had been renamed yet
         return
     if not target.exists():
         if (partial / MANIFEST_NAME).exists():
             os.rename(partial, target)
-        elif old.exists():
-            os.rename(old, target)
+        elif aside.exists():
+            os.rename(aside, target)
     sync_folder(target.parent)
     journal.unlink()
 
@@ -178,11 +180,11 @@ def check_target(target: Path, kind: str) -> None:
         raise UsageError(f"{target}: a file stands there", hint="choose another --out")
     manifest = target / MANIFEST_NAME
     if manifest.exists():
-        found = _kind_on_disk(manifest)
-        if found is None and not (target / TIMINGS_NAME).exists():
+        kind_there = _kind_on_disk(manifest)
+        if kind_there is None and not (target / TIMINGS_NAME).exists():
             raise UsageError(f"{target}: its {MANIFEST_NAME} is not one that a step wrote", hint="choose another --out")
-        if found not in (None, kind):
-            raise UsageError(f"{target}: holds a {found!r} artifact, not {kind!r}", hint="choose another --out")
+        if kind_there not in (None, kind):
+            raise UsageError(f"{target}: holds a {kind_there!r} artifact, not {kind!r}", hint="choose another --out")
     elif any(target.iterdir()):
         raise UsageError(f"{target}: holds files that no step wrote", hint="choose another --out; nothing was changed")
 
@@ -234,7 +236,7 @@ def take_place(partial: Path, target: Path) -> None:
     if not target.exists():
         os.rename(partial, target)
     elif not exchange(partial, target):
-        _journalled_replace(partial, target)
+        _replace_by_journal(partial, target)
     sync_folder(target.parent)
 
 

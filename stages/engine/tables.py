@@ -41,15 +41,15 @@ def as_tables(artifact: Artifact) -> dict[str, pandas.DataFrame]:
         once = _row(content, "", rows, {}, key=None)
         if once:
             rows[attribute] = [once]
-        for name, found in rows.items():
-            tables[name if name not in tables else f"{attribute}.{name}"] = pandas.DataFrame(_of_one_shape(found))
+        for name, table_rows in rows.items():
+            tables[name if name not in tables else f"{attribute}.{name}"] = pandas.DataFrame(_of_one_shape(table_rows))
     return tables
 
 
 def documents_of(kind: type[Artifact]) -> list[str]:
     """Return the attributes of a kind that are documents, `info` first."""
-    found = {name for base in kind.__mro__ for name, value in vars(base).items() if isinstance(value, Document)}
-    return sorted(found, key=lambda name: (name != "info", name))
+    names = {name for base in kind.__mro__ for name, value in vars(base).items() if isinstance(value, Document)}
+    return sorted(names, key=lambda name: (name != "info", name))
 
 
 def _row(model: Model, table: str, rows: dict[str, list[Row]], above: Row, key: str | None) -> Row:
@@ -73,13 +73,15 @@ def _row(model: Model, table: str, rows: dict[str, list[Row]], above: Row, key: 
         else:
             row[name] = value
     first = next(iter(row), None) if key is not None else None
-    told: Row = {} if first is None else {first if "." in first else f"{key}.{first}": row[first]}
+    labels: Row = {} if first is None else {first if "." in first else f"{key}.{first}": row[first]}
     for name, value in lists.items():
-        own = _below(table, name)
-        found = rows.setdefault(own, [])
+        own_table = _below(table, name)
+        own_rows = rows.setdefault(own_table, [])
         pairs = value.items() if isinstance(value, Mapping) else ((None, record) for record in value)
         for word, record in pairs:
-            found.append(_row(record, own, rows, told if word is None else {**told, "name": word}, key=own))
+            own_rows.append(
+                _row(record, own_table, rows, labels if word is None else {**labels, "name": word}, key=own_table)
+            )
     return row
 
 

@@ -102,7 +102,7 @@ def verify(root: Path, seen: dict[Path, Finding] | None = None) -> list[Finding]
 
     def enter(place: Path) -> None:
         reached.append(place)
-        visit = _opened(place)
+        visit = _open_visit(place)
         if isinstance(visit, Finding):
             seen[place] = visit
         else:
@@ -123,7 +123,7 @@ def verify(root: Path, seen: dict[Path, Finding] | None = None) -> list[Finding]
             continue
         record = visit.manifest.inputs[visit.followed]
         visit.followed += 1
-        place = _checked_input(visit, record, digests)
+        place = _check_input(visit, record, digests)
         if place in path:
             visit.problems.append(f"input {record.role}: leads back to {place}, which was made from this one")
         elif place is not None and place not in seen:
@@ -131,7 +131,7 @@ def verify(root: Path, seen: dict[Path, Finding] | None = None) -> list[Finding]
     return [seen[place] for place in reached]
 
 
-def _opened(root: Path) -> _Visit | Finding:
+def _open_visit(root: Path) -> _Visit | Finding:
     """Return an artifact with what is wrong with itself, or the verdict on what cannot be read."""
     try:
         manifest = read_manifest(root)
@@ -164,7 +164,7 @@ def _notes_on_code(manifest: Manifest) -> list[str]:
     return notes
 
 
-def _checked_input(visit: _Visit, record: InputRecord, digests: _Digests) -> Path | None:
+def _check_input(visit: _Visit, record: InputRecord, digests: _Digests) -> Path | None:
     """Compare an input with its record; return the artifact that it is, or lies in, or None."""
     try:
         source = input_place(visit.root, record.path)

@@ -62,8 +62,8 @@ def joined(ids: np.ndarray, segments: tuple[FrameSegment, ...], where: str) -> F
 
     What has no label is void: COCO has no place for it. Raises BadInput for an id that is not listed.
     """
-    found = np.unique(ids)
-    table = np.zeros(int(found[-1]) + 1, dtype=np.int32)
+    present_ids = np.unique(ids)
+    table = np.zeros(int(present_ids[-1]) + 1, dtype=np.int32)
     listed = np.zeros(len(table), dtype=bool)
     listed[0] = True
     groups: dict[tuple[int, int], int] = {}
@@ -78,7 +78,7 @@ def joined(ids: np.ndarray, segments: tuple[FrameSegment, ...], where: str) -> F
         table[segment.id] = group
         best = max(segment.score, masks[group].score if group in masks else 0.0)
         masks[group] = ExportMask(segment.class_id, segment.is_thing, best)
-    unknown = found[~listed[found]]
+    unknown = present_ids[~listed[present_ids]]
     if len(unknown):
         raise BadInput(f"{where}: id {unknown[0]} is not in segments.json", hint="run `scenewright segment` again")
     return FrameMasks(table[ids], masks)

@@ -53,8 +53,8 @@ def check(parameters: ExportParameters, inputs: Any) -> None:
     unknown = sorted(set(parameters.streams) - set(STREAMS))
     if unknown:
         raise UsageError(f"export: --streams: no stream {unknown[0]!r}", hint=f"streams are {', '.join(STREAMS)}")
-    own = dialects([parameters.layout])
-    if parameters.dialect not in (own or dialects()[:1]):
+    own_dialects = dialects([parameters.layout])
+    if parameters.dialect not in (own_dialects or dialects()[:1]):
         meant = next(declared.layout for declared in all_formats() if declared.dialect == parameters.dialect)
         raise UsageError(
             f"export: --dialect {parameters.dialect} is about {meant.upper()}, not about {parameters.layout}",

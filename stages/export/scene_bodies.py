@@ -62,8 +62,8 @@ class SceneToExport:
             if record.name not in links:
                 raise BadInput(f"{self.written.root}: no link {record.name!r} in scene.urdf", hint="run `urdf` again")
             joints = tuple(_below(record.name, inner))
-            own = (links[record.name], *(links[joint.child] for joint in joints))
-            bodies.append(BodyToExport(record, own, joints))
+            links_of_body = (links[record.name], *(links[joint.child] for joint in joints))
+            bodies.append(BodyToExport(record, links_of_body, joints))
         return tuple(bodies)
 
     def pose(self, link: Link) -> np.ndarray:

@@ -122,6 +122,6 @@ def _result(tally: Tally, frames_in_sequence: int, target_format: SequenceFormat
     if tally.depth_pixels_zeroed:
         summary["depth_pixels_zeroed"] = tally.depth_pixels_zeroed
     if not tally.frames:
-        left = ", ".join(f"{reason} {count}" for reason, count in tally.left_out.most_common())
-        summary["reason"] = f"no frame could be written: {left or 'the sequence has none'}"
+        reasons = ", ".join(f"{reason} {count}" for reason, count in tally.left_out.most_common())
+        summary["reason"] = f"no frame could be written: {reasons or 'the sequence has none'}"
     return ExportedSequence(context.output, outcome="ok" if tally.frames else "empty", summary=summary)

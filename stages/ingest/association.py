@@ -24,11 +24,11 @@ def partners(first: np.ndarray, second: np.ndarray, maximum_difference: int) -> 
     """Return what `mutual_nearest` does for sorted stamps that may repeat: a repeated stamp in `first` gets no partner,
     as the image before it has it already, and of a repeated stamp in `second` the first counts."""
     first, second = np.asarray(first, dtype=np.int64), np.asarray(second, dtype=np.int64)
-    found = np.full(len(first), -1)
+    partner_of = np.full(len(first), -1)
     fresh_first, fresh_second = fresh(first), np.flatnonzero(fresh(second))
     nearest = mutual_nearest(first[fresh_first], second[fresh_second], maximum_difference)
-    found[fresh_first] = np.where(nearest >= 0, fresh_second[nearest] if len(fresh_second) else -1, -1)
-    return found
+    partner_of[fresh_first] = np.where(nearest >= 0, fresh_second[nearest] if len(fresh_second) else -1, -1)
+    return partner_of
 
 
 def fresh(stamps: np.ndarray) -> np.ndarray:

@@ -26,8 +26,8 @@ def registered_loader(
         if color is None:
             raise Unusable("undecodable_color")
         depth = millimetres_to_depth(frame.depth)
-        seen = color_in_depth_camera(color, depth, depth_camera, color_camera, color_from_depth)
-        return replace(frame, color=seen)
+        registered_color = color_in_depth_camera(color, depth, depth_camera, color_camera, color_from_depth)
+        return replace(frame, color=registered_color)
 
     return registered
 

@@ -34,8 +34,8 @@ def registered_depth(
     target = np.array([target_camera.fx, target_camera.fy, target_camera.cx, target_camera.cy])
     inverse_depth = np.zeros((target_camera.height, target_camera.width), np.float64)
     _draw(depth.astype(np.float64), intrinsics, target, np.asarray(target_from_depth, np.float64), inverse_depth)
-    seen = np.divide(1.0, inverse_depth, out=np.zeros_like(inverse_depth), where=inverse_depth > 0)
-    return depth_to_millimetres(seen)
+    depth_in_color = np.divide(1.0, inverse_depth, out=np.zeros_like(inverse_depth), where=inverse_depth > 0)
+    return depth_to_millimetres(depth_in_color)
 
 
 @njit(cache=True)
@@ -50,7 +50,7 @@ def _draw(
     for row in range(height):
         for column in range(width):
             if depth[row, column] > 0:
-                u[row, column], v[row, column], w[row, column] = _carried(
+                u[row, column], v[row, column], w[row, column] = _reproject(
                     column, row, depth[row, column], intrinsics, target, motion
                 )
     spans = _cells_on_one_surface(depth, w)
@@ -91,7 +91,7 @@ def _draw(
 
 
 @njit(cache=True)
-def _carried(
+def _reproject(
     column: float, row: float, z: float, intrinsics: np.ndarray, target: np.ndarray, motion: np.ndarray
 ) -> tuple[float, float, float]:
     """Return pixel and inverse depth [1/m] in the other camera; inverse depth 0 when the point is not before it."""
@@ -122,11 +122,11 @@ def _cells_on_one_surface(depth: np.ndarray, w: np.ndarray) -> np.ndarray:
             if column + 1 < width:
                 before = inverse[row, column - 1] if column > 0 else 0.0
                 after = inverse[row, column + 2] if column + 2 < width else 0.0
-                right[row, column] = _joined(before, inverse[row, column], inverse[row, column + 1], after)
+                right[row, column] = _is_one_surface(before, inverse[row, column], inverse[row, column + 1], after)
             if row + 1 < height:
                 before = inverse[row - 1, column] if row > 0 else 0.0
                 after = inverse[row + 2, column] if row + 2 < height else 0.0
-                down[row, column] = _joined(before, inverse[row, column], inverse[row + 1, column], after)
+                down[row, column] = _is_one_surface(before, inverse[row, column], inverse[row + 1, column], after)
     spans = np.zeros((height + 1, width + 1), np.bool_)
     for row in range(height - 1):
         for column in range(width - 1):
@@ -137,7 +137,7 @@ def _cells_on_one_surface(depth: np.ndarray, w: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _joined(before: float, first: float, second: float, after: float) -> bool:
+def _is_one_surface(before: float, first: float, second: float, after: float) -> bool:
     """Whether of four inverse depths in a row (0: invalid) the middle two lie on one surface: near to each other, or
     on a line with a third."""
     if not (first > 0 and second > 0):
@@ -190,7 +190,7 @@ def _draw_square(
     w = np.empty(4)
     for corner in range(4):
         right, down = corner % 2 - 0.5, corner // 2 - 0.5
-        u[corner], v[corner], w[corner] = _carried(column + right, row + down, z, intrinsics, target, motion)
+        u[corner], v[corner], w[corner] = _reproject(column + right, row + down, z, intrinsics, target, motion)
         if not w[corner] > 0:
             return
     _draw_triangle(u[0], v[0], w[0], u[1], v[1], w[1], u[2], v[2], w[2], buffer)

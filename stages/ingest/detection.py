@@ -38,9 +38,9 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
         if rule is not None:
             return reader.open_source(path, parameters, rule)
     names = ", ".join(layout.name for layout in layouts)
-    what = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
+    kind = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
     raise BadInput(
-        f"{path}: is not a log in a format that is known ({names}); it is {what}",
+        f"{path}: is not a log in a format that is known ({names}); it is {kind}",
         hint="docs/LOGS.md describes the layouts",
     )
 

@@ -10,6 +10,7 @@ from scenewright.stages.kit.formats.foxglove import JPEG_START, PNG_START, decod
 from scenewright.stages.kit.formats.image_headers import may_be_decoded
 
 INVALID_DEPTH = 65535
+"""16-bit depth that some cameras write for "nothing measured" [stored units]."""
 
 
 def usable_color(data: bytes, camera: Camera) -> np.ndarray | bytes:

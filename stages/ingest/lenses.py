@@ -27,6 +27,7 @@ OPENCV_MODELS = (
 )
 """Names under which logs mean OpenCV's radial, tangential and thin prism coefficients, in OpenCV's order."""
 OPENCV_COUNTS = (4, 5, 8, 12, 14)
+"""Numbers of distortion coefficients that OpenCV's models have."""
 FISHEYE_MODELS = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4")
 SAME_RAY = 0.5
 """Pixels by which two cameras may differ anywhere in the image and still count as one."""
@@ -86,8 +87,8 @@ def lens_of(record: CalibrationRecord, size: tuple[int, int], rectified: bool, w
     matrix, notes = scaled_matrix(record, _projection(record) if rectified else record.K, size, where, what)
     camera = _camera(matrix, size if size != (0, 0) else (record.width, record.height), where)
     if rectified:
-        named = "P" if has_projection(record) else "K"
-        return Lens(camera, size, notes=(*notes, f"{what} are rectified: intrinsics are those of {named}"))
+        matrix_name = "P" if has_projection(record) else "K"
+        return Lens(camera, size, notes=(*notes, f"{what} are rectified: intrinsics are those of {matrix_name}"))
     maps = undistortion(record, matrix, None, camera, where)
     if maps is not None:
         notes = (*notes, f"lens distortion ({record.distortion_model}) undone")
@@ -116,10 +117,10 @@ def turned_lens(
             return Lens(camera, size, None, None, notes)
         maps = _maps(matrix, np.zeros(5), camera_from_frame, camera)
     else:
-        found = undistortion(record, matrix, camera_from_frame, camera, where)
-        if found is None:
+        undistorted = undistortion(record, matrix, camera_from_frame, camera, where)
+        if undistorted is None:
             return Lens(camera, size, None, None, notes)
-        maps = found
+        maps = undistorted
     return Lens(camera, size, maps, turned, notes)
 
 
@@ -181,8 +182,10 @@ def undistortion(
     model = record.distortion_model.lower().replace(" ", "_").replace("-", "_")
     fisheye = model in FISHEYE_MODELS
     straight = not np.abs(coefficients).max(initial=0) > 1e-9
-    known = (model in OPENCV_MODELS and len(coefficients) in OPENCV_COUNTS) or (fisheye and len(coefficients) == 4)
-    if not known and (fisheye or not straight):
+    is_known_model = (model in OPENCV_MODELS and len(coefficients) in OPENCV_COUNTS) or (
+        fisheye and len(coefficients) == 4
+    )
+    if not is_known_model and (fisheye or not straight):
         raise BadInput(
             f"{where}: distortion model {record.distortion_model!r:.40} with {len(coefficients)} coefficients is not "
             "supported",

@@ -15,13 +15,15 @@ from scipy.spatial.transform import Rotation
 __all__ = ["CONVENTION_WORDS", "POSE_CONVENTIONS", "PoseConvention", "converted"]
 
 OPENGL_AXES = np.diag([1.0, -1.0, -1.0, 1.0])
-"""opencv_camera_from_opengl_camera, and back."""
+"""Turns the camera axes of OpenCV into those of OpenGL, and back."""
 BODY_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """REP-103: x forward, y left, z up of a body whose camera looks along x."""
 MIRROR_Y = np.diag([1.0, -1.0, 1.0, 1.0])
+"""Mirrors y, which makes left-handed poses right-handed."""
 W_FIRST = (1, 2, 3, 0)
 """A reader of x y z w was given w x y z: what it calls y is x, z is y, w is z, and x is w."""
 W_LAST = (3, 0, 1, 2)
+"""A reader of w x y z was given x y z w: what it calls w is x, x is y, y is z, and z is w."""
 
 
 def converted(poses: np.ndarray, name: PoseConvention, translation_scale: float = 1.0) -> np.ndarray:

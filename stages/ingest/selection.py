@@ -27,7 +27,7 @@ def select(
     A frame without a pose is left out only when other frames of the log have one. Selection by number counts the
     frames of every camera for itself, so that cameras which were triggered together stay together.
     """
-    kept: list[Entry] = []
+    selected: list[Entry] = []
     drops: Counter[str] = Counter()
     last_times: dict[str, int] = {}
     counts: Counter[str] = Counter()
@@ -50,8 +50,8 @@ def select(
             drops[problem] += 1
             continue
         last_times[entry.camera_name] = time
-        kept.append(replace(entry, world_from_camera=pose))
-    return kept, drops
+        selected.append(replace(entry, world_from_camera=pose))
+    return selected, drops
 
 
 def checked_pose(matrix: np.ndarray | None, needed: bool) -> tuple[np.ndarray | None, str | None]:
@@ -66,9 +66,9 @@ def checked_pose(matrix: np.ndarray | None, needed: bool) -> tuple[np.ndarray | 
         return None, "non_rigid_pose"
     if is_rigid(matrix, 1e-9):
         return matrix, None
-    left, _, right = np.linalg.svd(matrix[:3, :3])
+    u, _, right = np.linalg.svd(matrix[:3, :3])
     pose = matrix.copy()
-    pose[:3, :3] = left @ right
+    pose[:3, :3] = u @ right
     return pose, None
 
 

@@ -27,7 +27,9 @@ from scenewright.stages.kit.stage import Context
 GRAVITY_FRAMES = 60
 """Frames whose depth is looked at to find the floor."""
 PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
+"""Median depth [m] outside of which the depth unit is doubted; by eye."""
 LARGE_STEP = 1.0
+"""Step of the camera between two frames [m] that is reported; by eye."""
 LIT_EVERY, DARK = 10, 8.0
 """Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
 StreamName = Literal["color", "depth", "right", "labels", "pose"]
@@ -77,8 +79,8 @@ class _Written:
 
 def check_cameras(source: LogSource, log: Path) -> None:
     """Refuse intrinsics of no camera: they would only show up as a room of nonsense. Raises BadInput."""
-    for known in source.cameras:
-        camera = known.camera
+    for source_camera in source.cameras:
+        camera = source_camera.camera
         if camera.width == 0:
             continue  # no image could be decoded, so there will be no frame either
         for name, focal, center, size in (
@@ -97,7 +99,7 @@ def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestPar
     posed = [entry for entry in entries if entry.world_from_camera is not None]
     chosen = [posed[i] for i in np.unique(np.linspace(0, len(posed) - 1, min(len(posed), GRAVITY_FRAMES)).astype(int))]
     poses = np.array([entry.world_from_camera for entry in posed]).reshape(-1, 4, 4)
-    cameras = {known.name: known.camera for known in source.cameras}
+    cameras = {each.name: each.camera for each in source.cameras}
 
     def cloud() -> tuple[np.ndarray, np.ndarray]:
         samples = [(np.zeros((0, 3)), np.zeros((0, 3)))]
@@ -137,10 +139,10 @@ def _write_frames(
             source.camera,
             labels=source.has_labels,
             world_up="unknown" if gravity.method == "none" else "z",
-            registered=all(known.registered for known in source.cameras),
+            registered=all(each.registered for each in source.cameras),
             label_table=source.label_table,
-            cameras={known.name: known.camera for known in source.cameras},
-            baselines={known.name: known.baseline for known in source.cameras if known.baseline is not None},
+            cameras={each.name: each.camera for each in source.cameras},
+            baselines={each.name: each.baseline for each in source.cameras if each.baseline is not None},
         ) as writer,
         ThreadPoolExecutor(1, thread_name_prefix="write") as thread,
     ):
@@ -232,9 +234,9 @@ def _finish(
         camera=source.camera,
         cameras=tuple(
             SequenceCamera(
-                name=known.name, camera=known.camera, baseline=known.baseline, frame_count=counts[known.name]
+                name=entry.name, camera=entry.camera, baseline=entry.baseline, frame_count=counts[entry.name]
             )
-            for known in source.cameras
+            for entry in source.cameras
         ),
         streams=tuple(stream for stream in get_args(StreamName) if stream in written.streams),
         frame_count=len(written.times),
@@ -244,7 +246,7 @@ def _finish(
         other_cameras=source.other_cameras,
         gravity=gravity,
         label_table=source.label_table,
-        color_depth_registered=all(known.registered for known in source.cameras),
+        color_depth_registered=all(entry.registered for entry in source.cameras),
         start_time=written.times[0] if written.times else 0.0,
         end_time=written.times[-1] if written.times else 0.0,
     ).write(context.output / "sequence.json")

@@ -98,8 +98,10 @@ def _from_transform(
             calibrations, sizes, rectified, (turn, right_turn), names, strict=True
         )
     ]
-    left = replace(lenses[0], notes=(*lenses[0].notes, "stereo pair rectified by the transforms between its frames"))
-    return left, lenses[1], baseline
+    rectified_left = replace(
+        lenses[0], notes=(*lenses[0].notes, "stereo pair rectified by the transforms between its frames")
+    )
+    return rectified_left, lenses[1], baseline
 
 
 def rectifying_rotation(left_from_right: np.ndarray) -> np.ndarray:

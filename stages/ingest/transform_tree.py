@@ -29,8 +29,8 @@ class Track:
         self.count += 1
         self._sorted = None
         values = array("d", np.asarray(parent_from_child, dtype=np.float64)[:3].tobytes())
-        kept = len(self._stamps)
-        if kept >= 2 and values == self._values[-12:] == self._values[-24:-12]:
+        count = len(self._stamps)
+        if count >= 2 and values == self._values[-12:] == self._values[-24:-12]:
             before, last = self._stamps[-2], self._stamps[-1]
             if before < last < stamp and stamp - before <= SAME:
                 self._stamps[-1] = stamp
@@ -141,13 +141,13 @@ class TransformTree:
         return self._preferred is not None and parent is not None and self._leads_to(parent, self._preferred)
 
     def _leads_to(self, frame: str, target: str) -> bool:
-        seen, open_frames = {frame}, [frame]
+        visited, open_frames = {frame}, [frame]
         while open_frames:
             current = open_frames.pop()
             if current == target:
                 return True
-            above = [parent for parent in self.parents(current) if parent not in seen]
-            seen.update(above)
+            above = [parent for parent in self.parents(current) if parent not in visited]
+            visited.update(above)
             open_frames.extend(above)
         return False
 

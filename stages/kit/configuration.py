@@ -12,7 +12,7 @@ from scenewright.schemas.outside import file_toml
 from scenewright.stages.kit.stage import NOT_SHOWN, Parameters, Stage
 
 LARGEST_TOML = 16 * 2**20
-"""Bytes."""
+"""Largest configuration file [bytes]."""
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -32,8 +32,8 @@ def parameters_for(
     values = dict(config or {})
     unknown = sorted(set(values) - set(stage.parameters.model_fields))
     if unknown:
-        known = ", ".join(stage.parameters.model_fields)
-        raise UsageError(f"{config_name}: step {stage.name!r} has no parameter {unknown[0]!r}", hint=f"it has: {known}")
+        names = ", ".join(stage.parameters.model_fields)
+        raise UsageError(f"{config_name}: step {stage.name!r} has no parameter {unknown[0]!r}", hint=f"it has: {names}")
     values.update({name: value for name, value in flags.items() if value is not None})
     try:
         return stage.parameters(**values)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 MEGABYTE, MEBIBYTE = 1e6, 2**20
+"""Bytes a megabyte and a mebibyte."""
 LOG_MEGABYTES_PER_MEGAPIXEL = 0.87
 """JPEG colour and zstd-packed 16-bit depth, as frames are stored; 0.84 to 0.88 on generated logs."""
 USUAL_FRAME = 0.3072
@@ -73,9 +74,9 @@ def grows_with(
     """Return the formula of a step whose output and memory grow with one of its inputs."""
 
     def formula(parameters: Any, inputs: Inputs) -> Estimate:
-        held = inputs[role].megabytes if role in inputs else 0.0
-        expected = megabytes + per_megabyte * held
-        return Estimate(expected, 0.02 * expected, mebibytes + mebibytes_per_megabyte * held)
+        input_megabytes = inputs[role].megabytes if role in inputs else 0.0
+        expected = megabytes + per_megabyte * input_megabytes
+        return Estimate(expected, 0.02 * expected, mebibytes + mebibytes_per_megabyte * input_megabytes)
 
     return formula
 

@@ -30,13 +30,13 @@ LABEL_TABLES = tuple(LABEL_FILES.values())
 OWN = "scenewright"
 """The label set that is the vocabulary itself."""
 MATCHED = (OWN, "coco-panoptic", "ade20k", "words")
-"""Where the labels of a network are sought."""
+"""Label tables in which the labels of a network are sought."""
 VOCABULARIES = ("coco", "nyu40", "scannet", "ade20k")
 ANYTHING = "object"
 LARGEST_FILE = 2**20
-"""Bytes of a label file."""
+"""Largest label file [bytes]."""
 LONGEST_WORD = 100
-"""Characters."""
+"""Longest word [characters]."""
 
 
 class Label(Model):
@@ -108,8 +108,8 @@ def load_label_set(name: str) -> LabelSet:
     if name == OWN:
         return _own_labels(load_vocabulary())
     if name == "coco-80":
-        things = [label for label in load_label_set("coco-panoptic").labels if label.kind == "thing"]
-        return LabelSet(name, tuple(things))
+        thing_labels = [label for label in load_label_set("coco-panoptic").labels if label.kind == "thing"]
+        return LabelSet(name, tuple(thing_labels))
     if name not in LABEL_FILES:
         names = ", ".join((*LABEL_FILES, "coco-80", OWN))
         raise BadInput(f"no label set {name!r}", hint=f"label sets: {names}")
@@ -164,12 +164,12 @@ def parse_words(words: Iterable[str], where: str) -> tuple[Label, ...]:
     """
     labels = []
     for line in words:
-        word, given, class_name = (part.strip() for part in line.split("#")[0].partition("="))
+        word, is_assigned, class_name = (part.strip() for part in line.split("#")[0].partition("="))
         if not word:
             continue
         if len(word) > LONGEST_WORD:
             raise BadInput(f"{where}: a word of {len(word)} letters", hint=f"at most {LONGEST_WORD}")
-        labels.append(Label(name=word, class_name=class_name if given else class_of_word(word)))
+        labels.append(Label(name=word, class_name=class_name if is_assigned else class_of_word(word)))
     if not labels:
         raise BadInput(f"{where}: no words", hint='for example --words "cup, table, kettle"')
     _check(tuple(labels), where)
@@ -197,9 +197,9 @@ def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, whe
     matched = {number: label for number, name in real.items() if (label := best.find(name)) is not None}
     unknown = tuple(sorted({name for name in real.values() if best.find(name) is None}))
     if not matched:
-        shown = ", ".join(list(real.values())[:5])
+        examples = ", ".join(list(real.values())[:5])
         raise BadInput(
-            f"{where}: its labels ({shown}, ...) are in no table", hint="give a table of them: --labels FILE.toml"
+            f"{where}: its labels ({examples}, ...) are in no table", hint="give a table of them: --labels FILE.toml"
         )
     return LabelMap(best.name, matched, unknown)
 

@@ -79,28 +79,33 @@ def run(
     """
     _check_options(models, parameters)
     decompose = uses_coacd(parameters)
-    said = read_mapping(mapping) if mapping is not None else Mapping()
-    taken, records, seed = _kept_models(library, context)
+    mapping_file = read_mapping(mapping) if mapping is not None else Mapping()
+    all_models, records, seed = _copy_models(library, context)
     uses = {} if library is None else {entry.model: entry for entry in library.info.affordances}
-    names = {model.id.lower(): 1 for model in taken}
+    names = {model.id.lower(): 1 for model in all_models}
     folder = SourceFolder(models)
     imported = 0
     for source in context.progress.track(find_models(folder), description="importing models"):
         if isinstance(source, Unread):
-            records.append(_left_out(source.source, source.source, "", (source.reason.replace(f"{folder.root}/", ""),)))
+            records.append(
+                _record_of_left_out(source.source, source.source, "", (source.reason.replace(f"{folder.root}/", ""),))
+            )
             continue
         source = replace(source, name=plain_text(source.name), source=plain_text(source.source))
         try:
             with told_refusals(source.name):
-                record, result = _import(source, Said(said.entry(source), parameters), names, decompose)
+                record, result = _import(source, Said(mapping_file.entry(source), parameters), names, decompose)
         except BadInput as error:
             reason = str(error).replace(f"{folder.root}/", "")
-            record, result = _left_out(source.name, source.source, source.format, (reason, *source.findings)), None
+            record, result = (
+                _record_of_left_out(source.name, source.source, source.format, (reason, *source.findings)),
+                None,
+            )
         records.append(record)
         if result is not None:
             names.setdefault(result.model.id.lower(), 1)
             write_model_folder(context.output / "models" / result.model.id, result.model, result.parts)
-            taken.append(result.model)
+            all_models.append(result.model)
             uses[result.model.id] = result.affordances
             imported += 1
     for line in table_lines(records):
@@ -108,16 +113,18 @@ def run(
     if imported == 0:
         why = _why(records[-1]) if records else "it holds no model files"
         raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md; --class-name, --mapping")
-    known = tuple(uses[model.id] for model in taken if model.id in uses)
-    LibraryFile(seed=seed, models=tuple(taken), affordances=known).write(context.output / "library.json")
+    affordance_files = tuple(uses[model.id] for model in all_models if model.id in uses)
+    LibraryFile(seed=seed, models=tuple(all_models), affordances=affordance_files).write(
+        context.output / "library.json"
+    )
     ImportFile(models=tuple(records)).write(context.output / IMPORTS_FILE)
     summary = {
-        "models": len(taken),
+        "models": len(all_models),
         "imported": imported,
         "left_out": sum(not record.id for record in records),
-        "classes": len({model.class_name for model in taken}),
-        "articulated": sum(model.articulated for model in taken),
-        "joints": sum(len(model.joints) for model in taken),
+        "classes": len({model.class_name for model in all_models}),
+        "articulated": sum(model.articulated for model in all_models),
+        "joints": sum(len(model.joints) for model in all_models),
     }
     return CadLibrary(context.output, summary=summary)
 
@@ -136,7 +143,7 @@ def _check_options(models: Path, parameters: AdditionParameters) -> None:
         raise UsageError(f"no class {parameters.class_name!r}", hint=f"one of: {', '.join(names)}")
 
 
-def _kept_models(library: CadLibrary | None, context: Context) -> tuple[list[CadModel], list[ImportedModel], int]:
+def _copy_models(library: CadLibrary | None, context: Context) -> tuple[list[CadModel], list[ImportedModel], int]:
     """Copy the models of an existing library; return them, what was said when they were imported, and its seed."""
     if library is None:
         return [], [], context.seed
@@ -154,75 +161,77 @@ def _copy_folder(source: Path, target: Path) -> None:
         if path.is_symlink() or not (path.is_file() or path.is_dir()):
             raise BadInput(f"{path}: a link or a device in a model's folder", hint="make the library again")
         if path.is_file():
-            place = target / path.relative_to(source)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(path, place)
+            copied = target / path.relative_to(source)
+            copied.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, copied)
 
 
 def _import(
-    source: SourceModel, said: Said, names: dict[str, int], decompose: bool
+    source: SourceModel, settings: Said, names: dict[str, int], decompose: bool
 ) -> tuple[ImportedModel, Assembled | None]:
     """Return what was found out about a model, and the model; None in its place when it is left out."""
-    parameters = said.parameters
-    class_name = said.class_name(source)
+    parameters = settings.parameters
+    class_name = settings.class_name(source)
     if class_name is None and parameters.unknown == "object":
         class_name = "object"
     if class_name == SKIP:
-        return _left_out(source.name, source.source, source.format, ("left out by the mapping",)), None
+        return _record_of_left_out(source.name, source.source, source.format, ("left out by the mapping",)), None
     if class_name is None:
         reason = "nothing tells its class (--class-name, --mapping, --unknown object)"
-        return _left_out(source.name, source.source, source.format, (reason, *source.findings)), None
+        return _record_of_left_out(source.name, source.source, source.format, (reason, *source.findings)), None
     groups, findings = grouped(source)
     points = source_points(groups)
     if not np.isfinite(points).all() or float(np.abs(points).max()) > 1e9:
         raise BadInput(f"{source.source}: corners are not finite, or far away")
-    choice = choose(said.unit(source), said.up(source), points, usual_size(class_name), source.format in Y_UP_FORMATS)
+    choice = choose(
+        settings.unit(source), settings.up(source), points, usual_size(class_name), source.format in Y_UP_FORMATS
+    )
     extent = choice.unit * float(np.ptp(points, axis=0).max())
     if not SMALLEST <= extent <= LARGEST:
         raise BadInput(
             f"{source.source}: {extent:.3g} m large in units of {choice.unit:g} m", hint="--unit says otherwise"
         )
-    front = said.front(source)
-    given = front.value if isinstance(front.value, tuple) else None
-    parts, more = placed_parts(
+    front = settings.front(source)
+    given_front = front.value if isinstance(front.value, tuple) else None
+    placed, findings_of_parts = placed_parts(
         source,
         groups,
-        model_rotation(choice.up, given),
+        model_rotation(choice.up, given_front),
         choice.unit,
         collision_given=parameters.collision == "given",
         decompose=decompose,
     )
-    front_name, front_from = axis_name(given) if given is not None else "", front.origin
-    if given is None:
-        told = told_front(parts, class_name)
+    front_name, front_from = axis_name(given_front) if given_front is not None else "", front.origin
+    if given_front is None:
+        found_front = told_front(placed, class_name)
         upright = upright_rotation(choice.up)
-        direction: Direction = told[0] if told is not None else AXES["-y"]
-        parts = turned(parts, direction)
-        front_from = told[1] if told is not None else "assumed"
+        direction: Direction = found_front[0] if found_front is not None else AXES["-y"]
+        placed = turned(placed, direction)
+        front_from = found_front[1] if found_front is not None else "assumed"
         front_name = axis_name(as_vector(upright.T @ np.asarray(direction)))
     model_id = _free_id(plain_name(source.name) or class_name, names)
     result = assembled(
-        centered(parts),
+        centered(placed),
         model_id,
         class_name,
-        contains=said.entry.contains if said.entry.contains is not None else source.contains,
+        contains=settings.entry.contains if settings.entry.contains is not None else source.contains,
         density=parameters.density,
         recipe={"source": source.source, "format": source.format},
     )
-    findings = [*choice.findings, *source.findings, *findings, *more, *result.findings]
+    findings = [*choice.findings, *source.findings, *findings, *findings_of_parts, *result.findings]
     result = replace(result, findings=few_findings([plain_text(finding) for finding in findings]))
     return _record(source, result, choice, front_name, front_from), result
 
 
 def _free_id(name: str, names: dict[str, int]) -> str:
     """Return an id that is not taken: name, name_2, ...; `names` (lower case) holds the last number of each."""
-    found, number = name, names.get(name.lower(), 1)
-    while found.lower() in names:
+    free_id, number = name, names.get(name.lower(), 1)
+    while free_id.lower() in names:
         number += 1
-        found = f"{name}_{number}"
+        free_id = f"{name}_{number}"
     if number > 1:
         names[name.lower()] = number
-    return found
+    return free_id
 
 
 def _record(source: SourceModel, result: Assembled, choice: Choice, front: str, front_from: str) -> ImportedModel:
@@ -252,7 +261,7 @@ def _record(source: SourceModel, result: Assembled, choice: Choice, front: str, 
     )
 
 
-def _left_out(name: str, source: str, kind: str, findings: tuple[str, ...]) -> ImportedModel:
+def _record_of_left_out(name: str, source: str, kind: str, findings: tuple[str, ...]) -> ImportedModel:
     return ImportedModel(
         id="",
         name=plain_text(name),

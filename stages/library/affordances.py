@@ -32,11 +32,15 @@ WALL_LEVEL = 0.3
 LEVELS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Shares of the free height at which a way out is looked for."""
 RIM_STEPS = 24
+"""Heights at which a rim is looked for."""
 ROUND_FILL = 0.88
 """A floor that fills less of its rectangle is round: its volume stands on the largest square within."""
 SIDEWAYS = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
+"""Horizontal unit directions in which a way out is looked for."""
 UP = np.array([0.0, 0, 1.0])
+"""Direction against gravity."""
 LIFT = 1e-3
+"""Distance by which samples are lifted off the surface that they lie on [m]."""
 
 
 @dataclass(frozen=True)
@@ -59,14 +63,14 @@ class _Shape:
 def affordances(model: CadModel, solids: Mapping[str, Sequence[Solid]]) -> Affordances:
     """Return what can be done with a model. `solids`: part -> its convex pieces in the model frame, closed [m]."""
     corners = {part: np.concatenate([solid.vertices for solid in solids[part]]) for part in model.parts}
-    whole = np.concatenate(list(corners.values()))
-    kinds = {joint.name: joint_kind(joint, corners[joint.part], whole) for joint in model.joints}
+    all_points = np.concatenate(list(corners.values()))
+    kinds = {joint.name: joint_kind(joint, corners[joint.part], all_points) for joint in model.joints}
     numbers = {part: k for k, part in enumerate(model.parts)}
     shape = _Shape(
         rays=SolidRays([solid for part in model.parts for solid in solids[part]]),
         owner=np.repeat(np.arange(len(model.parts)), [len(solids[part]) for part in model.parts]),
         opener={numbers[joint.part]: joint for joint in model.joints if kinds[joint.name] in OPENING_KINDS},
-        top=float(whole[:, 2].max()),
+        top=float(all_points[:, 2].max()),
         parts=model.parts,
     )
     uses = tuple(
@@ -155,8 +159,8 @@ def _inner_volume(
         depth = surface.clearance
         if depth < LEAST_DEPTH or len(_walls(middle + WALL_LEVEL * depth * UP, reach, shape)) < 3:
             return None
-    own = shape.opener.get(shape.parts.index(surface.part))
-    joints = (*behind[own.name], own.name) if own is not None else through
+    own_part = shape.opener.get(shape.parts.index(surface.part))
+    joints = (*behind[own_part.name], own_part.name) if own_part is not None else through
     if plane.area < ROUND_FILL * float(np.prod(high - low)):
         low, high = (0.5 * (low + high) + sign * np.sqrt(0.125) * (high - low) for sign in (-1.0, 1.0))
     return InnerVolume(
@@ -197,7 +201,7 @@ def _ways_in(plane: SurfacePlane, surface: SupportSurface, shape: _Shape) -> tup
         return ()
     depth = surface.clearance
     samples = _samples(plane)
-    found: tuple[str, ...] | None = None
+    shortest: tuple[str, ...] | None = None
     for direction in (*SIDEWAYS[::-1], UP):
         blocked: set[int] = set()
         free = 0
@@ -208,9 +212,9 @@ def _ways_in(plane: SurfacePlane, surface: SupportSurface, shape: _Shape) -> tup
             for line in np.flatnonzero(open_lines):
                 blocked |= {int(k) for k in shape.owner[np.isfinite(hits[line])]}
         names = tuple(shape.opener[k].name for k in sorted(blocked))
-        if free >= (1 if direction[2] else 2) and (found is None or len(names) < len(found)):
-            found = names
-    return found
+        if free >= (1 if direction[2] else 2) and (shortest is None or len(names) < len(shortest)):
+            shortest = names
+    return shortest
 
 
 def _behind(joint: Joint, part: np.ndarray, shape: _Shape, number: int) -> tuple[str, ...]:
@@ -228,16 +232,18 @@ def _behind(joint: Joint, part: np.ndarray, shape: _Shape, number: int) -> tuple
 
 def _apart(volumes: list[InnerVolume]) -> tuple[InnerVolume, ...]:
     """Return the volumes, largest first, without those whose middle lies in a larger one."""
-    kept: list[InnerVolume] = []
+    apart: list[InnerVolume] = []
 
     def size(volume: InnerVolume) -> float:
         return float(np.prod(np.asarray(volume.box_maximum) - np.asarray(volume.box_minimum)))
 
     for volume in sorted(volumes, key=lambda entry: (-round(size(entry), 9), entry.plane)):
         middle = 0.5 * (np.asarray(volume.box_minimum) + np.asarray(volume.box_maximum))
-        if not any((middle > other.box_minimum).all() and (middle < other.box_maximum).all() for other in kept):
-            kept.append(volume)
-    return tuple(kept)
+        if not any(
+            (middle > accepted.box_minimum).all() and (middle < accepted.box_maximum).all() for accepted in apart
+        ):
+            apart.append(volume)
+    return tuple(apart)
 
 
 def _grasps(model: CadModel) -> tuple[GraspPlace, ...]:
@@ -250,6 +256,8 @@ def _grasps(model: CadModel) -> tuple[GraspPlace, ...]:
     if model.movable and model.grasp_width is not None:
         state = model.states[0]
         middle = 0.5 * (np.asarray(state.box_minimum) + np.asarray(state.box_maximum))
-        whole = GraspPlace(part=model.parts[0], point=as_vector(np.round(middle, 6) + 0.0), width=model.grasp_width)
-        places.append(whole)
+        whole_model = GraspPlace(
+            part=model.parts[0], point=as_vector(np.round(middle, 6) + 0.0), width=model.grasp_width
+        )
+        places.append(whole_model)
     return tuple(places)

@@ -42,29 +42,39 @@ class Paint:
 
 
 WOOD = Material(620.0, ((196, 154, 108), (160, 114, 72), (120, 80, 50), (222, 190, 148), (92, 62, 44), (178, 132, 84)))
+"""Wood: density [kg/m^3] and colours; by eye."""
 LACQUER = Material(
     680.0, ((240, 240, 236), (228, 226, 218), (206, 208, 210), (70, 74, 80), (150, 166, 160), (64, 88, 110))
 )
+"""Lacquered board: density [kg/m^3] and colours; by eye."""
 STEEL = Material(2600.0, ((178, 182, 186), (120, 124, 128), (58, 60, 64), (206, 208, 210)))
 """Bars and legs: tubes, so far lighter than solid steel."""
 APPLIANCE = Material(220.0, ((238, 240, 242), (192, 196, 200), (58, 60, 64), (226, 220, 200), (158, 60, 52)))
-"""Insulated walls between sheets."""
+"""Appliances, insulated walls between sheets: density [kg/m^3] and colours; by eye."""
 FABRIC = Material(70.0, ((92, 110, 132), (150, 80, 70), (112, 126, 96), (176, 164, 146), (70, 72, 78), (196, 150, 90)))
+"""Fabric: density [kg/m^3] and colours; by eye."""
 LINEN = Material(70.0, ((236, 232, 224), (180, 196, 210), (214, 196, 178), (140, 156, 140)))
+"""Linen: density [kg/m^3] and colours; by eye."""
 PLASTIC = Material(
     1000.0, ((40, 42, 46), (222, 222, 220), (180, 60, 54), (60, 108, 160), (84, 140, 100), (232, 188, 70))
 )
+"""Coloured plastic: density [kg/m^3] and colours; by eye."""
 DARK_PLASTIC = Material(900.0, ((34, 36, 40), (56, 58, 62)))
+"""Dark plastic of devices: density [kg/m^3] and colours; by eye."""
 SCREEN = Material(900.0, ((18, 20, 28), (26, 30, 40)))
+"""Screen of a device: density [kg/m^3] and colours; by eye."""
 CERAMIC = Material(
     2300.0, ((238, 236, 230), (196, 70, 60), (66, 110, 160), (92, 150, 110), (236, 192, 80), (60, 62, 70))
 )
+"""Glazed ceramic: density [kg/m^3] and colours; by eye."""
 GLASS = Material(950.0, ((64, 120, 84), (150, 96, 50), (110, 150, 190), (196, 214, 216)))
-"""Filled bottles: close to water."""
+"""Filled bottles of glass: density [kg/m^3], close to water, and colours."""
 CARDBOARD = Material(
     180.0, ((190, 150, 106), (206, 60, 56), (60, 110, 180), (236, 190, 60), (96, 150, 90), (232, 226, 214))
 )
+"""Cardboard: density [kg/m^3] and colours; by eye."""
 PAPER = Material(700.0, ((236, 232, 220), (246, 244, 238)))
+"""Paper: density [kg/m^3] and colours; by eye."""
 
 
 @dataclass(frozen=True)

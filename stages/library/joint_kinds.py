@@ -13,7 +13,7 @@ KNOB_OFFSET = 0.3
 KNOB_REACH, LEVER_REACH = 0.25, 0.15
 """Largest reach from the axis of a knob and of a lever, as shares of the diagonal of the model."""
 LARGEST_REACH = 0.2
-"""And at most this [m]: the doors of a whole kitchen in one piece are no levers."""
+"""Longest reach of a lever [m]: the doors of a whole kitchen in one piece are no levers."""
 SLIDING_DOOR = 0.3
 """A sliding door is thinner across its way than this share of its length along it; a drawer is not."""
 PANEL_FLATNESS = 0.85
@@ -33,8 +33,11 @@ def joint_kind(joint: Joint, part: np.ndarray, model: np.ndarray) -> JointKind:
     middle = 0.5 * (part.min(axis=0) + part.max(axis=0))
     if joint.type == "prismatic":
         if abs(axis[2]) < UPRIGHT:
-            way = np.abs(axis[:2])
-            thin = size[:2] @ way[::-1] < SLIDING_DOOR * (size[:2] @ way) and size[2] > size[:2] @ way[::-1]
+            direction = np.abs(axis[:2])
+            thin = (
+                size[:2] @ direction[::-1] < SLIDING_DOOR * (size[:2] @ direction)
+                and size[2] > size[:2] @ direction[::-1]
+            )
             return "door" if thin else "drawer"
         above = middle[2] > 0.5 * (model[:, 2].min() + model[:, 2].max())
         return "lid" if axis[2] > 0 and above else "slide"

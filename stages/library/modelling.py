@@ -24,11 +24,12 @@ TURNED = ("knob", "lever")
 def describe(design: Design, model_id: str, movable: bool) -> CadModel:
     """Return the library's record of a centred design."""
     joints = tuple(link.joint for link in design.moving)
-    whole = np.concatenate([piece.solid.vertices for piece in design.pieces()])
+    vertices = np.concatenate([piece.solid.vertices for piece in design.pieces()])
     shaping = tuple(
         link.joint
         for link in design.moving
-        if joint_kind(link.joint, np.concatenate([piece.solid.vertices for piece in link.pieces]), whole) not in TURNED
+        if joint_kind(link.joint, np.concatenate([piece.solid.vertices for piece in link.pieces]), vertices)
+        not in TURNED
     )
     behind = {link.joint.name: link.behind for link in design.moving if link.behind is not None}
     return CadModel(
@@ -54,16 +55,18 @@ def closed_solids(design: Design) -> dict[str, list[Solid]]:
 
 def part_geometries(design: Design) -> list[PartGeometry]:
     """Return the body and the moving links, each in its part frame (origin at its joint)."""
-    parts = []
+    geometries = []
     for name, pieces, origin in [
         (BODY, design.body, np.zeros(3)),
         *((link.joint.part, link.pieces, np.asarray(link.joint.origin)) for link in design.moving),
     ]:
         local = [piece.solid.shifted(*(-origin)) for piece in pieces]
-        whole = mass_of(pieces)
-        properties = type(whole)(whole.mass, whole.center - origin, whole.inertia)
-        parts.append(PartGeometry(name, local, [piece.paint.color for piece in pieces], properties))
-    return parts
+        properties_of_all = mass_of(pieces)
+        properties = type(properties_of_all)(
+            properties_of_all.mass, properties_of_all.center - origin, properties_of_all.inertia
+        )
+        geometries.append(PartGeometry(name, local, [piece.paint.color for piece in pieces], properties))
+    return geometries
 
 
 def joint_values(

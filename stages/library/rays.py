@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.stages.kit.geometry.solids import Solid
 
 PARALLEL = 1e-9
+"""Slope below which a ray counts as parallel to a plane; rounding."""
 SEAM = 1e-9
 """A ray along the seam between two solids hits them, whatever rounding says [m]."""
 

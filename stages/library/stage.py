@@ -30,14 +30,14 @@ def run(*, parameters: LibraryParameters, context: Context) -> CadLibrary:
         movable = vocabulary.by_name(class_name).movable
         count = parameters.small_shapes_per_class if movable else parameters.shapes_per_class
         work += [(stream, class_name, generate, movable, k) for k in range(count)]
-    models, found = [], []
+    models, affordance_files = [], []
     for stream, class_name, generate, movable, k in context.progress.track(work, description="drawing furniture"):
         design = centered(generate(context.random(stream, k), k))
         model = describe(design, f"{class_name}_{k:02d}", movable)
         write_model_folder(context.output / "models" / model.id, model, part_geometries(design))
         models.append(model)
-        found.append(affordances(model, closed_solids(design)))
-    library = LibraryFile(seed=context.seed, models=tuple(models), affordances=tuple(found))
+        affordance_files.append(affordances(model, closed_solids(design)))
+    library = LibraryFile(seed=context.seed, models=tuple(models), affordances=tuple(affordance_files))
     library.write(context.output / "library.json")
     summary = {
         "models": len(models),

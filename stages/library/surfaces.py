@@ -76,10 +76,10 @@ def surface_planes(
         union = shapely.union_all(_hulls(np.concatenate([corners @ basis.T for corners in facets]), of_solid))
         gaps = COVER_GAPS + tuple(gap for gap in CLEARANCES if up and gap <= 0.25 * size[2])
         heights = offset - np.array(gaps)
-        near = edges.reach(normal, heights)
+        is_near = edges.reach(normal, heights)
         if sections is not None:
-            sections.take(int(near.sum()))
-        exposed = union.difference(shapely.union_all(edges.sections(normal, heights, basis, near)))
+            sections.take(int(is_near.sum()))
+        exposed = union.difference(shapely.union_all(edges.sections(normal, heights, basis, is_near)))
         regions = _regions(exposed, width) if up else [exposed]
         for region in regions:
             if region.area < least:
@@ -184,8 +184,8 @@ def _regions(exposed: shapely.Geometry, width: float) -> list[shapely.Geometry]:
     with np.errstate(divide="ignore", invalid="ignore"):  # GEOS divides by zero at corners that are nearly straight
         closed = exposed.simplify(1e-6).buffer(half, join_style="mitre").buffer(-half, join_style="mitre")
         opened = closed.buffer(-strip, join_style="mitre").buffer(strip, join_style="mitre").intersection(closed)
-    parts = list(getattr(opened, "geoms", [opened]))
-    return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
+    polygons = list(getattr(opened, "geoms", [opened]))
+    return [part for part in polygons if isinstance(part, Polygon) and not part.is_empty]
 
 
 def _can_be_stood_on(region: shapely.Geometry, corners: np.ndarray) -> bool:

@@ -20,7 +20,9 @@ from scenewright.stages.report.surfaces import Model
 from scenewright.stages.report.views import Bounds, View, best_azimuth, direction_of, fitted_pose, page_camera
 
 ELEVATION = np.radians(28.0)
+"""Angle from which candidates are looked at over the horizontal [rad]; by eye."""
 QUALITY = 72
+"""JPEG quality of the pictures of candidates; by eye."""
 
 
 @dataclass(frozen=True)
@@ -75,14 +77,14 @@ def _object_view(
     width: int,
 ) -> ObjectView:
     candidates = candidates_of(replacement)
-    seen = _object_mesh(replacement, node, cad_scene, panoptic_map)
+    object_mesh = _object_mesh(replacement, node, cad_scene, panoptic_map)
     meshes = [
         shelf.mesh(candidate, replacement.part_colors if "chosen" in role else None)
         for role, candidate in candidates[:count]
     ]
     firsts = [m for (role, _), m in zip(candidates[:count], meshes, strict=True) if role] or meshes[:1]
-    view = _common_view(seen, firsts, node.class_name if node is not None else "object", width)
-    shown = tuple(
+    view = _common_view(object_mesh, firsts, node.class_name if node is not None else "object", width)
+    candidate_views = tuple(
         CandidateView(
             picture=_draw(mesh, view, f"{candidate.model_id} in the place of {replacement.node}"),
             model_id=candidate.model_id,
@@ -98,9 +100,9 @@ def _object_view(
     moved = chosen is not None and first is not None and not same_placement(first, chosen, 0.02, 0.05)
     return ObjectView(
         node=replacement.node,
-        picture=_draw(seen, view, f"mesh of {replacement.node}"),
+        picture=_draw(object_mesh, view, f"mesh of {replacement.node}"),
         outcome=_outcome(replacement, chosen, first if moved else None),
-        candidates=shown,
+        candidates=candidate_views,
         others=max(0, len(candidates) - count),
         rejected=tuple(sorted(replacement.rejected.items(), key=lambda item: (-item[1], item[0]))),
         changed=chosen is None or moved,
@@ -117,8 +119,8 @@ def _outcome(replacement: Replacement, chosen: CadCandidate | None, before: CadC
     first, last = np.array(before.world_from_model), np.array(chosen.world_from_model)
     shift = 100 * float(np.linalg.norm(last[:3, 3] - first[:3, 3]))
     turn = np.degrees(rotation_angle(first[:3, :3].T @ last[:3, :3]))
-    ways = [f"moved by {shift:.0f} cm" if shift >= 0.5 else "", f"turned by {turn:.0f}°" if turn >= 0.5 else ""]
-    return " and ".join(way for way in ways if way) + " by the global check"
+    corrections = [f"moved by {shift:.0f} cm" if shift >= 0.5 else "", f"turned by {turn:.0f}°" if turn >= 0.5 else ""]
+    return " and ".join(correction for correction in corrections if correction) + " by the global check"
 
 
 def _object_mesh(
@@ -136,10 +138,10 @@ def _object_mesh(
 
 
 def _common_view(
-    seen: trimesh.Trimesh | None, meshes: list[trimesh.Trimesh | None], class_name: str, width: int
+    object_mesh: trimesh.Trimesh | None, meshes: list[trimesh.Trimesh | None], class_name: str, width: int
 ) -> View | None:
     """A view that shows all of them whole, from the side of which most was seen."""
-    framed = [mesh for mesh in (seen, *meshes) if mesh is not None]
+    framed = [mesh for mesh in (object_mesh, *meshes) if mesh is not None]
     if not framed:
         return None
     bounds = Bounds(

@@ -45,7 +45,7 @@ def frame_views(
 ) -> tuple[list[FrameView], list[Chip]]:
     """Return pictures of chosen frames and the legend of their segment colours."""
     views: list[FrameView] = []
-    seen: set[int] = set()
+    seen_classes: set[int] = set()
     by_frame = {entry.frame: entry.segments for entry in segments.info.frames} if segments is not None else {}
     with FrameReader(sequence.path("frames.mcap")) as reader:
         for index in choose_frames(len(reader), wanted):
@@ -60,8 +60,8 @@ def frame_views(
                         f"its frames have {frame.color.shape[1]}x{frame.color.shape[0]}",
                         hint="give the --segments that were made from --sequence",
                     )
-                colors, shown = segment_colors(by_frame[index])
-                seen |= shown
+                colors, classes = segment_colors(by_frame[index])
+                seen_classes |= classes
                 overlay = jpeg(blend_segments(frame.color, ids, colors), f"segments of frame {index}", width)
             views.append(
                 FrameView(
@@ -75,7 +75,9 @@ def frame_views(
                 )
             )
     names = class_names()
-    legend = [Chip(spaced(names.get(c, f"class {c}")), hex_color(entity_color(c, names.get(c)))) for c in sorted(seen)]
+    legend = [
+        Chip(spaced(names.get(c, f"class {c}")), hex_color(entity_color(c, names.get(c)))) for c in sorted(seen_classes)
+    ]
     return views, legend
 
 
@@ -122,9 +124,9 @@ def blend_segments(
 def depth_colors(depth: np.ndarray, near: float = 0.4, far: float = 5.0) -> np.ndarray:
     """Colour (H, W) depth [m] from yellow (near) to dark blue (far); pixels without depth are black."""
     stops = np.array([[253, 231, 76], [244, 142, 65], [193, 64, 104], [98, 40, 128], [28, 22, 74]], dtype=float)
-    place = np.clip((depth - near) / (far - near), 0.0, 1.0) * (len(stops) - 1)
-    low = np.minimum(place.astype(int), len(stops) - 2)
-    share = (place - low)[..., None]
+    stop = np.clip((depth - near) / (far - near), 0.0, 1.0) * (len(stops) - 1)
+    low = np.minimum(stop.astype(int), len(stops) - 2)
+    share = (stop - low)[..., None]
     result = (1 - share) * stops[low] + share * stops[low + 1]
     result[depth <= 0] = 0.0
     return np.round(result).astype(np.uint8)

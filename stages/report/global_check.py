@@ -15,9 +15,11 @@ from scenewright.stages.report.placed_models import ModelShelf
 from scenewright.stages.report.surfaces import Model, cad_model
 
 CONFLICT = (0.80, 0.08, 0.07)
+"""Colour of objects in conflict (sRGB, 0 to 1)."""
 CALM = 0.62
 """How far the colours of what collides with nothing go towards light grey."""
 NAMED_PAIRS = 6
+"""Most pairs of objects that a caption names."""
 
 
 @dataclass(frozen=True)
@@ -82,5 +84,5 @@ def _caption(title: str, conflicts: list[Penetration], models: int) -> str:
     if not conflicts:
         return f"{title}: none of {models} CAD models stands more than 5 mm in another, or in floor, walls or ceiling"
     pairs = [f"{pair.first} in {pair.second} ({1000 * pair.depth:.0f} mm)" for pair in conflicts[:NAMED_PAIRS]]
-    more = f" and {len(conflicts) - NAMED_PAIRS} more" if len(conflicts) > NAMED_PAIRS else ""
-    return f"{title}: {len(conflicts)} conflict{'s' if len(conflicts) > 1 else ''}, red: {', '.join(pairs)}{more}"
+    and_more = f" and {len(conflicts) - NAMED_PAIRS} more" if len(conflicts) > NAMED_PAIRS else ""
+    return f"{title}: {len(conflicts)} conflict{'s' if len(conflicts) > 1 else ''}, red: {', '.join(pairs)}{and_more}"

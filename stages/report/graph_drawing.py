@@ -17,8 +17,11 @@ from scenewright.stages.kit.drawing.tree_layout import tree_layout
 from scenewright.stages.kit.measurement.relation_evidence import evidence
 
 ROW = 30
+"""Height of a row [px]."""
 LETTER = 7.1
+"""Width of a letter in the boxes [px]; by eye."""
 GAP = 46
+"""Gap between the columns [px]."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +77,11 @@ def draw_graph(
     for node in graph.nodes:
         depth = int(layout[node.id][0])
         widths[depth] = max(widths.get(depth, 0.0), _node_width(node))
-    left = {0: 8.0}
+    column_left = {0: 8.0}
     for depth in sorted(widths):
-        left[depth + 1] = left[depth] + widths[depth] + GAP
+        column_left[depth + 1] = column_left[depth] + widths[depth] + GAP
     boxes = {
-        node.id: (left[int(layout[node.id][0])], 20 + ROW * layout[node.id][1], _node_width(node))
+        node.id: (column_left[int(layout[node.id][0])], 20 + ROW * layout[node.id][1], _node_width(node))
         for node in graph.nodes
     }
     nodes = tuple(

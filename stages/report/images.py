@@ -15,8 +15,9 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_content
 
 MAXIMUM_PIXELS = 40_000_000
+"""Most pixels of a picture that is embedded; a bound, by eye."""
 LARGEST_ANIMATION = 6_000_000
-"""Of a GIF that is embedded as it is [bytes]."""
+"""Largest GIF that is embedded as it is [bytes]."""
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR, owner_o
 from scenewright.stages.report.graph_drawing import GAP, LETTER, ROW, DrawnEdge, DrawnNode, elbow
 
 GUTTER = 60
-"""Between the two trees [px]."""
+"""Gap between the two trees [px]."""
 TOP = 48
+"""Space for the headings over the trees [px]."""
 
 
 @dataclass(frozen=True)
@@ -93,17 +94,20 @@ def corresponding_trees(graph: ContactGraphFile, links: list[str], joints: list[
     root = next((link for link in links if link not in children), "")
     bodies = {node.id for node in graph.nodes if node.id != SCENE_NODE}
     node_of = {link: SCENE_NODE if link == root else owner_of_link(link, bodies) for link in links}
-    parts = {link: owner for link, owner in node_of.items() if owner not in (None, link, SCENE_NODE)}
-    layout = _rows(graph, parts)
+    owner_of_part = {link: owner for link, owner in node_of.items() if owner not in (None, link, SCENE_NODE)}
+    layout = _rows(graph, owner_of_part)
     left_boxes = _boxes({node.id: node.id for node in graph.nodes}, {n.id: layout[n.id] for n in graph.nodes}, 8.0)
     link_left = max((x + width for x, _, width in left_boxes.values()), default=0.0) + GUTTER
     names = {link: owner for link, owner in node_of.items() if owner in (link, SCENE_NODE)}
-    shown = {link: link.rsplit(PART_SEPARATOR, 1)[-1] if link in parts else link for link in (*names, *parts)}
+    label_of = {
+        link: link.rsplit(PART_SEPARATOR, 1)[-1] if link in owner_of_part else link for link in (*names, *owner_of_part)
+    }
     depths = _link_depths(joints, root)
     places = {
-        link: (float(depths.get(link, 0)), layout[link if link in parts else str(names[link])][1]) for link in shown
+        link: (float(depths.get(link, 0)), layout[link if link in owner_of_part else str(names[link])][1])
+        for link in label_of
     }
-    right_boxes = _boxes(shown, places, link_left)
+    right_boxes = _boxes(label_of, places, link_left)
     classes = {node.id: node for node in graph.nodes}
 
     def color(name: str | None) -> str:
@@ -116,12 +120,12 @@ def corresponding_trees(graph: ContactGraphFile, links: list[str], joints: list[
     link_nodes = tuple(
         DrawnNode(
             *right_boxes[link],
-            shown[link],
-            "scene" if link == root else "part" if link in parts else "rigid",
+            label_of[link],
+            "scene" if link == root else "part" if link in owner_of_part else "rigid",
             color(node_of[link]),
             f"link {link}",
         )
-        for link in shown
+        for link in label_of
     )
     return Corresponding(
         width=max((x + width for x, _, width in right_boxes.values()), default=link_left) + 12,
@@ -150,13 +154,13 @@ def corresponding_trees(graph: ContactGraphFile, links: list[str], joints: list[
     )
 
 
-def _rows(graph: ContactGraphFile, parts: Mapping[str, str | None]) -> dict[str, tuple[float, float]]:
+def _rows(graph: ContactGraphFile, owner_of_part: Mapping[str, str | None]) -> dict[str, tuple[float, float]]:
     """(depth, row) of nodes and of the links that are parts of them."""
     parents: dict[str, str | None] = {node.id: None for node in graph.nodes}
     for link in graph.links:
         if link.relation in TREE_RELATIONS and link.target in parents and link.source in parents:
             parents[link.target] = link.source
-    return tree_layout({**parents, **parts})
+    return tree_layout({**parents, **owner_of_part})
 
 
 def _link_depths(joints: list[UrdfJoint], root: str) -> dict[str, int]:
@@ -181,10 +185,10 @@ def _boxes(
     columns: dict[int, float] = {}
     for name, (depth, _) in places.items():
         columns[int(depth)] = max(columns.get(int(depth), 0.0), widths[name])
-    left = {0: start}
+    column_left = {0: start}
     for depth in range(max(columns, default=0) + 1):
-        left[depth + 1] = left[depth] + columns.get(depth, 0.0) + GAP
-    return {name: (left[int(depth)], TOP + ROW * row, widths[name]) for name, (depth, row) in places.items()}
+        column_left[depth + 1] = column_left[depth] + columns.get(depth, 0.0) + GAP
+    return {name: (column_left[int(depth)], TOP + ROW * row, widths[name]) for name, (depth, row) in places.items()}
 
 
 def _graph_edges(graph: ContactGraphFile, boxes: Mapping[str, tuple[float, float, float]]) -> tuple[DrawnEdge, ...]:

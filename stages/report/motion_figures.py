@@ -9,7 +9,7 @@ from scenewright.stages.kit.drawing.plan_tree import REACHED, Branch, plan_tree
 from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 WIDTH, HEIGHT = 10.0, 5.4
-"""[inch]"""
+"""Size of a figure [inch]."""
 SHADE = "#f0f3f6"
 ARM_JOINTS = 7
 """Columns of `joints` before those of the fingers."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 CLASS_AGNOSTIC = "class-agnostic"
-"""In the label of masks that have no names."""
+"""Word in the label of masks that have no names."""
 MANY_UNCERTAIN, MANY_MESHES, MANY_LOST = 0.25, 0.5, 0.1
 """Shares of supports, of things without a model, of frames, from which there is something to do about them."""
 HELD_UPRIGHT = "which way is up: no floor was seen, the camera is taken to have been held upright"
@@ -56,22 +56,22 @@ class Outlook:
 
 def outlook(facts: Mapping[str, Facts]) -> Outlook:
     """Return what the facts of a run's artifacts amount to, role (`sequence`, `panoptic_map`) -> facts."""
-    found = Outlook()
+    judged = Outlook()
     if "trajectory" in facts and "sequence" in facts:  # which way is up is then that of the trajectory
         summary = {name: value for name, value in facts["sequence"].summary.items() if name != "gravity"}
         facts = {**facts, "sequence": Facts(facts["sequence"].outcome, summary)}
     for role, judge in JUDGES.items():
         if role in facts:
-            more = judge(facts[role])
-            found = Outlook(
-                found.sound + more.sound,
-                found.doubtful + more.doubtful,
-                found.missing + more.missing,
-                found.advice + tuple(text for text in more.advice if text not in found.advice),
+            verdict = judge(facts[role])
+            judged = Outlook(
+                judged.sound + verdict.sound,
+                judged.doubtful + verdict.doubtful,
+                judged.missing + verdict.missing,
+                judged.advice + tuple(text for text in verdict.advice if text not in judged.advice),
             )
-    if "interactive_scene" in facts and not found.doubtful and not found.missing:
-        return Outlook(found.sound, advice=("nothing speaks against acting in it: scenewright plan",))
-    return found
+    if "interactive_scene" in facts and not judged.doubtful and not judged.missing:
+        return Outlook(judged.sound, advice=("nothing speaks against acting in it: scenewright plan",))
+    return judged
 
 
 def _sequence(facts: Facts) -> Outlook:
@@ -140,16 +140,16 @@ def _contact_graph(facts: Facts) -> Outlook:
 
 def _cad_scene(facts: Facts) -> Outlook:
     models, built, meshes = (facts.count(name) for name in ("cad", "built_in", "mesh"))
-    things, error = models + built + meshes, facts.number("alignment_error_median")
+    thing_count, error = models + built + meshes, facts.number("alignment_error_median")
     sound, doubtful, missing, advice = [], [], [], []
     if models:
         fit = f", the middle one within {1000 * error:.0f} mm of what was seen" if error else ""
-        sound.append(f"{models} of {things} things have a CAD model{fit}")
+        sound.append(f"{models} of {thing_count} things have a CAD model{fit}")
     if built:
-        sound.append(f"boxes that were made for {built} of {things} things, which no model fits, stand for them")
+        sound.append(f"boxes that were made for {built} of {thing_count} things, which no model fits, stand for them")
     if meshes:
-        doubtful.append(f"{meshes} of {things} things keep their scanned mesh: no doors, nothing behind them")
-    if meshes > MANY_MESHES * things:
+        doubtful.append(f"{meshes} of {thing_count} things keep their scanned mesh: no doors, nothing behind them")
+    if meshes > MANY_MESHES * thing_count:
         advice.append("walk around what matters, closer; add models of your own things (scenewright library add)")
     if facts.number("surroundings_m2") >= 1:
         missing.append(f"what {facts.number('surroundings_m2'):.1f} m² of mapped surface belong to")
@@ -163,8 +163,8 @@ def _interactive_scene(facts: Facts) -> Outlook:
             return Outlook(doubtful=("whether it stays when it is let go: that was not tried",))
         return Outlook((f"let go, all {movable} movable bodies stay; {joints} joints are free at their start",))
     reason = str(facts.summary.get("reason", facts.outcome))
-    if held := facts.count("held"):
-        reason += f"; {held} things that could be pushed lie in others and stay"
+    if held_count := facts.count("held"):
+        reason += f"; {held_count} things that could be pushed lie in others and stay"
     if facts.outcome == "nothing_movable":
         return Outlook(doubtful=(f"acting in it: {reason}",), advice=("masks that tell things from furniture",))
     sound = () if collisions else ("nothing stands more than 5 mm in anything else",)

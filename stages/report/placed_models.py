@@ -53,6 +53,6 @@ class ModelShelf:
         shape = (folder, candidate.scale, *sorted(candidate.joints.items()))
         if shape not in self._pieces:
             pieces = posed_collision(folder, self._model(folder), candidate.joints, candidate.scale)
-            found = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
-            self._pieces[shape] = [piece for piece in found if piece is not None]
+            convex_pieces = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
+            self._pieces[shape] = [piece for piece in convex_pieces if piece is not None]
         return [piece.placed(np.array(candidate.world_from_model)) for piece in self._pieces[shape]]

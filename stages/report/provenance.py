@@ -53,10 +53,10 @@ class Made:
 def made_of(artifacts: Mapping[str, Artifact], report_folder: Path) -> list[Made]:
     """Describe the artifacts by role. `report_folder`: where report.html will lie."""
     slowest = max((a.manifest.provenance.seconds for a in artifacts.values() if a.manifest is not None), default=0.0)
-    return [_made(role, artifact, report_folder, slowest) for role, artifact in artifacts.items()]
+    return [_provenance_of(role, artifact, report_folder, slowest) for role, artifact in artifacts.items()]
 
 
-def _made(role: str, artifact: Artifact, report_folder: Path, slowest: float) -> Made:
+def _provenance_of(role: str, artifact: Artifact, report_folder: Path, slowest: float) -> Made:
     manifest = artifact.manifest
     provenance = (manifest or _nothing(artifact)).provenance
     described = manifest or _nothing(artifact)

@@ -56,8 +56,10 @@ def all_roles() -> dict[str, type[Artifact]]:
     roles: dict[str, type[Artifact]] = {}
     for section in all_sections():
         for role, kind in section.reads.items():
-            other = roles.get(role, kind)
-            if not issubclass(kind, other) and not issubclass(other, kind):
-                raise RuntimeError(f"{role!r} is {kind.kind!r} to section {section.name!r}, {other.kind!r} to another")
-            roles[role] = other if issubclass(kind, other) else kind
+            earlier_kind = roles.get(role, kind)
+            if not issubclass(kind, earlier_kind) and not issubclass(earlier_kind, kind):
+                raise RuntimeError(
+                    f"{role!r} is {kind.kind!r} to section {section.name!r}, {earlier_kind.kind!r} to another"
+                )
+            roles[role] = earlier_kind if issubclass(kind, earlier_kind) else kind
     return roles

@@ -17,6 +17,7 @@ from scenewright.stages.report.parameters import STAGE, ReportParameters
 from scenewright.stages.report.section import all_sections
 
 MAXIMUM_BYTES = 15_000_000
+"""Largest report [bytes]; a larger one is refused."""
 
 
 def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | None) -> Report:
@@ -27,7 +28,7 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
     artifacts = {role: artifact for role in STAGE.reads if (artifact := inputs.get(role)) is not None}
     page = Page(artifacts, parameters, context.output.parent / "report")
     head = {"label": page.label, "baseline_label": page.baseline_label}
-    shown: list[dict[str, Any]] = []
+    rendered: list[dict[str, Any]] = []
     tiles: list[Any] = []
     scripts: list[str] = []
     for section in all_sections():
@@ -37,13 +38,13 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
             values = importlib.import_module(f"scenewright.stages.report.sections.{section.name}.view").view(page)
         if values is not None:
             html = render(f"sections/{section.name}/section.html.j2", {**head, **values})
-            shown.append({"id": section.name, "name": section.title, "html": html})
+            rendered.append({"id": section.name, "name": section.title, "html": html})
             tiles += values.get("tiles", ())
             scripts += values.get("scripts", ())
     title = parameters.title or _title(page)
-    values = {"title": title, "lead": _lead(page), "tiles": tiles, "sections": shown, "version": _version()}
+    values = {"title": title, "lead": _lead(page), "tiles": tiles, "sections": rendered, "version": _version()}
     page_text = render_page({**head, **values, "scripts": scripts})
-    return _write(page_text, title, tuple(section["id"] for section in shown), artifacts, context)
+    return _write(page_text, title, tuple(section["id"] for section in rendered), artifacts, context)
 
 
 def _version() -> str:
@@ -64,21 +65,23 @@ def _title(page: Page) -> str:
 
 
 def _lead(page: Page) -> str:
-    parts = []
+    clauses = []
     sequence, ground_truth = page.given("sequence", Sequence), page.given("ground_truth", GroundTruth)
     if sequence is not None:
         info = sequence.info
         camera = f"{info.camera.width} x {info.camera.height}"
-        parts.append(f"{info.frame_count} RGB-D frames of {camera} pixels over {info.end_time - info.start_time:.0f} s")
-    made = [
+        clauses.append(
+            f"{info.frame_count} RGB-D frames of {camera} pixels over {info.end_time - info.start_time:.0f} s"
+        )
+    results = [
         text(page.artifacts[role]) if callable(text) else text
         for section in all_sections()
         for role, text in section.became.items()
         if role in page.artifacts
     ]
-    if made:
-        parts.append(", ".join(made[:-1]) + (" and " if len(made) > 1 else "") + made[-1])
-    text = " became ".join(parts) if len(parts) == 2 else "".join(parts)
+    if results:
+        clauses.append(", ".join(results[:-1]) + (" and " if len(results) > 1 else "") + results[-1])
+    text = " became ".join(clauses) if len(clauses) == 2 else "".join(clauses)
     truth = ""
     if ground_truth is not None:
         file = ground_truth.info

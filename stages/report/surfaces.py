@@ -100,11 +100,11 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
         raise BadInput(f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices")
     a, b, c = labels[mesh.faces].T
     instance = np.where((b == c) & (a != b), b, a)
-    kept = np.linalg.norm(mesh.face_normals, axis=1) > 0.5
+    is_kept = np.linalg.norm(mesh.face_normals, axis=1) > 0.5
     corners = mesh.vertices[mesh.faces]
-    kept &= np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-12
-    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces[kept], vertex_colors=_vertex_colors(mesh), process=False)
-    soup = replace(build_soup([(0, mesh)]), instance=instance[kept].astype(np.int32))
+    is_kept &= np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-12
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces[is_kept], vertex_colors=_vertex_colors(mesh), process=False)
+    soup = replace(build_soup([(0, mesh)]), instance=instance[is_kept].astype(np.int32))
     entities = panoptic_map.info.entities
     return Model(
         soup,
@@ -143,8 +143,8 @@ def cad_model(
         number = node.instance if node is not None and node.instance > 0 else 100_000 + row
         chosen = after_check(replacement) if candidates is None else candidates.get(replacement.node)
         if chosen is not None:
-            own = replacement.chosen is not None and chosen.model_id == replacement.chosen.model_id
-            mesh: trimesh.Trimesh | None = shelf.mesh(chosen, replacement.part_colors if own else None)
+            is_chosen = replacement.chosen is not None and chosen.model_id == replacement.chosen.model_id
+            mesh: trimesh.Trimesh | None = shelf.mesh(chosen, replacement.part_colors if is_chosen else None)
         else:
             where = "layout" if replacement.decision == "layout" else "meshes"
             mesh = _load(cad_scene, f"{where}/{replacement.node}.ply")

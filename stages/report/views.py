@@ -12,10 +12,13 @@ from scenewright.stages.kit.rendering.surfaces import TriangleSoup
 from scenewright.stages.report.surfaces import Model
 
 FIELD_OF_VIEW = np.radians(32.0)
+"""Opening angle of the views [rad]; by eye."""
 PLAN_FIELD_OF_VIEW = np.radians(8.0)
-"""From above: almost parallel rays, so that walls stay lines."""
+"""Opening angle of the plan from above [rad]: almost parallel rays, so that walls stay lines."""
 ELEVATION = np.radians(42.0)
+"""Angle of the views over the horizontal [rad]; by eye."""
 AZIMUTHS = 12
+"""Directions around a scene that are tried for its view; by eye."""
 SHELL = 0.25
 """Triangles this near to the bounds that look outward belong to the outside of the room [m]."""
 
@@ -118,12 +121,12 @@ def best_azimuth(model: Model) -> float:
     Each thing counts with the square root of its area that faces the eye, so that many small things outweigh one
     large one; occlusion is not considered.
     """
-    things = model.things
-    if not things.any():
+    is_thing = model.things
+    if not is_thing.any():
         return 2.0 * np.pi * 0.5 / AZIMUTHS
-    corners = model.soup.corners[things]
+    corners = model.soup.corners[is_thing]
     area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    _, owner = np.unique(model.soup.instance[things], return_inverse=True)
+    _, owner = np.unique(model.soup.instance[is_thing], return_inverse=True)
     sign = model.inward_sign(model.centers.mean(axis=0))
     azimuths = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
     scores = [
@@ -168,7 +171,7 @@ def place_labels(
 ) -> list[Label]:
     """Put names on (H, W) instance images: in the middle of what is seen, large things first, none over another."""
     values, counts = np.unique(instance, return_counts=True)
-    taken: list[tuple[float, float, float, float]] = []
+    used_boxes: list[tuple[float, float, float, float]] = []
     labels: list[Label] = []
     for value, count in sorted(zip(values.tolist(), counts.tolist(), strict=True), key=lambda vc: (-vc[1], vc[0])):
         if value not in names or count < minimum_pixels:
@@ -179,8 +182,8 @@ def place_labels(
         half, high = 0.28 * font_size * len(names[value]) + 4, 0.68 * font_size
         x = int(np.clip(x, half, instance.shape[1] - half)) if instance.shape[1] > 2 * half else x
         box = (x - half, y - high, x + half, y + high)
-        if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken):
+        if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in used_boxes):
             continue
-        taken.append(box)
+        used_boxes.append(box)
         labels.append(Label(x, y, names[value], f"{names[value]}: {count} pixels in this view"))
     return labels

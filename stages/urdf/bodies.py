@@ -115,13 +115,13 @@ def held_under_fixed(bodies: list[BundleBody]) -> list[BundleBody]:
     world would be squeezed out between it and the floor."""
     by_name = {body.name: body for body in bodies}
     fixed = [body for body in bodies if not body.movable and body.relation in STANDS]
-    held: set[str] = set()
+    fixed_names: set[str] = set()
     while fixed:
         carrier = by_name.get(fixed.pop().parent or "")
-        if carrier is not None and carrier.movable and carrier.name not in held:
-            held.add(carrier.name)
+        if carrier is not None and carrier.movable and carrier.name not in fixed_names:
+            fixed_names.add(carrier.name)
             fixed.append(carrier)
-    return [replace(body, movable=False, furniture=False) if body.name in held else body for body in bodies]
+    return [replace(body, movable=False, furniture=False) if body.name in fixed_names else body for body in bodies]
 
 
 def _surroundings(file: Path) -> BundleBody:

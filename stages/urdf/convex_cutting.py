@@ -15,17 +15,17 @@ def outside_box(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> list[n
 
     Of what lies beyond two faces at once the piece beyond the one that leaves most has it.
     """
-    pieces, rest = [], points
+    pieces, remaining = [], points
     faces = [(axis, sign, sign * (high if sign > 0 else low)[axis]) for axis in range(3) for sign in (1.0, -1.0)]
-    while faces and len(rest):
-        beyond = [half(rest, axis, sign, limit) for axis, sign, limit in faces]
+    while faces and len(remaining):
+        beyond = [half(remaining, axis, sign, limit) for axis, sign, limit in faces]
         volumes = [_volume(part) for part in beyond]
         best = int(np.argmax(volumes))
         if volumes[best] <= 0.0:
             break
         axis, sign, limit = faces.pop(best)
         pieces.append(beyond[best])
-        rest = half(rest, axis, -sign, -limit)
+        remaining = half(remaining, axis, -sign, -limit)
     return sorted(pieces, key=lambda part: -_volume(part))
 
 

@@ -29,7 +29,7 @@ DEPTH = 0.003
 """Things that lie no deeper in each other are left alone [m]: the settle test lets 5 mm pass, and Bullet pads every
 mesh by one."""
 TOUCHING = 0.001
-"""Of those that do, pieces may lie this deep in each other [m]."""
+"""Depth [m] by which pieces that touch may lie in each other."""
 CLEARANCE = 0.002
 """Room that is left around what was cut out [m]: the padding of both."""
 
@@ -68,11 +68,11 @@ class Piece:
 
     def without(self, other: Piece) -> list[Piece]:
         """Return what of it is outside of the least upright box around another, 2 mm wider, as pieces."""
-        there = inverse(other.world_from_box)
-        around = apply(there, other.points)
+        box_from_world = inverse(other.world_from_box)
+        around = apply(box_from_world, other.points)
         low, high = around.min(axis=0) - CLEARANCE, around.max(axis=0) + CLEARANCE
-        parts = outside_box(apply(there, self.points), low, high)
-        return [Piece(apply(other.world_from_box, part)) for part in parts]
+        cut_points = outside_box(apply(box_from_world, self.points), low, high)
+        return [Piece(apply(other.world_from_box, part)) for part in cut_points]
 
     def depth(self, other: Piece) -> float:
         """Return how deep [m] it lies in another."""
@@ -86,18 +86,20 @@ def given_way(root: Path, bodies: Sequence[BundleBody]) -> list[BundleBody]:
     in the building, or in a smaller thing that keeps its own. Raises BadInput."""
     pieces = written_pieces(root)
     keeping = [body for body in bodies if body.model is None and body.mesh is not None and not _is_layout(body)]
-    final = {name: own for name, own in pieces.items() if name not in {body.name for body in keeping}}
+    final = {name: own_pieces for name, own_pieces in pieces.items() if name not in {body.name for body in keeping}}
     cut: dict[str, dict[int, list[Piece]]] = {}
     for body in sorted(keeping, key=lambda body: (box_volume(body.box), body.name)):
-        own = {number: [piece] for number, piece in enumerate(pieces[body.name])}
+        own_pieces = {number: [piece] for number, piece in enumerate(pieces[body.name])}
         for others in final.values():
-            _cut(own, others)
-        final[body.name] = [piece for parts in own.values() for piece in parts]
-        changed = {number: parts for number, parts in own.items() if parts != [pieces[body.name][number]]}
+            _cut(own_pieces, others)
+        final[body.name] = [piece for cut_pieces in own_pieces.values() for piece in cut_pieces]
+        changed = {
+            number: cut_pieces for number, cut_pieces in own_pieces.items() if cut_pieces != [pieces[body.name][number]]
+        }
         if not final[body.name]:
             final[body.name] = pieces[body.name]
         elif changed:
-            cut[body.name] = own if body.movable else changed
+            cut[body.name] = own_pieces if body.movable else changed
     return [_with(body, cut[body.name]) if body.name in cut else body for body in bodies]
 
 
@@ -115,20 +117,22 @@ def written_pieces(root: Path) -> dict[str, list[Piece]]:
     return pieces
 
 
-def _cut(own: dict[int, list[Piece]], others: Sequence[Piece]) -> None:
+def _cut(pieces_of_shape: dict[int, list[Piece]], others: Sequence[Piece]) -> None:
     """Cut what of a thing's pieces, by the number of their shape, lies in those of another, if any lies deep in it."""
-    pieces = [piece for parts in own.values() for piece in parts]
+    pieces = [piece for cut_pieces in pieces_of_shape.values() for piece in cut_pieces]
     if not pieces:
         return
     low, high = np.min([piece.low for piece in pieces], axis=0), np.max([piece.high for piece in pieces], axis=0)
-    others = [other for other in others if (other.low < high).all() and (low < other.high).all()]
-    depths = [max(piece.depth(other) for piece in pieces) for other in others]
+    others = [obstacle for obstacle in others if (obstacle.low < high).all() and (low < obstacle.high).all()]
+    depths = [max(piece.depth(obstacle) for piece in pieces) for obstacle in others]
     if max(depths, default=0.0) <= DEPTH:
         return
-    for other in (other for other, depth in zip(others, depths, strict=True) if depth > TOUCHING):
-        for number, parts in own.items():
-            own[number] = [
-                rest for piece in parts for rest in (piece.without(other) if piece.depth(other) > TOUCHING else [piece])
+    for obstacle in (obstacle for obstacle, depth in zip(others, depths, strict=True) if depth > TOUCHING):
+        for number, cut_pieces in pieces_of_shape.items():
+            pieces_of_shape[number] = [
+                remainder
+                for piece in cut_pieces
+                for remainder in (piece.without(obstacle) if piece.depth(obstacle) > TOUCHING else [piece])
             ]
 
 
@@ -139,6 +143,7 @@ def _is_layout(body: BundleBody) -> bool:
 def _with(body: BundleBody, cut: Mapping[int, Sequence[Piece]]) -> BundleBody:
     body_from_world = inverse(body.world_from_body)
     in_body = {
-        number: tuple(apply(body_from_world, piece.points) for piece in parts) for number, parts in sorted(cut.items())
+        number: tuple(apply(body_from_world, piece.points) for piece in pieces)
+        for number, pieces in sorted(cut.items())
     }
     return replace(body, cut=in_body)

@@ -65,13 +65,13 @@ def _contents(world: PhysicsWorld, name: str) -> set[str]:
     inside: set[str] = set()
     grown = True
     while grown:
-        more = {
+        touching = {
             body.name
             for body in world.bodies.values()
             if body.record.parent in inside or (body.record.parent == name and body.record.relation == "contains")
         }
-        grown = not more <= inside
-        inside |= more
+        grown = not touching <= inside
+        inside |= touching
     return inside
 
 
@@ -79,25 +79,25 @@ def _sweep(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) 
     before = {name: world.joint_value(body.name, name) for name in body.joints}
     opened: set[str] = set()
     while True:
-        found = _swept(world, body, joint, riding)
-        door = None if found.free_at_start else _door_of(world, body, joint, found.hit_link)
+        joint_range = _sweep_one_joint(world, body, joint, riding)
+        door = None if joint_range.free_at_start else _door_of(world, body, joint, joint_range.hit_link)
         if door is None or door in opened:
             break
         opened.add(door)
         world.set_joint(body.name, door, _open_value(world, body, door))
     for name, value in before.items():
         world.set_joint(body.name, name, value)
-    return found
+    return joint_range
 
 
 def _door_of(world: PhysicsWorld, body: LoadedBody, joint: str, link: str | None) -> str | None:
     """Return the other joint of a body that moves the link, None where it is of another body, or moved by none."""
     index = next((k for k in body.links.values() if world.link_name(body.body_id, k) == link), None)
     moving = _moving_links(world, body, body.joints[joint])
-    for name, place in body.joints.items():
-        if index is not None and index not in moving and index in _moving_links(world, body, place):
+    for name, index_of_joint in body.joints.items():
+        if index is not None and index not in moving and index in _moving_links(world, body, index_of_joint):
             # A joint that carries the part too (a tray that hangs on the door) would take it along.
-            return None if body.joints[joint] in _moving_links(world, body, place) else name
+            return None if body.joints[joint] in _moving_links(world, body, index_of_joint) else name
     return None
 
 
@@ -113,7 +113,7 @@ def _limits(world: PhysicsWorld, body: LoadedBody, joint: str) -> tuple[float, f
     return (-np.pi, np.pi) if info[9] < info[8] else (info[8], info[9])  # without limits: once around
 
 
-def _swept(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) -> JointRange:
+def _sweep_one_joint(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) -> JointRange:
     """Sweep a joint with every other one where it is."""
     index = body.joints[joint]
     lower, upper = _limits(world, body, joint)
@@ -121,11 +121,11 @@ def _swept(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) 
     moving = _moving_links(world, body, index)
     parent = engine.getJointInfo(body.body_id, index, physicsClientId=world.client)[16]
     still = [
-        (other.body_id, link, np.array(engine.getAABB(other.body_id, link, physicsClientId=world.client)))
-        for other in world.bodies.values()
-        if other.name not in riding
-        for link in sorted(other.links.values())
-        if other.name != body.name or (link not in moving and link != parent)
+        (obstacle.body_id, link, np.array(engine.getAABB(obstacle.body_id, link, physicsClientId=world.client)))
+        for obstacle in world.bodies.values()
+        if obstacle.name not in riding
+        for link in sorted(obstacle.links.values())
+        if obstacle.name != body.name or (link not in moving and link != parent)
     ]
     step = (upper - lower) / STEPS
     stretches = [_stretch(world, body, joint, closed, limit, step, moving, still) for limit in (upper, lower)]
@@ -187,9 +187,9 @@ def _hit(
     bounds = np.array([entry[2] for entry in still]).reshape(-1, 2, 3)
     for link in moving:
         low, high = np.array(engine.getAABB(body.body_id, link, physicsClientId=world.client))
-        for place in np.flatnonzero(((bounds[:, 0] <= high) & (bounds[:, 1] >= low)).all(axis=1)):
-            other, other_link = still[place][:2]
-            depth = link_depth(world, body.body_id, link, other, other_link)
+        for index in np.flatnonzero(((bounds[:, 0] <= high) & (bounds[:, 1] >= low)).all(axis=1)):
+            other_body, other_link = still[index][:2]
+            depth = link_depth(world, body.body_id, link, other_body, other_link)
             if depth > HIT_DEPTH and (deepest is None or depth > deepest[1]):
-                deepest = (world.link_name(other, other_link), depth)
+                deepest = (world.link_name(other_body, other_link), depth)
     return deepest

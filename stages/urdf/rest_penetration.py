@@ -75,8 +75,8 @@ def _measure(body: int, joined: set[frozenset[str]], limit: float, client: int) 
     bounds = {index: engine.getAABB(body, index, physicsClientId=client) for index in names}
     penetrations = []
     indices = sorted(names)
-    for place, first in enumerate(indices):
-        for second in indices[place + 1 :]:
+    for position, first in enumerate(indices):
+        for second in indices[position + 1 :]:
             if frozenset((names[first], names[second])) in joined or not _bounds_meet(bounds[first], bounds[second]):
                 continue
             points = engine.getClosestPoints(body, body, 0.0, first, second, physicsClientId=client)

@@ -20,9 +20,10 @@ from scenewright.stages.urdf.settle_report import free_bodies
 from scipy.spatial.transform import Rotation
 
 SECONDS = 3.0
+"""Simulated time in which bodies come to rest [s]; by eye."""
 PADDING, SMALLEST_MOVE, SMALLEST_TURN = 0.002, 0.0005, np.radians(0.5)
-"""Less is left alone [m], [rad]: Bullet pads the hulls of two meshes by 1 mm each, and lifts what stands on another by
-as much for every contact below it."""
+"""Smallest gap [m], move [m] and turn [rad] that count: Bullet pads the hulls of two meshes by 1 mm each, and lifts
+what stands on another by as much for every contact below it."""
 LARGEST_MOVE, LARGEST_TURN = 0.01, np.radians(5.0)
 """A body that goes further [m], [rad] was misplaced."""
 STILL = 0.005
@@ -52,7 +53,7 @@ def rested_bodies(root: Path, bodies: Sequence[BundleBody]) -> list[BundleBody]:
         return SMALLEST_MOVE + PADDING * contacts
 
     return [
-        _placed(body, poses[body.name], smallest_move(body)) if body.name in poses and near(body) else body
+        _at_new_pose(body, poses[body.name], smallest_move(body)) if body.name in poses and near(body) else body
         for body in bodies
     ]
 
@@ -75,7 +76,7 @@ def _motion(body: BundleBody, poses: dict[str, np.ndarray]) -> tuple[float, floa
     return float(np.linalg.norm(apply(change, middle[None])[0] - middle)), turned
 
 
-def _placed(body: BundleBody, world_from_body: np.ndarray, smallest_move: float) -> BundleBody:
+def _at_new_pose(body: BundleBody, world_from_body: np.ndarray, smallest_move: float) -> BundleBody:
     """Return the body at its new pose; the same one when it moved less than `smallest_move` [m] and hardly turned."""
     moved, turned = _motion(body, {body.name: world_from_body})
     if moved < smallest_move and turned < SMALLEST_TURN:

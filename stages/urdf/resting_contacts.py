@@ -25,10 +25,12 @@ def resting_contacts(scene_folder: Path) -> list[tuple[str, str]]:
             for name, index in body.links.items()
         ]
         touching = []
-        for (body, index, name, bounds), (other, other_index, other_name, other_bounds) in combinations(links, 2):
+        for (body, index, name, bounds), (other_body, other_index, other_name, other_bounds) in combinations(links, 2):
             if (bounds[0] > other_bounds[1] + REACH).any() or (other_bounds[0] > bounds[1] + REACH).any():
                 continue
-            reach = REACH - link_padding(world.client, body, index) - link_padding(world.client, other, other_index)
-            if engine.getClosestPoints(body, other, reach, index, other_index, physicsClientId=world.client):
+            reach = (
+                REACH - link_padding(world.client, body, index) - link_padding(world.client, other_body, other_index)
+            )
+            if engine.getClosestPoints(body, other_body, reach, index, other_index, physicsClientId=world.client):
                 touching.append((name, other_name))
     return touching

@@ -82,6 +82,6 @@ def _deepest(
     depths = [link_depth(world, first.body_id, a, second.body_id, b) for a, b in pairs]
     if not depths or max(depths) <= smallest:
         return []
-    place = depths.index(max(depths))
-    names = (world.link_name(first.body_id, pairs[place][0]), world.link_name(second.body_id, pairs[place][1]))
-    return [Overlap(first.name, second.name, *names, depths[place])]
+    deepest = depths.index(max(depths))
+    names = (world.link_name(first.body_id, pairs[deepest][0]), world.link_name(second.body_id, pairs[deepest][1]))
+    return [Overlap(first.name, second.name, *names, depths[deepest])]

@@ -37,10 +37,10 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         bodies = given_way(context.output, bodies)
     cut = sum(bool(body.cut) for body in bodies)
     if cut:
-        scene = write_scene_bundle(context.output, _written(bodies), graph)
-    held = _wedged(context)
-    if held:
-        bodies = _held(context.output, bodies, held)
+        scene = write_scene_bundle(context.output, _for_rewriting(bodies), graph)
+    wedged = _find_wedged(context)
+    if wedged:
+        bodies = _hold(context.output, bodies, wedged)
         scene = write_scene_bundle(context.output, bodies, graph)
     rested = 0
     if parameters.rest:
@@ -48,7 +48,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
             laid = rested_bodies(context.output, bodies)
             rested = sum(body.reconstructed is not None for body in laid)
             if rested:
-                scene = write_scene_bundle(context.output, _written(laid), graph)
+                scene = write_scene_bundle(context.output, _for_rewriting(laid), graph)
     with context.progress.step("write what stands beside it"):
         write_exports(context.output, scene)
     summary: dict[str, float | str] = {
@@ -57,7 +57,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         "joints": sum(len(body.joints) for body in scene.bodies),
         "cad_models": sum(body.model is not None for body in bodies),
         "rested": rested,
-        "held": len(held),
+        "held": len(wedged),
         "cut": cut,
     }
     outcome = "ok" if scene.bodies else "empty"
@@ -71,27 +71,29 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
     return InteractiveScene(context.output, outcome=outcome, summary=summary)
 
 
-def _wedged(context: Context) -> dict[str, str]:
+def _find_wedged(context: Context) -> dict[str, str]:
     """Return the furniture of the scene just written that cannot be free, and say so."""
     with context.progress.step("look for what is wedged"):
-        held = wedged_furniture(context.output)
-    for name, other in sorted(held.items()):
-        context.logger.warning("%s could be pushed but lies in %s: it stays", name, other)
-    return held
+        carrier_of = wedged_furniture(context.output)
+    for name, carrier in sorted(carrier_of.items()):
+        context.logger.warning("%s could be pushed but lies in %s: it stays", name, carrier)
+    return carrier_of
 
 
-def _held(root: Path, bodies: list[BundleBody], held: Collection[str]) -> list[BundleBody]:
+def _hold(root: Path, bodies: list[BundleBody], wedged: Collection[str]) -> list[BundleBody]:
     """Return the bodies for another writing into `root`, some of them held; removes what only free ones have there."""
-    for name in held:
+    for name in wedged:
         (root / "bodies" / f"{name}.urdf").unlink()
         for pattern in ("collision_*.obj", "cut_*.obj"):
             for file in (root / "meshes" / name).glob(pattern):
                 file.unlink()
-    again = _written(bodies)
-    return [replace(body, movable=False, furniture=False, cut={}) if body.name in held else body for body in again]
+    rewritten = _for_rewriting(bodies)
+    return [
+        replace(body, movable=False, furniture=False, cut={}) if body.name in wedged else body for body in rewritten
+    ]
 
 
-def _written(bodies: Sequence[BundleBody]) -> list[BundleBody]:
+def _for_rewriting(bodies: Sequence[BundleBody]) -> list[BundleBody]:
     """Return the bodies for another writing into the same folder."""
     return [replace(body, mesh_is_written=body.mesh is not None) for body in bodies]
 

@@ -40,12 +40,14 @@ def held(free: Mapping[str, float], carried: Iterable[str], overlaps: Iterable[O
     loose = set(carried)
     pairs = [(o.first, o.second) for o in overlaps if o.first != o.second and not {o.first, o.second} & loose]
     meets = [pair for a, b in pairs for pair in ((a, b), (b, a)) if pair[0] in free]
-    found: dict[str, str] = {}
+    wedged_in: dict[str, str] = {}
     while True:
-        open_pairs = [(name, other) for name, other in meets if name not in found]
-        fast = [(name, other) for name, other in open_pairs if other not in free or other in found]
+        open_pairs = [(name, other_name) for name, other_name in meets if name not in wedged_in]
+        fast = [
+            (name, other_name) for name, other_name in open_pairs if other_name not in free or other_name in wedged_in
+        ]
         if not fast and open_pairs:
             fast = [max(open_pairs, key=lambda pair: (free[pair[0]], pair[0]))]
         if not fast:
-            return found
-        found |= {name: other for name, other in reversed(fast)}
+            return wedged_in
+        wedged_in |= {name: other_name for name, other_name in reversed(fast)}

@@ -18,9 +18,11 @@ from scenewright.stages.kit.open_words.options import EncoderParameters
 LEAST = 0.5
 """Probability of an answer, as `splat query` takes it unless it is told otherwise."""
 MOST = 10
+"""Most answers that are shown."""
 COLD = 0.5
 """Relevancy from which on a Gaussian is shown warm: what fits no better than the canonical phrases has none."""
 MOST_WARM = 40_000
+"""Most Gaussians that are shown warm; by eye."""
 
 
 class Asking:
@@ -51,11 +53,11 @@ class Asking:
         began, finder = time.perf_counter(), self._finder
         fits, ranking = finder.fits(text), finder.find(text)
         seconds = time.perf_counter() - began
-        kept = [found for found in ranking if found.probability >= LEAST][:MOST]
-        below = next((found for found in ranking if found.probability < LEAST), None)
+        answers = [candidate for candidate in ranking if candidate.probability >= LEAST][:MOST]
+        below = next((candidate for candidate in ranking if candidate.probability < LEAST), None)
         return {
             "text": text,
-            "answers": [self._place(found) for found in kept],
+            "answers": [self._place(candidate) for candidate in answers],
             "next_best": None if below is None else self._place(below),
             "unread": list(finder.encoder.unread(text)),
             "calibrated": finder.calibration.fitted,
@@ -64,11 +66,11 @@ class Asking:
             **self._warmth(fits.gaussians),
         }
 
-    def _place(self, found: Found) -> dict[str, Any]:
+    def _place(self, answer: Found) -> dict[str, Any]:
         assert self._finder is not None
-        region = self._finder.info.regions[found.region]
+        region = self._finder.info.regions[answer.region]
         return {
-            "probability": round(found.probability, 3),
+            "probability": round(answer.probability, 3),
             "name": f"{region.class_name}_{region.instance}" if region.class_name else "",
             "center": [round(value, 3) for value in region.box.center],
             "corners": np.round(box_corners(region.box), 4).ravel().tolist(),

@@ -25,6 +25,7 @@ from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas, ServedPa
 
 SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("editing.js", "asking.js"))
 EMPTY = EditsFile(format="scenewright-edits", version=1)
+"""What a desk without a file of edits applies."""
 
 
 class Stale(BadInput):
@@ -77,20 +78,20 @@ class Desk:
             revision = revision_of(self.edits)
             if revision == self._revision:
                 return
-            asked: Sequence[AnyEdit] = (read_edits(self.edits) if revision else EMPTY).edits
+            all_edits: Sequence[AnyEdit] = (read_edits(self.edits) if revision else EMPTY).edits
         except ScenewrightError as error:
             self._trouble = str(error)
             return
         self._trouble = ""
         done = len(self._applied)
-        if tuple(asked[:done]) != self._applied:
+        if tuple(all_edits[:done]) != self._applied:
             self._records, done = [], 0
             for subject in self.subjects:
                 subject.restart()
-        for record in (record for subject in self.subjects for record in subject.apply(asked[done:])):
+        for record in (record for subject in self.subjects for record in subject.apply(all_edits[done:])):
             self._records.append(record.model_copy(update={"number": done + record.number}))
         self._records.sort(key=lambda record: record.number)
-        self._applied, self._revision = tuple(asked), revision
+        self._applied, self._revision = tuple(all_edits), revision
 
     # ---- what the page shows -----------------------------------------------------------------------------------------
     def page(self) -> bytes:
@@ -133,9 +134,9 @@ class Desk:
             "artifact": self.shown,
             "read_only": self.read_only,
             "revision": self._revision or "",
-            "forms": [form | {"of": one.artifact.kind} for one in self.subjects for form in forms_of(one.table)],
+            "forms": [form | {"of": each.artifact.kind} for each in self.subjects for form in forms_of(each.table)],
             "classes": [entry.name for entry in load_vocabulary().classes],
-            "next": [cleaned(f"{one.command()} --edits {self.edits} --out ...") for one in self.subjects],
+            "next": [cleaned(f"{each.command()} --edits {self.edits} --out ...") for each in self.subjects],
             "shows_edits": self._shows_edits,
             **self.subjects[0].facts(),
         }
@@ -146,21 +147,23 @@ class Desk:
         with self._turn:
             trouble = ""
             try:
-                if (there := self._there()) != self.shown:
+                if (shown_now := self._there()) != self.shown:
                     trouble = "what lies in the folder was made anew: load the page again to see it"
             except ScenewrightError as error:
-                there, trouble = "", cleaned(str(error))
-            told: dict[str, Any] = {"artifact": there, "trouble": trouble}
+                shown_now, trouble = "", cleaned(str(error))
+            state: dict[str, Any] = {"artifact": shown_now, "trouble": trouble}
             if self.edits is not None:
                 self._apply()
-                rows = [{**record.model_dump(mode="json"), "of": _said(edit)} for record, edit in self._pairs()]
-                told |= {
+                rows = [
+                    {**record.model_dump(mode="json"), "of": _edit_in_words(edit)} for record, edit in self._pairs()
+                ]
+                state |= {
                     "trouble": trouble or cleaned(self._trouble),
                     "revision": self._revision or "",
                     "rows": rows,
                     "things": [thing.name for thing in self.subjects[0].state.things()],
                 }
-            return told
+            return state
 
     def _pairs(self) -> Iterator[tuple[AppliedEdit, Edit]]:
         return ((record, self._applied[record.number - 1]) for record in self._records)
@@ -182,7 +185,7 @@ class Desk:
         """
         with self._turn:
             file = self._check_fresh(artifact, revision)
-            edit = asked_edit(by, note, self._anchored(asked))
+            edit = asked_edit(by, note, self._with_anchors(asked))
             append_edits(file, [edit], as_read=revision)
             return self.now()
 
@@ -202,23 +205,27 @@ class Desk:
             raise Changed(f"{self.edits}: somebody else has changed it meanwhile", hint=UNWRITTEN)
         return self.edits
 
-    def _anchored(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def _with_anchors(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of an edit with anchors where things are named."""
-        forms = {form["what"]: (one, form["fields"]) for one in self.subjects for form in forms_of(one.table)}
-        what = asked.get("what")
-        if not isinstance(what, str) or what not in forms:
-            raise UsageError(f"there is no edit {what!r:.40} here", hint=f"there are {', '.join(forms)}")
-        subject, fields = forms[what]
-        return subject.fields(what, fields, asked)
+        forms = {form["what"]: (each, form["fields"]) for each in self.subjects for form in forms_of(each.table)}
+        edit_name = request.get("what")
+        if not isinstance(edit_name, str) or edit_name not in forms:
+            raise UsageError(f"there is no edit {edit_name!r:.40} here", hint=f"there are {', '.join(forms)}")
+        subject, fields = forms[edit_name]
+        return subject.fields(edit_name, fields, request)
 
 
-def _said(edit: Edit) -> str:
+def _edit_in_words(edit: Edit) -> str:
     """Return an edit in a few words."""
     values = edit.model_dump(mode="json", by_alias=True, exclude={"what", "by", "when", "note"}, exclude_defaults=True)
     of = values.get("of")
-    things = of if isinstance(of, list) else [of] if isinstance(of, dict) else []
+    anchors = of if isinstance(of, list) else [of] if isinstance(of, dict) else []
     words = [
-        "{} at ({:.2f}, {:.2f}, {:.2f})".format(thing["class"], *thing["point"]) for thing in things if "point" in thing
+        "{} at ({:.2f}, {:.2f}, {:.2f})".format(anchor["class"], *anchor["point"])
+        for anchor in anchors
+        if "point" in anchor
     ]
-    rest = [f"{key}: {value}" for key, value in values.items() if isinstance(value, str | int | float) and value != ""]
-    return cleaned(" + ".join(words) + (" → " if words and rest else "") + ", ".join(rest))
+    values_text = [
+        f"{key}: {value}" for key, value in values.items() if isinstance(value, str | int | float) and value != ""
+    ]
+    return cleaned(" + ".join(words) + (" → " if words and values_text else "") + ", ".join(values_text))

@@ -31,40 +31,40 @@ def kinds_of(union: Any) -> tuple[type[edits.Edit], ...]:
 
 def forms_of(kinds: Iterable[type[edits.Edit]]) -> list[Form]:
     """Return the forms of the kinds that can be asked for on a page, as JSON: `what`, `says`, and `fields`."""
-    found = []
+    forms = []
     for kind in kinds:
-        asked = {
+        field_infos = {
             info.alias or name: info
             for name, info in kind.model_fields.items()
             if name not in OF_ALL and edits.Asked.NOT not in info.metadata
         }
-        fields = [field_of(name, info) for name, info in asked.items()]
+        fields = [field_of(name, info) for name, info in field_infos.items()]
         if all(field is not None for field in fields):
-            (what,) = get_args(kind.model_fields["what"].annotation)
-            found.append({"what": what, "says": (kind.__doc__ or "").split("\n")[0], "fields": fields})
-    return found
+            (edit_name,) = get_args(kind.model_fields["what"].annotation)
+            forms.append({"what": edit_name, "says": (kind.__doc__ or "").split("\n")[0], "fields": fields})
+    return forms
 
 
 def field_of(name: str, info: FieldInfo) -> Form | None:
     """Return how a field is asked for, as JSON: `name`, `kind`, `needed` and what goes with its kind; None when a page
     cannot ask for it."""
     needed = info.is_required()
-    asked = _kind_of(info.annotation, tuple(info.metadata))
-    if asked is None:
+    kind_form = _kind_of(info.annotation, tuple(info.metadata))
+    if kind_form is None:
         return None
     start = None if needed or not isinstance(info.default, str | int | float | bool) else info.default
-    if not needed and (word := WITHOUT.get(asked["kind"])) is not None:
-        needed, asked = True, {**asked, "choices": [*asked.get("choices", ()), word]}
-    return {"name": name, "needed": needed, "start": start, **asked}
+    if not needed and (word := WITHOUT.get(kind_form["kind"])) is not None:
+        needed, kind_form = True, {**kind_form, "choices": [*kind_form.get("choices", ()), word]}
+    return {"name": name, "needed": needed, "start": start, **kind_form}
 
 
 def _kind_of(annotation: Any, metadata: tuple[Any, ...]) -> Form | None:
     if get_origin(annotation) is Annotated:
-        inner, *more = get_args(annotation)
-        return _kind_of(inner, (*metadata, *more))
-    said = next((one for one in metadata if isinstance(one, edits.Asked)), None)
-    if said is not None:
-        return {"kind": said.value}
+        inner, *further_metadata = get_args(annotation)
+        return _kind_of(inner, (*metadata, *further_metadata))
+    asked_kind = next((each for each in metadata if isinstance(each, edits.Asked)), None)
+    if asked_kind is not None:
+        return {"kind": asked_kind.value}
     if annotation == Point:
         return {"kind": "point"}
     if get_origin(annotation) in (Union, types.UnionType):
@@ -84,31 +84,31 @@ def _kind_of(annotation: Any, metadata: tuple[Any, ...]) -> Form | None:
     if annotation in (int, float):
         return {"kind": "number", **_bounds(metadata)}
     if annotation is str:
-        is_class = any(isinstance(one, AfterValidator) and one in get_args(edits.ClassName) for one in metadata)
+        is_class = any(isinstance(each, AfterValidator) and each in get_args(edits.ClassName) for each in metadata)
         return {"kind": "class" if is_class else "text"}
     return None
 
 
-def _kind_of_union(parts: list[Any], metadata: tuple[Any, ...]) -> Form | None:
+def _kind_of_union(members: list[Any], metadata: tuple[Any, ...]) -> Form | None:
     """Of a thing or a word (`floor`), a choice of which the thing is one."""
-    if len(parts) == 1:
-        return _kind_of(parts[0], metadata)
-    words = [word for part in parts if get_origin(part) is Literal for word in get_args(part)]
-    others = [part for part in parts if get_origin(part) is not Literal]
+    if len(members) == 1:
+        return _kind_of(members[0], metadata)
+    words = [word for part in members if get_origin(part) is Literal for word in get_args(part)]
+    others = [part for part in members if get_origin(part) is not Literal]
     if len(others) == 1 and others[0] is edits.Anchor:
         return {"kind": "thing", "choices": words}
     return None
 
 
-def _kind_of_tuple(parts: tuple[Any, ...], metadata: tuple[Any, ...]) -> Form | None:
-    if parts == (edits.Anchor, ...):
-        fewest = next((one.min_length for one in metadata if hasattr(one, "min_length")), 1)
+def _kind_of_tuple(members: tuple[Any, ...], metadata: tuple[Any, ...]) -> Form | None:
+    if members == (edits.Anchor, ...):
+        fewest = next((each.min_length for each in metadata if hasattr(each, "min_length")), 1)
         return {"kind": "things", "fewest": fewest}
-    if len(parts) == 2 and parts[0] == Point and parts[1] is Ellipsis:
-        fewest = next((one.min_length for one in metadata if hasattr(one, "min_length")), 1)
+    if len(members) == 2 and members[0] == Point and members[1] is Ellipsis:
+        fewest = next((each.min_length for each in metadata if hasattr(each, "min_length")), 1)
         return {"kind": "points", "fewest": fewest}
-    if Ellipsis not in parts and all(part is float or _is_number(part) for part in parts):
-        return {"kind": "numbers", "count": len(parts)}
+    if Ellipsis not in members and all(part is float or _is_number(part) for part in members):
+        return {"kind": "numbers", "count": len(members)}
     return None
 
 
@@ -117,10 +117,10 @@ def _is_number(part: Any) -> bool:
 
 
 def _bounds(metadata: tuple[Any, ...]) -> Form:
-    found: Form = {}
-    for one in metadata:
+    bounds: Form = {}
+    for each in metadata:
         for side, names in (("least", ("ge", "gt")), ("most", ("le", "lt"))):
             for name in names:
-                if getattr(one, name, None) is not None:
-                    found[side] = float(getattr(one, name))
-    return found
+                if getattr(each, name, None) is not None:
+                    bounds[side] = float(getattr(each, name))
+    return bounds

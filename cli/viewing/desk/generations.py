@@ -17,8 +17,8 @@ Kind = TypeVar("Kind", bound=Artifact)
 def before_edits(artifact: Artifact, edits: Path) -> Artifact:
     """Return what an artifact was before the edits of a file were applied to it, where that is there still."""
     for _ in range(MOST_GENERATIONS):
-        given = artifact.manifest.inputs if artifact.manifest is not None else ()
-        if not any((artifact.root / record.path).resolve() == edits.resolve() for record in given):
+        inputs = artifact.manifest.inputs if artifact.manifest is not None else ()
+        if not any((artifact.root / record.path).resolve() == edits.resolve() for record in inputs):
             return artifact
         artifact = input_artifact(artifact, type(artifact)) or artifact
     return artifact
@@ -29,16 +29,18 @@ def behind(artifact: Artifact, wanted: type[Kind]) -> Iterator[Kind]:
     waiting = [artifact]
     for _ in range(MOST_GENERATIONS):
         below: list[Artifact] = []
-        for one in waiting:
-            if isinstance(one, wanted):
-                yield one
+        for candidate in waiting:
+            if isinstance(candidate, wanted):
+                yield candidate
                 continue
-            found = input_artifact(one, wanted)
-            if found is not None:
-                yield found
+            source = input_artifact(candidate, wanted)
+            if source is not None:
+                yield source
                 continue
-            kinds = {record.kind for record in one.manifest.inputs} if one.manifest is not None else set()
-            below += [made for kind in sorted(kinds) if (made := _input_of(one, kind)) is not None]
+            kinds = {record.kind for record in candidate.manifest.inputs} if candidate.manifest is not None else set()
+            below += [
+                input_of_kind for kind in sorted(kinds) if (input_of_kind := _input_of(candidate, kind)) is not None
+            ]
         waiting = below
 
 

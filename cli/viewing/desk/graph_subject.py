@@ -39,12 +39,12 @@ class GraphSubject(Subject[GraphState]):
     def facts(self) -> dict[str, Any]:
         """See Subject."""
         nodes = self.state.graph.nodes
-        return {"things": {nodes[k.instance].id: self._known(k, nodes[k.instance]) for k in self.state.things()}} | {
+        return {"things": {nodes[k.instance].id: self._facts_of(k, nodes[k.instance]) for k in self.state.things()}} | {
             "models": []
         }
 
-    def _known(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
+    def _facts_of(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
         link = self.state.graph.parent_link(node.id)
         stands = "" if link is None else f"{link.source} {link.relation.replace('_', ' ')} it"
-        said = [word for word in (stands, node.mark and f"marked {node.mark}", node.model_id) if word]
-        return {"box": written_box(thing.box).model_dump(), "says": "; ".join(said)}
+        words = [word for word in (stands, node.mark and f"marked {node.mark}", node.model_id) if word]
+        return {"box": written_box(thing.box).model_dump(), "says": "; ".join(words)}

@@ -23,15 +23,15 @@ class MapSubject(Subject[MapState]):
     option = "map --panoptic-map"
 
     @cached_property
-    def _seen(self) -> MapState:
+    def _map_state(self) -> MapState:
         assert isinstance(self.artifact, PanopticMap)
         return read_state(self.artifact)[0]
 
     def begun(self) -> MapState:
         """See Subject."""
-        seen = self._seen
-        seen.things()
-        return replace(seen, entities=dict(seen.entities), touched=set(seen.touched), _things=dict(seen._things))
+        state = self._map_state
+        state.things()
+        return replace(state, entities=dict(state.entities), touched=set(state.touched), _things=dict(state._things))
 
     def anchor_of(self, thing: Thing) -> Anchor:
         """See Subject."""

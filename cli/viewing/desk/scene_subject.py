@@ -105,18 +105,18 @@ class SceneSubject(GraphSubject):
         ids |= set() if self._library is None else {model.id for model in self._library.info.models}
         return super().facts() | {"models": sorted(ids)}
 
-    def _known(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
-        known, before = super()._known(thing, node), self.state.replacements.get(node.id)
+    def _facts_of(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
+        fields, before = super()._facts_of(thing, node), self.state.replacements.get(node.id)
         folder = None if node.model_id is None else self.state.model_folder(node.model_id)
         joints = [] if folder is None else list(read_model(folder).joints)
-        held = set() if before is None else set(before.held)
+        held_joints = set() if before is None else set(before.held)
         tried = [] if before is None else [candidate.model_id for _, candidate in candidates_of(before)]
-        return known | {
+        return fields | {
             "joints": [
                 {
                     "name": joint.name,
                     "says": f"{joint.type}, {joint.lower:.3g} to {joint.upper:.3g}, at "
-                    f"{node.joints.get(joint.name, 0.0):.3g}" + (", held" if joint.name in held else ""),
+                    f"{node.joints.get(joint.name, 0.0):.3g}" + (", held" if joint.name in held_joints else ""),
                 }
                 for joint in joints
             ],
@@ -125,13 +125,15 @@ class SceneSubject(GraphSubject):
 
     def command(self) -> str:
         """See Subject."""
-        more = [("--library", self._library), ("--panoptic-map", self._map)]
-        return super().command() + "".join(f" {option} {one.root}" for option, one in more if one is not None)
+        input_options = [("--library", self._library), ("--panoptic-map", self._map)]
+        return super().command() + "".join(
+            f" {option} {artifact.root}" for option, artifact in input_options if artifact is not None
+        )
 
 
-def _is_place(given: object) -> bool:
+def _is_place(value_given: object) -> bool:
     return (
-        isinstance(given, list)
-        and len(given) == 3
-        and all(isinstance(value, int | float) and math.isfinite(value) for value in given)
+        isinstance(value_given, list)
+        and len(value_given) == 3
+        and all(isinstance(value, int | float) and math.isfinite(value) for value in value_given)
     )

@@ -17,7 +17,7 @@ from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedSer
 
 HOST = "127.0.0.1"
 LARGEST_REQUEST = 200_000
-"""Bytes: a hundred things with long names, and a long note."""
+"""Largest request [bytes]: a hundred things with long names, and a long note."""
 HEADERS = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",
@@ -80,12 +80,12 @@ class _Handler(BoundedHandler):
         self.answer(200, json.dumps(self.server.desk.now()).encode(), HEADERS)
 
     def do(self) -> None:
-        self._answered(lambda body: self._done(Asked.model_validate_json(body)))
+        self._send_answer(lambda body: self._do(Asked.model_validate_json(body)))
 
     def ask(self) -> None:
-        self._answered(lambda body: self.server.desk.ask(Question.model_validate_json(body).text))
+        self._send_answer(lambda body: self.server.desk.ask(Question.model_validate_json(body).text))
 
-    def _answered(self, answer: Callable[[bytes], dict[str, Any]]) -> None:
+    def _send_answer(self, answer: Callable[[bytes], dict[str, Any]]) -> None:
         body = self.body()
         if body is None:
             return
@@ -103,8 +103,8 @@ class _Handler(BoundedHandler):
         finally:
             self.done()
 
-    def _done(self, asked: Asked) -> dict[str, Any]:
-        desk, at = self.server.desk, {"artifact": asked.artifact, "revision": asked.revision}
-        if asked.remove is not None:
-            return desk.remove(asked.remove, **at)
-        return desk.append(asked.edit or {}, **at, by=asked.by, note=asked.note)
+    def _do(self, request: Asked) -> dict[str, Any]:
+        desk, at = self.server.desk, {"artifact": request.artifact, "revision": request.revision}
+        if request.remove is not None:
+            return desk.remove(request.remove, **at)
+        return desk.append(request.edit or {}, **at, by=request.by, note=request.note)

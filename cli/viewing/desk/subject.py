@@ -18,7 +18,7 @@ from scenewright.stages.edit.parameters import EditMapParameters
 from scenewright.stages.kit.viewing.canvas import Canvas
 
 FITTING = Fitting(**EditMapParameters.model_validate({}).model_dump())
-"""As the steps take it unless they are told otherwise."""
+"""How edits are fitted, as the steps take it unless they are told otherwise."""
 Held = TypeVar("Held", bound=State)
 
 
@@ -62,26 +62,26 @@ class Subject(ABC, Generic[Held]):
         called = next((thing.instance for thing in things if thing.name == name), self.first.get(str(name)))
         if called is None:
             raise UsageError(f"there is no thing {str(name)!r:.80} here", hint="click on one")
-        found = next((thing for thing in things if thing.instance == called), None)
-        if found is None:
+        match = next((thing for thing in things if thing.instance == called), None)
+        if match is None:
             raise UsageError(f"{name} is not there any more: an edit took it away", hint="delete that edit first")
-        return found
+        return match
 
     def fields(self, what: str, form: Sequence[Mapping[str, Any]], asked: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of an edit out of what a page asks for, where things are named. Raises UsageError."""
         values: dict[str, Any] = {"what": what}
         for field in form:
-            name, kind, given = field["name"], field["kind"], asked.get(field["name"])
-            if given is None or (given in (NOTHING, NO_MODEL) and given in field.get("choices", ())):
+            name, kind, value = field["name"], field["kind"], asked.get(field["name"])
+            if value is None or (value in (NOTHING, NO_MODEL) and value in field.get("choices", ())):
                 continue
-            if kind == "thing" and given not in field.get("choices", ()):
-                given = self._said(self.thing(given))
-            elif kind == "things" and isinstance(given, list):
-                given = [self._said(self.thing(one)) for one in given]
-            values[name] = given
+            if kind == "thing" and value not in field.get("choices", ()):
+                value = self._anchor_fields(self.thing(value))
+            elif kind == "things" and isinstance(value, list):
+                value = [self._anchor_fields(self.thing(name_of_thing)) for name_of_thing in value]
+            values[name] = value
         return values
 
-    def _said(self, thing: Thing) -> dict[str, Any]:
+    def _anchor_fields(self, thing: Thing) -> dict[str, Any]:
         return self.anchor_of(thing).model_dump(mode="json", by_alias=True)
 
     def facts(self) -> dict[str, Any]:

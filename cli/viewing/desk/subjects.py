@@ -31,16 +31,16 @@ def subjects_of(artifact: Artifact, edits: Path) -> list[Subject[Any]]:
 
     Raises BadInput where there is nothing, and what reading it raises.
     """
-    found: list[Subject[Any]] = []
-    taken: frozenset[type[Edit]] = frozenset()
+    subjects: list[Subject[Any]] = []
+    kinds_taken: frozenset[type[Edit]] = frozenset()
     for kind, subject in SUBJECTS:
-        one = next(behind(artifact, kind), None)
-        if one is not None:
-            found.append(subject(before_edits(one, edits), taken))
-            taken |= found[-1].table.keys()
-    if not found:
+        nearest = next(behind(artifact, kind), None)
+        if nearest is not None:
+            subjects.append(subject(before_edits(nearest, edits), kinds_taken))
+            kinds_taken |= subjects[-1].table.keys()
+    if not subjects:
         raise BadInput(
             f"{artifact.root}: neither it nor anything it was made from can be edited, or that is not there any more",
             hint="give a panoptic map, a contact graph or a CAD scene",
         )
-    return found
+    return subjects

@@ -14,13 +14,13 @@ from scenewright.stages.engine.reading import check_sizes, read_manifest
 
 def manifests(folder: Path, steps: Sequence[str]) -> dict[str, Manifest]:
     """Return step -> manifest of the artifacts that are there."""
-    found = {}
+    by_step = {}
     for step in steps:
         try:
-            found[step] = read_manifest(folder / step)
+            by_step[step] = read_manifest(folder / step)
         except BadInput:
             continue
-    return found
+    return by_step
 
 
 def measures(folder: Path, found: dict[str, Manifest]) -> dict[str, float]:

@@ -12,22 +12,22 @@ from scenewright.stages.engine.batch.names import distinct, matched_part, names_
 from scenewright.stages.engine.batch.spec import DataSpec
 
 LARGEST_LIST = 64 * 2**20
-"""Bytes of a list of paths."""
+"""Largest list of paths [bytes]."""
 
 
 def _absolute(text: str, base: Path) -> Path:
     return Path(os.path.abspath(base / os.path.expanduser(text)))
 
 
-def _listed(file: Path, where: str) -> list[str]:
+def _read_list(file: Path, where: str) -> list[str]:
     try:
         lines = file_text(file, LARGEST_LIST, error=UsageError).splitlines()
     except UsageError as error:
         raise UsageError(f"{where}: list: {error}", hint="a text file with one path a line") from None
-    found = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if not found:
+    lines_with_text = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if not lines_with_text:
         raise UsageError(f"{where}: list: {file} names nothing", hint="one path a line")
-    return found
+    return lines_with_text
 
 
 def find_scenes(data: DataSpec, base: Path, where: str) -> list[tuple[str, Path]]:
@@ -38,34 +38,34 @@ def find_scenes(data: DataSpec, base: Path, where: str) -> list[tuple[str, Path]
     """
     if not data.folders and data.glob is None and data.list is None:
         raise UsageError(f"{where}: data: no folders, glob or list", hint="give at least one")
-    named = [_absolute(folder, base) for folder in data.folders]
-    for folder in named:
+    listed = [_absolute(folder, base) for folder in data.folders]
+    for folder in listed:
         if not folder.is_dir():
             raise UsageError(f"{where}: data: {folder}: no such folder", hint="check folders")
     if data.list is not None:
         file = _absolute(data.list, base)
-        for line in _listed(file, where):
+        for line in _read_list(file, where):
             path = _absolute(line, base)
             if not path.exists():
                 raise UsageError(f"{where}: data: {path}: no such file or folder", hint=f"check {file}")
-            named.append(path)
-    found: dict[Path, str] = {}
+            listed.append(path)
+    name_of: dict[Path, str] = {}
     if data.glob is not None:
         pattern = str(Path(os.path.expanduser(data.glob)))
         matches = sorted(glob.glob(pattern, root_dir=base, recursive=True))
         if not matches:
             raise UsageError(f"{where}: data: glob {data.glob}: no match in {base}", hint="check the pattern")
-        found = {_absolute(match, base): matched_part(PurePath(match), pattern) for match in matches}
-    paths = [*named[: len(data.folders)], *found, *named[len(data.folders) :]]
-    seen: dict[str, Path] = {}
+        name_of = {_absolute(match, base): matched_part(PurePath(match), pattern) for match in matches}
+    paths = [*listed[: len(data.folders)], *name_of, *listed[len(data.folders) :]]
+    by_path: dict[str, Path] = {}
     for path in paths:
         if not str(path).isprintable():  # such names survive neither JSON nor a log of lines
             raise UsageError(f"{where}: data: {str(path)!r}: not a printable name", hint="rename it")
         real = os.path.realpath(path)
-        if real in seen:
+        if real in by_path:
             raise UsageError(f"{where}: data: {path} is named twice", hint="each scene once")
-        seen[real] = path
-    names = dict(zip(named, names_from_paths(named), strict=True)) | found
+        by_path[real] = path
+    names = dict(zip(listed, names_from_paths(listed), strict=True)) | name_of
     longer = names_from_paths(paths)
     unique = distinct([[names[path], long] for path, long in zip(paths, longer, strict=True)])
     return list(zip(unique, paths, strict=True))

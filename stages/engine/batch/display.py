@@ -15,9 +15,9 @@ from scenewright.stages.engine.batch.results import SceneResult
 from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower
 
 REFRESH = 0.5
-"""Between two drawings of the table [s]."""
+"""Time between two drawings of the table [s]."""
 LONGEST_TABLE = 30
-"""Rows of running scenes."""
+"""Most rows of running scenes."""
 
 
 class Count:
@@ -42,12 +42,12 @@ class Count:
     def as_text(self) -> str:
         """Return the count for people."""
         ended = self.ended.total()
-        parts = [f"{ended}/{self.total}"]
-        parts += [f"{self.ended[name]} {name}" for name in ("done", "explained", "crashed") if self.ended[name]]
+        phrases = [f"{ended}/{self.total}"]
+        phrases += [f"{self.ended[name]} {name}" for name in ("done", "explained", "crashed") if self.ended[name]]
         remaining = self.remaining_seconds()
         if remaining is not None and ended < self.total:
-            parts.append(f"{format_seconds(remaining)} to go")
-        return ", ".join(parts)
+            phrases.append(f"{format_seconds(remaining)} to go")
+        return ", ".join(phrases)
 
 
 def describe(result: SceneResult) -> str:

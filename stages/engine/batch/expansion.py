@@ -58,12 +58,12 @@ def _pipeline_file(name: str, base: Path) -> Path:
     return Path(os.path.abspath(beside if beside.is_file() else pipeline_path(name)))
 
 
-def _check_names(names: Sequence[str], what: str, where: str, refused: Sequence[str] = ()) -> None:
-    seen: set[str] = set()
+def _check_names(names: Sequence[str], item_kind: str, where: str, refused: Sequence[str] = ()) -> None:
+    taken_names: set[str] = set()
     for name in names:
-        if not is_folder_name(name) or name.casefold() in seen or name in refused:
-            raise UsageError(f"{where}: {what} {name!r}: not a unique folder name", hint="rename it")
-        seen.add(name.casefold())
+        if not is_folder_name(name) or name.casefold() in taken_names or name in refused:
+            raise UsageError(f"{where}: {item_kind} {name!r}: not a unique folder name", hint="rename it")
+        taken_names.add(name.casefold())
 
 
 def _merge(groups: Sequence[tuple[str, Mapping[str, str]]], where: str) -> dict[str, str]:
@@ -87,12 +87,13 @@ def _check_variables(spec: BatchSpec, pipeline: Pipeline, where: str) -> None:
     tables += [(f"parameters {entry.name!r}", tuple(entry.set)) for entry in spec.parameters]
     tables += [("data", (spec.data.variable,))] if spec.data else []
     tables += [("seeds", (spec.seed_variable,))] if spec.seeds else []
-    known = ", ".join(pipeline.variables) or "none"
+    variable_names = ", ".join(pipeline.variables) or "none"
     for table, variables in tables:
         for variable in variables:
             if variable not in pipeline.variables:
                 raise UsageError(
-                    f"{where}: {table}: pipeline {pipeline.name} has no variable {variable!r}", hint=f"it has: {known}"
+                    f"{where}: {table}: pipeline {pipeline.name} has no variable {variable!r}",
+                    hint=f"it has: {variable_names}",
                 )
 
 
@@ -109,14 +110,14 @@ def read_batch(path: Path) -> Batch:
     ]
     _check_names([name for name, _, _ in scenes], "scene", where)
     if spec.data is not None:
-        found = find_scenes(spec.data, base, where)
-        scenes += [(name, "data", {spec.data.variable: str(scene_path)}) for name, scene_path in found]
+        scenes_of_data = find_scenes(spec.data, base, where)
+        scenes += [(name, "data", {spec.data.variable: str(scene_path)}) for name, scene_path in scenes_of_data]
         _check_names([name for name, _, _ in scenes], "scene", where)
     if not scenes:
         raise UsageError(f"{where}: no scene", hint="give [[scene]] or [data]; see docs/BATCH.md")
     # Beside the folders of parameter sets stand, after a change of the batch file, those of steps and seeds.
-    taken = [*(step.name for step in pipeline.step), *(f"seed-{seed}" for seed in spec.seeds)]
-    _check_names([entry.name for entry in spec.parameters], "parameters", where, taken)
+    reserved = [*(step.name for step in pipeline.step), *(f"seed-{seed}" for seed in spec.seeds)]
+    _check_names([entry.name for entry in spec.parameters], "parameters", where, reserved)
     if len(set(spec.seeds)) < len(spec.seeds):
         raise UsageError(f"{where}: seeds: one is there twice", hint="each seed once")
     paths = input_variables(pipeline)
@@ -126,18 +127,18 @@ def read_batch(path: Path) -> Batch:
     for scene, source, scene_settings in scenes:
         for condition in conditions:
             for seed in seeds:
-                own = [(source, scene_settings)]
-                own += [(f"parameters {condition.name!r}", condition.set)] if condition else []
-                own += [("seeds", {spec.seed_variable: str(seed)})] if seed is not None else []
-                settings = absolute_inputs({**spec.set, **_merge(own, where)}, paths, base)
-                parts = (scene, condition.name if condition else None, None if seed is None else f"seed-{seed}")
+                sources = [(source, scene_settings)]
+                sources += [(f"parameters {condition.name!r}", condition.set)] if condition else []
+                sources += [("seeds", {spec.seed_variable: str(seed)})] if seed is not None else []
+                settings = absolute_inputs({**spec.set, **_merge(sources, where)}, paths, base)
+                name_parts = (scene, condition.name if condition else None, None if seed is None else f"seed-{seed}")
                 try:
                     values = resolve_variables(pipeline, settings)
                 except UsageError as error:
                     raise UsageError(f"{where}: scene {scene!r}: {error.message}", hint=error.hint) from None
                 runs.append(
                     PlannedRun(
-                        "/".join(p for p in parts if p),
+                        "/".join(p for p in name_parts if p),
                         scene,
                         condition.name if condition else None,
                         seed,

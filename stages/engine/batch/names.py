@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 RESERVED = frozenset({"results.jsonl", "summary.csv", "summary.md", "summary.html", "slurm"})
 """What the batch itself writes into its folder."""
 _LONGEST = 100
+"""Longest name of a folder [bytes]; longer ones are cut and end in a digest."""
 _UNSAFE = re.compile(r"[^\w.+-]+")
 
 
@@ -49,11 +50,11 @@ def matched_part(path: PurePath, pattern: str) -> str:
     if not magic:
         return path.stem
     after = len(components) - 1 - magic[-1]
-    parts = list(path.parts[magic[0] : len(path.parts) - after])
+    matched = list(path.parts[magic[0] : len(path.parts) - after])
     suffix = PurePath(components[-1]).suffix
-    if parts and not after and suffix and not glob.has_magic(suffix):
-        parts[-1] = parts[-1].removesuffix(suffix)
-    return "-".join(parts) or path.stem
+    if matched and not after and suffix and not glob.has_magic(suffix):
+        matched[-1] = matched[-1].removesuffix(suffix)
+    return "-".join(matched) or path.stem
 
 
 def names_from_paths(paths: Sequence[Path]) -> list[str]:
@@ -61,8 +62,8 @@ def names_from_paths(paths: Sequence[Path]) -> list[str]:
 
     A file is named without its suffix. Paths are absolute and differ, hence the names differ in the end.
     """
-    parts = [(*path.parts[1:-1], path.stem if path.is_file() else path.name) for path in paths]
-    return distinct([["-".join(p[-count:]) for count in range(1, len(p) + 1)] for p in parts])
+    name_chains = [(*path.parts[1:-1], path.stem if path.is_file() else path.name) for path in paths]
+    return distinct([["-".join(p[-count:]) for count in range(1, len(p) + 1)] for p in name_chains])
 
 
 def distinct(candidates: Sequence[Sequence[str]]) -> list[str]:
@@ -74,10 +75,10 @@ def distinct(candidates: Sequence[Sequence[str]]) -> list[str]:
     depth = [0] * len(candidates)
     while True:
         names = [as_folder_name(options[level]) for options, level in zip(candidates, depth, strict=True)]
-        taken: dict[str, list[int]] = {}
+        owners: dict[str, list[int]] = {}
         for k, name in enumerate(names):
-            taken.setdefault(name.casefold(), []).append(k)
-        clashing = [k for group in taken.values() if len(group) > 1 for k in group]
+            owners.setdefault(name.casefold(), []).append(k)
+        clashing = [k for group in owners.values() if len(group) > 1 for k in group]
         deeper = [k for k in clashing if depth[k] + 1 < len(candidates[k])]
         if not deeper:
             for k in clashing:

@@ -34,6 +34,7 @@ BY_EXIT_CODE: dict[int, Outcome] = {
     6: "machine failure",
     130: "interrupted",
 }
+"""Exit codes of a step, by what became of its scene (docs/ARCHITECTURE.md, "Exit codes")."""
 MACHINE_FAILED = 6
 """Exit code of a scene that was stopped at a limit or lost with its worker."""
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 import psutil
 
 _PAUSE = 0.02
-"""Between two looks at a group that is being ended [s]."""
+"""Time between two looks at a group that is being ended [s]."""
 
 
 def descendants(pid: int) -> list[int]:
@@ -18,7 +18,7 @@ def descendants(pid: int) -> list[int]:
 
     The kernel's own list of children costs microseconds; psutil reads the whole process table.
     """
-    found: list[int] = []
+    pids: list[int] = []
     waiting = [pid]
     while waiting:
         parent = waiting.pop()
@@ -33,9 +33,9 @@ def descendants(pid: int) -> list[int]:
                 continue  # it ended in the meantime
             return _descendants_by_table(pid)
         children = [int(word) for text in texts for word in text.split()]
-        found += children
+        pids += children
         waiting += children
-    return found
+    return pids
 
 
 def _descendants_by_table(pid: int) -> list[int]:

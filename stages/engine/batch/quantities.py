@@ -7,14 +7,16 @@ import re
 _QUANTITY = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([A-Za-z]+)")
 _RANGE = re.compile(r"([0-9]+)\s*-\s*([0-9]+)")
 _SECONDS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
+"""Seconds a unit of time."""
 _BYTES = {"B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12} | {
     "KiB": 2**10,
     "MiB": 2**20,
     "GiB": 2**30,
     "TiB": 2**40,
 }
+"""Bytes a unit of size."""
 LARGEST_SEED_RANGE = 100_000
-"""More seeds than this is a typing error, not an experiment."""
+"""Most seeds of a range: more is a typing error, not an experiment."""
 
 
 def _parse(text: str, units: dict[str, int], example: str) -> float:
@@ -54,10 +56,10 @@ def format_seconds(seconds: float) -> str:
     """Return a duration [s] for people: `12.3 s`, `4 min 10 s`, `2 h 05 min`."""
     if seconds < 99.95:
         return f"{seconds:.1f} s"
-    whole = round(seconds)
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    whole_seconds = round(seconds)
+    if whole_seconds < 3600:
+        return f"{whole_seconds // 60} min {whole_seconds % 60:02d} s"
+    return f"{whole_seconds // 3600} h {whole_seconds % 3600 // 60:02d} min"
 
 
 def format_bytes(size: float) -> str:

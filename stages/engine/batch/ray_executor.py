@@ -65,10 +65,10 @@ class RayExecutor:
         """Connect to the cluster. Raises MissingDependency, MachineFailure, or UsageError when no node fits a scene."""
         self._ray: Any = runtime or load_ray()
         self._options = options
-        self._wanted = {"CPU": options.cpus, **options.resources}
+        self._resources = {"CPU": options.cpus, **options.resources}
         memory = options.memory or memory_limit
         if memory is not None:
-            self._wanted["memory"] = float(memory)
+            self._resources["memory"] = float(memory)
         self._jobs: dict[Any, Job] = {}
         self._lost: dict[str, list[str]] = {}
         self._stopping = False
@@ -77,8 +77,10 @@ class RayExecutor:
             self._connect()
         if not self.capacity():
             self.close()
-            wanted = ", ".join(f"{name} {amount:g}" for name, amount in self._wanted.items())
-            raise UsageError(f"no node of the cluster offers what a scene asks for: {wanted}", hint="lower [executor]")
+            requested = ", ".join(f"{name} {amount:g}" for name, amount in self._resources.items())
+            raise UsageError(
+                f"no node of the cluster offers what a scene asks for: {requested}", hint="lower [executor]"
+            )
         self._task = self._ray.remote(run_on_worker).options(
             num_cpus=options.cpus,
             memory=memory,
@@ -99,7 +101,7 @@ class RayExecutor:
 
     def capacity(self) -> int:
         """Return how many scenes fit on the nodes that are alive, and one more so that none waits for us."""
-        total = sum(fitting(node["Resources"], self._wanted) for node in self._ray.nodes() if node["Alive"])
+        total = sum(fitting(node["Resources"], self._resources) for node in self._ray.nodes() if node["Alive"])
         if not total:
             return 0
         return min(total + 1, self._options.jobs) if self._options.jobs else total + 1
@@ -117,8 +119,8 @@ class RayExecutor:
             return []
         ready, _ = self._ray.wait(list(self._jobs), num_returns=1, timeout=timeout)
         if ready:
-            more, _ = self._ray.wait(list(self._jobs), num_returns=len(self._jobs), timeout=0)
-            ready = list(dict.fromkeys([*ready, *more]))
+            ready_now, _ = self._ray.wait(list(self._jobs), num_returns=len(self._jobs), timeout=0)
+            ready = list(dict.fromkeys([*ready, *ready_now]))
         results = [self._take(reference) for reference in ready]
         return [result for result in results if result is not None]
 

@@ -16,8 +16,9 @@ from scenewright.stages.engine.batch.outcomes import Outcome
 
 RESULTS_NAME = "results.jsonl"
 LARGEST_RESULTS = 2**30
-"""Bytes: a million scenes."""
+"""Largest file of results [bytes]: a million scenes."""
 FORMAT = 1
+"""Version of the lines of results.jsonl."""
 
 
 class SceneResult(Model):

@@ -9,6 +9,7 @@ from pathlib import Path
 LOG_NAME = "batch.log"
 _STEP = re.compile(rb"^\[\d+/\d+\] ([a-z][a-z0-9_]*)$")
 _LONGEST_REASON = 500
+"""Longest reason in a result [characters]; longer ones are cut."""
 _LONGEST_LINE = 64 * 2**10
 """A line beyond this [bytes] is noise of a native library; its beginning is enough."""
 

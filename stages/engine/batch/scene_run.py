@@ -45,9 +45,9 @@ LAUNCHER = Path(__file__).with_name("launcher.py")
 PROCESS_NAME = ".batch-process.json"
 """Beside the log while a scene runs: who runs it, for the next batch to end it if this one is killed."""
 LONGEST_PAUSE = 0.05
-"""Between two looks at the process [s]."""
+"""Longest time between two looks at the process [s]."""
 SAMPLE_INTERVAL = 0.25
-"""Between two looks at its memory [s]."""
+"""Time between two looks at the process's memory [s]."""
 MEMORY_GRACE = 1.0
 """A scene over its memory limit endangers the others: it has this long to stop [s]."""
 
@@ -136,7 +136,7 @@ def start_scene(job: Job, log: int) -> Process:
 
 def _watch(job: Job, process: Process, cancelled: Callable[[], bool]) -> _Watched:
     """Wait for the end of a scene, and bring it about at a limit."""
-    found = _Watched()
+    watched = _Watched()
     begun = time.monotonic()
     next_sample, kill_at, grace = begun, None, job.grace
     with closing(_Pauses(process.pid)) as pauses:
@@ -144,18 +144,18 @@ def _watch(job: Job, process: Process, cancelled: Callable[[], bool]) -> _Watche
             now = time.monotonic()
             if now >= next_sample:
                 memory = resident_memory(process.pid)
-                found.peak_memory = max(found.peak_memory, memory)
+                watched.peak_memory = max(watched.peak_memory, memory)
                 next_sample = now + min(SAMPLE_INTERVAL, now - begun)  # short scenes are looked at more often
             else:
                 memory = 0
             if kill_at is None:
                 if cancelled():
-                    found.stopped_by = "interrupted"
+                    watched.stopped_by = "interrupted"
                 elif job.time_limit is not None and now - begun > job.time_limit:
-                    found.stopped_by = "time limit"
+                    watched.stopped_by = "time limit"
                 elif job.memory_limit is not None and memory > job.memory_limit:
-                    found.stopped_by, grace = "memory limit", min(job.grace, MEMORY_GRACE)
-                if found.stopped_by is not None:
+                    watched.stopped_by, grace = "memory limit", min(job.grace, MEMORY_GRACE)
+                if watched.stopped_by is not None:
                     signal_group(process.pid, signal.SIGTERM)
                     kill_at = now + grace
             elif now > kill_at:
@@ -163,13 +163,13 @@ def _watch(job: Job, process: Process, cancelled: Callable[[], bool]) -> _Watche
             pauses.pause()
     signal_group(process.pid, signal.SIGKILL)  # what it started and left behind
     _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = found.status = os.waitstatus_to_exitcode(status)
-    found.processor_seconds = usage.ru_utime + usage.ru_stime  # with those of the steps, for which it waited
+    process.returncode = watched.status = os.waitstatus_to_exitcode(status)
+    watched.processor_seconds = usage.ru_utime + usage.ru_stime  # with those of the steps, for which it waited
     # A spike between two looks shows in the largest process at least [KiB]. The figure begins with what this process
     # held when it forked, so it says something only above our own peak.
     if usage.ru_maxrss > resource.getrusage(resource.RUSAGE_SELF).ru_maxrss:
-        found.peak_memory = max(found.peak_memory, usage.ru_maxrss * 1024)
-    return found
+        watched.peak_memory = max(watched.peak_memory, usage.ru_maxrss * 1024)
+    return watched
 
 
 def _stop_at_once(process: Process, grace: float) -> None:
@@ -182,17 +182,17 @@ def _stop_at_once(process: Process, grace: float) -> None:
     process.wait()
 
 
-def _describe(job: Job, found: _Watched, follower: LogFollower) -> tuple[Outcome, int, str]:
+def _describe(job: Job, watched: _Watched, follower: LogFollower) -> tuple[Outcome, int, str]:
     """Return outcome, exit code and reason."""
-    if found.stopped_by == "time limit":
+    if watched.stopped_by == "time limit":
         return "time limit", MACHINE_FAILED, f"ran longer than {format_seconds(job.time_limit or 0)}"
-    if found.stopped_by == "memory limit":
-        text = f"took {format_bytes(found.peak_memory)}, the limit is {format_bytes(job.memory_limit or 0)}"
+    if watched.stopped_by == "memory limit":
+        text = f"took {format_bytes(watched.peak_memory)}, the limit is {format_bytes(job.memory_limit or 0)}"
         return "memory limit", MACHINE_FAILED, text
-    outcome, code = classify(found.status)
+    outcome, code = classify(watched.status)
     if outcome == "done":
         return outcome, code, ""
-    number = signal_of(found.status)
+    number = signal_of(watched.status)
     if number is not None:
         text = f"died of {signal_name(number)}"
         if number == signal.SIGKILL:
@@ -245,14 +245,14 @@ def run_processes(
                 record.write_text(
                     json.dumps({"group": process.pid, "created": created_at(process.pid) or 0.0, "host": this_host()})
                 )
-                found = _watch(job, process, cancelled)
+                watched = _watch(job, process, cancelled)
             except BaseException:
                 _stop_at_once(process, job.grace)
                 raise
             finally:
                 record.unlink(missing_ok=True)
-            if found.stopped_by is not None:
-                os.write(log, f"# stopped: {found.stopped_by}\n".encode())
+            if watched.stopped_by is not None:
+                os.write(log, f"# stopped: {watched.stopped_by}\n".encode())
         finally:
             os.close(log)
     except OSError as error:
@@ -265,33 +265,33 @@ def run_processes(
                 "seconds": round(time.monotonic() - begun, 3),
             }
         )
-    if found.stopped_by == "interrupted":
+    if watched.stopped_by == "interrupted":
         return None
     follower = LogFollower(folder / LOG_NAME, job.steps, position)
     follower.look(final=True)
-    outcome, code, reason = _describe(job, found, follower)
+    outcome, code, reason = _describe(job, watched, follower)
     steps = job.steps
     if outcome != "done":
         reached = steps.index(follower.step) if follower.step is not None else 0
         steps = steps[: reached + (outcome == "not ok")]
-    made = manifests(folder, steps)
+    written = manifests(folder, steps)
     failed_step = None if outcome == "done" else follower.step
     if outcome == "not ok":  # the chain may have gone on after it
-        failed_step = next((step for step, manifest in made.items() if manifest.outcome != "ok"), failed_step)
+        failed_step = next((step for step, manifest in written.items() if manifest.outcome != "ok"), failed_step)
     return SceneResult.model_validate(
         identity
         | {
-            "measures": measures(folder, made),
+            "measures": measures(folder, written),
             "outcome": outcome,
             "exit_code": code,
             "failed_step": failed_step,
             "reason": reason,
             "seconds": round(time.monotonic() - begun, 3),
-            "peak_memory_bytes": found.peak_memory,
-            "processor_seconds": round(found.processor_seconds, 3),
-            "artifact_bytes": sum(file.bytes for manifest in made.values() for file in manifest.files),
-            "artifacts": {step: manifest.content_digest for step, manifest in made.items()},
-            "outcomes": {step: manifest.outcome for step, manifest in made.items() if manifest.outcome != "ok"},
+            "peak_memory_bytes": watched.peak_memory,
+            "processor_seconds": round(watched.processor_seconds, 3),
+            "artifact_bytes": sum(file.bytes for manifest in written.values() for file in manifest.files),
+            "artifacts": {step: manifest.content_digest for step, manifest in written.items()},
+            "outcomes": {step: manifest.outcome for step, manifest in written.items() if manifest.outcome != "ok"},
         }
     )
 

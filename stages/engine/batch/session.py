@@ -189,7 +189,7 @@ def run_task(
     unknown = [name for name in names if name not in by_name]
     if unknown:
         raise UsageError(f"{batch.path}: has no scene {unknown[0]!r} any more", hint="write the scripts again")
-    own = [by_name[name] for name in names]
+    jobs_of_task = [by_name[name] for name in names]
     path = part_path(out, index)
     with (
         folder_lock(out, shared=True),
@@ -197,8 +197,8 @@ def run_task(
         ResultsFile(path) as results,
     ):
         before = [*read_results(out / RESULTS_NAME), *read_results(path)]
-        reasons = missing_jobs(own, latest_by_job(before), "all" if force else retry)
-        todo = [job for job in own if job.name in reasons]
+        reasons = missing_jobs(jobs_of_task, latest_by_job(before), "all" if force else retry)
+        todo = [job for job in jobs_of_task if job.name in reasons]
         with display_for(len(todo), say, terminal=False, quiet=quiet) as display:
             progress = run_jobs(
                 todo,
@@ -207,10 +207,10 @@ def run_task(
                 stop_after_failures=batch.spec.limits.stop_after_failures,
                 observer=display,
             )
-        standing = _standing(own, [*before, *progress.results])
+        standing = _standing(jobs_of_task, [*before, *progress.results])
     if progress.ended == "interrupted":
         raise KeyboardInterrupt
-    return BatchEnd(tuple(own), standing, tuple(progress.results))
+    return BatchEnd(tuple(jobs_of_task), standing, tuple(progress.results))
 
 
 def collect_tasks(batch: Batch, out: Path) -> BatchEnd:

@@ -51,7 +51,7 @@ def part_of(names: Sequence[str], index: int, count: int) -> list[str]:
 
 
 LARGEST_LIST = 64 * 2**20
-"""Bytes of the list of jobs."""
+"""Largest list of jobs [bytes]."""
 
 
 def parse_task(text: str) -> tuple[int, int]:
@@ -118,11 +118,11 @@ def write_scripts(
     folder, tasks = out / FOLDER_NAME, task_count(len(jobs), options)
     words = [sys.executable, "-m", "scenewright", "batch", str(spec_path), "--out", str(out)]
     base = shlex.join(words)
-    more = "".join(f" {shlex.quote(word)}" for word in extra)
+    extra_words = "".join(f" {shlex.quote(word)}" for word in extra)
     array = _script(
         _array_directives(folder, jobs, options, tasks),
         options,
-        f'exec {base} --task "${{SLURM_ARRAY_TASK_ID}}/{tasks}"{more}',
+        f'exec {base} --task "${{SLURM_ARRAY_TASK_ID}}/{tasks}"{extra_words}',
     )
     log = str(folder).replace("%", "%%")
     collect = _script(
@@ -134,11 +134,11 @@ def write_scripts(
         options,
         f"exec {base} --collect",
     )
-    here = shlex.quote(str(folder))
+    quoted_folder = shlex.quote(str(folder))
     submit = (
         "#!/bin/bash\nset -eu\n"
-        f"array=$(sbatch --parsable {here}/array.sh)\n"
-        f'sbatch --dependency="afterany:${{array%%;*}}" {here}/collect.sh\n'
+        f"array=$(sbatch --parsable {quoted_folder}/array.sh)\n"
+        f'sbatch --dependency="afterany:${{array%%;*}}" {quoted_folder}/collect.sh\n'
     )
     texts = {LIST_NAME: "\n".join(job.name for job in jobs) + "\n", "array.sh": array, "collect.sh": collect}
     try:
@@ -157,14 +157,17 @@ def merge_parts(out: Path, results: ResultsFile) -> int:
 
     A part is removed after its lines are on disk; lines that are there already (a kill in between) are not doubled.
     """
-    parts = sorted((out / FOLDER_NAME).glob("results-*.jsonl"))
-    if not parts:
+    part_files = sorted((out / FOLDER_NAME).glob("results-*.jsonl"))
+    if not part_files:
         return 0
-    known = {result.as_line() for result in read_results(out / RESULTS_NAME)}
-    found = {result.as_line(): result for part in parts for result in read_results(part)}
-    new = sorted((found[line] for line in found.keys() - known), key=lambda result: (result.started, result.job))
-    for result in new:
+    known_lines = {result.as_line() for result in read_results(out / RESULTS_NAME)}
+    result_of_line = {result.as_line(): result for part in part_files for result in read_results(part)}
+    missing_results = sorted(
+        (result_of_line[line] for line in result_of_line.keys() - known_lines),
+        key=lambda result: (result.started, result.job),
+    )
+    for result in missing_results:
         results.append(result)
-    for part in parts:
+    for part in part_files:
         part.unlink()
-    return len(new)
+    return len(missing_results)

@@ -35,7 +35,7 @@ def check_storage(url: str, timeout: float) -> None:
         finally:
             files.rm_file(f"{root}/{name}")
 
-    if _asked(url, timeout, ask) != token:
+    if _ask_storage(url, timeout, ask) != token:
         raise MachineFailure(f"{url}: gives back other bytes than were written there", hint=HINT)
 
 
@@ -53,14 +53,14 @@ def send(folder: Path, steps: Sequence[str], url: str, timeout: float) -> None:
             if files.exists(f"{root}/{step}/{MANIFEST_NAME}"):
                 files.rm_file(f"{root}/{step}/{MANIFEST_NAME}")
 
-        _asked(url, timeout, remove_manifest)
+        _ask_storage(url, timeout, remove_manifest)
         for name in (*(file.path for file in manifest.files), MANIFEST_NAME):
 
             def put(files: Any, root: str, source: Path = folder / step / name, name: str = f"{step}/{name}") -> None:
                 files.makedirs(f"{root}/{name}".rpartition("/")[0], exist_ok=True)
                 files.put_file(str(source), f"{root}/{name}")
 
-            _asked(url, timeout, put)
+            _ask_storage(url, timeout, put)
 
 
 def stored_digest(url: str, step: str, timeout: float) -> str | None:
@@ -74,12 +74,12 @@ def stored_digest(url: str, step: str, timeout: float) -> str | None:
             manifest = Manifest.model_validate_json(
                 files.cat_file(f"{root}/{step}/{MANIFEST_NAME}", end=LARGEST_MANIFEST)
             )
-            whole = all(files.size(f"{root}/{step}/{file.path}") == file.bytes for file in manifest.files)
+            is_complete = all(files.size(f"{root}/{step}/{file.path}") == file.bytes for file in manifest.files)
         except (FileNotFoundError, NotADirectoryError, ValueError):
             return None
-        return manifest.content_digest if whole else None
+        return manifest.content_digest if is_complete else None
 
-    return _asked(url, timeout, look)
+    return _ask_storage(url, timeout, look)
 
 
 def drop_local(folder: Path, steps: Sequence[str]) -> None:
@@ -88,14 +88,14 @@ def drop_local(folder: Path, steps: Sequence[str]) -> None:
         shutil.rmtree(folder / step, ignore_errors=True)
 
 
-def _asked(url: str, timeout: float, ask: Callable[[Any, str], Value]) -> Value:
+def _ask_storage(url: str, timeout: float, ask: Callable[[Any, str], Value]) -> Value:
     """Return what `ask(file system, root)` returns. It is left behind in its thread when it takes longer."""
     answer: list[Value] = []
     trouble: list[BaseException] = []
 
     def work() -> None:
         try:
-            files, root = _opened(url)
+            files, root = _open_file_system(url)
             answer.append(ask(files, root.rstrip("/")))
         except BaseException as error:  # noqa: BLE001 (raised below, in the thread that asked)
             trouble.append(error)
@@ -114,7 +114,7 @@ def _asked(url: str, timeout: float, ask: Callable[[Any, str], Value]) -> Value:
     raise MachineFailure(f"{url}: {clean(f'{type(error).__name__}: {error}')}", hint=HINT) from None
 
 
-def _opened(url: str) -> tuple[Any, str]:
+def _open_file_system(url: str) -> tuple[Any, str]:
     from fsspec.core import url_to_fs
     from fsspec.registry import known_implementations
 

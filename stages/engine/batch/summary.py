@@ -135,12 +135,12 @@ def cost_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> Table:
             row = (result.processor_seconds, result.artifact_bytes / 1e6, result.peak_memory_bytes / 1e6)
             costs[job.parameters].append(row)
     rows: list[tuple[Cell, ...]] = []
-    for parameters, found in sorted(costs.items(), key=lambda item: item[0] or ""):
-        processor, megabytes, memory = np.array(found).T
+    for parameters, costs_of_group in sorted(costs.items(), key=lambda item: item[0] or ""):
+        processor, megabytes, memory = np.array(costs_of_group).T
         rows.append(
             (
                 parameters,
-                len(found),
+                len(costs_of_group),
                 float(processor.mean()),
                 float(np.median(processor)),
                 float(processor.max()),

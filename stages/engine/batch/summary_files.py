@@ -33,16 +33,16 @@ p.note { color: #5a6675; }
 """
 
 
-def _columns(table: Table, wanted: Sequence[str]) -> Table:
-    positions = [table.columns.index(name) for name in wanted]
+def _columns(table: Table, columns: Sequence[str]) -> Table:
+    positions = [table.columns.index(name) for name in columns]
     rows = tuple(tuple(row[k] for k in positions) for row in table.rows)
-    return Table(table.name, table.title, tuple(wanted), rows, table.note)
+    return Table(table.name, table.title, tuple(columns), rows, table.note)
 
 
 def _html_table(table: Table, kinds: Sequence[str] = (), links: Sequence[str | None] = ()) -> str:
     """Return a table; `kinds` colours the rows, `links` are where the first cell of each row leads."""
-    parts = [f"<h2>{html.escape(table.title)}</h2>", "<table>"]
-    parts.append(
+    lines = [f"<h2>{html.escape(table.title)}</h2>", "<table>"]
+    lines.append(
         "<tr>" + "".join(f"<th>{html.escape(name.replace('_', ' '))}</th>" for name in table.columns) + "</tr>"
     )
     for number, row in enumerate(table.rows):
@@ -53,11 +53,11 @@ def _html_table(table: Table, kinds: Sequence[str] = (), links: Sequence[str | N
                 text = f'<a href="{html.escape(links[number] or "")}">{text}</a>'
             cells.append(f"<td{' class=number' if isinstance(value, int | float) else ''}>{text}</td>")
         kind = f' class="{html.escape(kinds[number])}"' if kinds and kinds[number] else ""
-        parts.append(f"<tr{kind}>{''.join(cells)}</tr>")
-    parts.append("</table>")
+        lines.append(f"<tr{kind}>{''.join(cells)}</tr>")
+    lines.append("</table>")
     if table.note:
-        parts.append(f'<p class="note">{html.escape(table.note)}</p>')
-    return "\n".join(parts)
+        lines.append(f'<p class="note">{html.escape(table.note)}</p>')
+    return "\n".join(lines)
 
 
 def _as_link(path: str) -> str:
@@ -68,10 +68,10 @@ def _as_link(path: str) -> str:
 
 def summary_texts(title: str, jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> dict[str, str]:
     """Return file name -> text of the three summaries. `title` stands above them."""
-    whole = scene_table(jobs, latest, measures=True)
+    full_table = scene_table(jobs, latest, measures=True)
     people = _columns(scene_table(jobs, latest, measures=False), PEOPLE_COLUMNS)
-    kinds = [str(row[whole.columns.index("kind")]) for row in whole.rows]
-    logs = [row[whole.columns.index("log")] for row in whole.rows]
+    kinds = [str(row[full_table.columns.index("kind")]) for row in full_table.rows]
+    logs = [row[full_table.columns.index("log")] for row in full_table.rows]
     tables = [count_table(jobs, latest)]
     tables += [t for t in (reason_table(jobs, latest), accepted_table(jobs, latest)) if t.rows]
     groups = group_table(jobs, latest)
@@ -87,15 +87,15 @@ def summary_texts(title: str, jobs: Sequence[Job], latest: Mapping[str, SceneRes
         _html_table(people, kinds, [None if log is None else _as_link(str(log)) for log in logs]),
         "</body></html>\n",
     ]
-    return {"summary.csv": as_csv(whole), "summary.md": "\n".join(markdown), "summary.html": "\n".join(page)}
+    return {"summary.csv": as_csv(full_table), "summary.md": "\n".join(markdown), "summary.html": "\n".join(page)}
 
 
 def write_summary(folder: Path, title: str, jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> None:
     """Write the three files, each whole or not at all. Raises MachineFailure."""
     for name, text in summary_texts(title, jobs, latest).items():
-        new = folder / f".{name}.new"
+        fresh = folder / f".{name}.new"
         try:
-            new.write_text(text, encoding="utf-8")
-            os.replace(new, folder / name)
+            fresh.write_text(text, encoding="utf-8")
+            os.replace(fresh, folder / name)
         except OSError as error:
             raise MachineFailure(f"{folder / name}: {error.strerror}", hint="free space, then run again") from None

@@ -22,8 +22,9 @@ from scenewright.stages.engine.batch.scene_run import LAUNCHER, run_scene, scene
 
 WORKER = "scenewright.stages.engine.batch.warm_worker"
 SECONDS_BETWEEN_LOOKS = 0.25
+"""Time between two looks at a waiting worker [s]."""
 PATIENCE = 5.0
-"""Beyond the grace of a scene, for a worker that is asked to stop [s]."""
+"""Time beyond the grace of a scene that a worker gets to stop when it is asked to [s]."""
 
 
 class _Died(Exception):
@@ -48,9 +49,9 @@ class _Worker:
 
     def run(self, job: Job, cancelled: Callable[[], bool], host: str) -> SceneResult | None:
         """Run a scene, the storage left out. Raises _Died."""
-        own = job.model_copy(update={"storage": None})
+        local_job = job.model_copy(update={"storage": None})
         try:
-            self._requests.write(json.dumps({"job": own.model_dump(mode="json"), "host": host}).encode() + b"\n")
+            self._requests.write(json.dumps({"job": local_job.model_dump(mode="json"), "host": host}).encode() + b"\n")
             self._requests.flush()
             answer = self._answer(cancelled)
         except OSError:
@@ -68,10 +69,10 @@ class _Worker:
         waited, text = 0.0, b""
         while not text.endswith(b"\n"):
             if waiting.poll(1000 * SECONDS_BETWEEN_LOOKS):
-                more = os.read(self._answers.fileno(), 2**16)
-                if not more:
+                received = os.read(self._answers.fileno(), 2**16)
+                if not received:
                     raise _Died
-                text += more
+                text += received
                 continue
             waited += SECONDS_BETWEEN_LOOKS
             if cancelled():
@@ -96,17 +97,17 @@ class WarmScenes:
     """Runs scenes like `run_scene`, each thread with a worker."""
 
     def __init__(self) -> None:
-        self._own = threading.local()
+        self._local = threading.local()
         self._all: list[_Worker] = []
 
     def __call__(self, job: Job, cancelled: Callable[[], bool] = lambda: False, host: str = "") -> SceneResult | None:
         """Run a scene to its end, within its limits, and send what it made to the storage (scene_run.py)."""
-        worker, environment = getattr(self._own, "worker", None), scene_environment(job)
+        worker, environment = getattr(self._local, "worker", None), scene_environment(job)
         if worker is not None and worker.environment != environment:  # numeric libraries look at it when they load
             self._drop(worker)
             worker = None
         if worker is None:
-            worker = self._own.worker = _Worker(environment)
+            worker = self._local.worker = _Worker(environment)
             self._all.append(worker)
         try:
             result = worker.run(job, cancelled, host)
@@ -116,7 +117,7 @@ class WarmScenes:
         return None if result is None else stored(job, result)
 
     def _drop(self, worker: _Worker) -> None:
-        self._own.worker = None
+        self._local.worker = None
         self._all.remove(worker)
         worker.close()
 

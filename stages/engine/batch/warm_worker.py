@@ -35,16 +35,16 @@ class _Asked:
 
 def main() -> None:
     """Answer requests until there are no more."""
-    asked = _Asked()
-    signal.signal(signal.SIGTERM, asked.interrupt)
+    interruption = _Asked()
+    signal.signal(signal.SIGTERM, interruption.interrupt)
     answers = os.dup(1)
     os.dup2(2, 1)  # what libraries print when they are loaded is no answer
     with tempfile.TemporaryFile("a+b", buffering=0) as learned:
         forking.begin(learned)
-        _answer_all(answers, asked)
+        _answer_all(answers, interruption)
 
 
-def _answer_all(answers: int, asked: _Asked) -> None:
+def _answer_all(answers: int, interruption: _Asked) -> None:
     def start(job: Job, log: int) -> forking.Process:
         if forking.module_words(job.command) is None:
             return start_scene(job, log)
@@ -53,8 +53,8 @@ def _answer_all(answers: int, asked: _Asked) -> None:
 
     for line in sys.stdin:
         request = json.loads(line)
-        asked.stop = False
-        result = run_processes(Job.model_validate(request["job"]), asked, request["host"], start)
+        interruption.stop = False
+        result = run_processes(Job.model_validate(request["job"]), interruption, request["host"], start)
         os.write(answers, (b"null" if result is None else result.model_dump_json().encode()) + b"\n")
         forking.load_learned()
 

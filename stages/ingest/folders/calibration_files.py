@@ -33,8 +33,8 @@ PAIR_NAMES = (("left.yaml", "right.yaml"), ("left.yml", "right.yml"), ("cam0/sen
 LARGEST_FILE = 256_000
 """Bytes of a calibration file: its parser is slow, and it holds some dozens of numbers."""
 LARGEST_BASELINE = 1.0
-"""Metres. OpenCV's stereo files have the unit of whoever calibrated; eyes further apart than this are taken to be
-stated in millimetres, and a note says so."""
+"""Largest distance of two eyes [m]. OpenCV's stereo files have the unit of whoever calibrated; eyes further apart than
+this are taken to be stated in millimetres, and a note says so."""
 OPENCV_TAG = re.compile(r"!!opencv-matrix\b")
 KITTI = re.compile(r"^P([0-3]):((?:\s+\S+){12})\s*$", re.MULTILINE)
 MIDDLEBURY_KEYS = ("cam0", "cam1", "doffs", "baseline")
@@ -80,12 +80,12 @@ def read_calibration(path: Path, camera_number: int = 0) -> FolderCalibration:
         raise BadInput(f"{path}: more than {LARGEST_FILE} bytes is no calibration")
     note = f"intrinsics read from {path.name}"
     if path.suffix in (".yaml", ".yml"):
-        found = _from_document(_read_yaml(path), path)
+        calibration = _from_document(_read_yaml(path), path)
     elif path.suffix == ".json":
-        found = _from_document(read_json(path), path)
+        calibration = _from_document(read_json(path), path)
     else:
-        found = _from_text(read_text(path), path, camera_number)
-    return replace(found, notes=(note, *found.notes))
+        calibration = _from_text(read_text(path), path, camera_number)
+    return replace(calibration, notes=(note, *calibration.notes))
 
 
 def _read_yaml(path: Path) -> Any:
@@ -194,14 +194,14 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
 
 
 def _kalibr(document: dict[Any, Any], path: Path) -> FolderCalibration:
-    left = _camera_of(document["cam0"], path)
-    other = document.get("cam1")
-    if not isinstance(other, dict):
-        return FolderCalibration(left)
-    right_from_left = _matrix(other.get("T_cn_cnm1"), 4, 4)
+    first = _camera_of(document["cam0"], path)
+    second = document.get("cam1")
+    if not isinstance(second, dict):
+        return FolderCalibration(first)
+    right_from_left = _matrix(second.get("T_cn_cnm1"), 4, 4)
     if right_from_left is None or not is_rigid(right_from_left):
         raise BadInput(f"{path}: cam1 has no rigid T_cn_cnm1")
-    return FolderCalibration(left, _camera_of(other, path), inverse(right_from_left))
+    return FolderCalibration(first, _camera_of(second, path), inverse(right_from_left))
 
 
 def _first(document: Any, *names: str) -> Any:
@@ -237,10 +237,10 @@ def _size(document: dict[Any, Any], path: Path) -> tuple[int, int]:
     numbers = _numbers(values)
     if numbers is None:
         numbers = _numbers(_first(document, "resolution", "image_size", "imageSize"))
-    return _checked_size(numbers or (0, 0), path)
+    return _check_size(numbers or (0, 0), path)
 
 
-def _checked_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
+def _check_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
     if len(numbers) != 2 or not all(0 <= value <= 100_000 for value in numbers):
         raise BadInput(f"{path}: image size {list(numbers)} is impossible")
     return round(numbers[0]), round(numbers[1])
@@ -252,11 +252,11 @@ def _checked_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
 def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     if KITTI.search(text):
         return _kitti(text, path, camera_number)
-    keyed = _keyed(text)
+    keyed = _split_lines(text)
     if "cam0" in keyed and "baseline" in keyed:
         return _middlebury(keyed, path)
     if "fx" in keyed:
-        return FolderCalibration(_camera_of(_typed(keyed), path))
+        return FolderCalibration(_camera_of(_parse_values(keyed), path))
     try:
         numbers = [float(field) for field in re.sub(r"#.*", "", text).replace(",", " ").split()]
     except ValueError:
@@ -269,12 +269,12 @@ def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     raise BadInput(f"{path}: {len(numbers)} numbers, expected fx fy cx cy [distortion], 3x3 or 4x4")
 
 
-def _keyed(text: str) -> dict[str, str]:
+def _split_lines(text: str) -> dict[str, str]:
     lines = (re.split(r"\s*[=:]\s*", line.strip(), maxsplit=1) for line in text.splitlines())
-    return {parts[0]: parts[1] for parts in lines if len(parts) == 2}
+    return {words[0]: words[1] for words in lines if len(words) == 2}
 
 
-def _typed(keyed: dict[str, str]) -> dict[str, Any]:
+def _parse_values(keyed: dict[str, str]) -> dict[str, Any]:
     typed: dict[str, Any] = {}
     for key, value in keyed.items():
         try:
@@ -325,7 +325,7 @@ def _middlebury(keyed: dict[str, str], path: Path) -> FolderCalibration:
     offset = numbers("doffs", 1)[0] if "doffs" in keyed else float(second[0, 2] - first[0, 2])
     if abs(second[0, 2] - first[0, 2] - offset) > 0.5:
         raise BadInput(f"{path}: doffs {offset:g} is not the difference of the principal points in cam0 and cam1")
-    size = _checked_size([numbers(key, 1)[0] for key in ("width", "height")], path) if "width" in keyed else (0, 0)
+    size = _check_size([numbers(key, 1)[0] for key in ("width", "height")], path) if "width" in keyed else (0, 0)
     # The difference of the principal points is doffs to the digits printed; disparities are stated against doffs.
     second[0, 2] = first[0, 2] + offset
     records = [

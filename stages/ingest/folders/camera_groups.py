@@ -42,12 +42,12 @@ def grouped(
         for index, kind in enumerate(zip(labels, recorded, strict=True)):
             members.setdefault(kind, []).append(index)
         return tuple(CameraGroup(names[kind], kind[1].camera, tuple(members[kind])) for kind in kinds), ()
-    sizes = list(dict.fromkeys((one.camera.width, one.camera.height) for one in recorded))
+    sizes = list(dict.fromkeys((each.camera.width, each.camera.height) for each in recorded))
     groups = []
     for number, size in enumerate(sizes, start=1):
-        indices = [i for i, one in enumerate(recorded) if (one.camera.width, one.camera.height) == size]
+        indices = [i for i, each in enumerate(recorded) if (each.camera.width, each.camera.height) == size]
         cameras = [recorded[i].camera for i in indices]
-        middle = np.median([[one.fx, one.fy, one.cx, one.cy] for one in cameras], axis=0)
+        middle = np.median([[each.fx, each.fy, each.cx, each.cy] for each in cameras], axis=0)
         numbers = dict(zip(("fx", "fy", "cx", "cy"), map(float, middle), strict=True))
         name = "camera" if len(sizes) == 1 else f"camera_{number}"
         groups.append(CameraGroup(name, Camera(width=size[0], height=size[1], **numbers), tuple(indices)))

@@ -22,8 +22,8 @@ NPY_HEADER = 4096
 def depth_array(data: bytes, suffix: str) -> np.ndarray:
     """Return the (H, W) array in the bytes of a file with one of ARRAY_SUFFIXES, float32, float64 or uint16, in the
     file's own unit. Raises Unusable."""
-    read = {".npy": _npy, ".pfm": _pfm, ".bin": _colmap}[suffix]
-    return read(data)
+    reader = {".npy": _npy, ".pfm": _pfm, ".bin": _colmap}[suffix]
+    return reader(data)
 
 
 def _npy(data: bytes) -> np.ndarray:

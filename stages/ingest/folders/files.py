@@ -47,10 +47,10 @@ def images_by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
     images: dict[str, Path] = {}
     folded: dict[str, Path] = {}
     for path in files_of(folder, suffixes):
-        other = folded.setdefault(path.stem.casefold(), path)
-        if other is not path:
-            same = "has the same name" if other.stem == path.stem else "differs only in case"
-            raise BadInput(f"{path}: {other.name} {same}", hint="keep one of the two")
+        same_stem = folded.setdefault(path.stem.casefold(), path)
+        if same_stem is not path:
+            same = "has the same name" if same_stem.stem == path.stem else "differs only in case"
+            raise BadInput(f"{path}: {same_stem.name} {same}", hint="keep one of the two")
         images[path.stem] = path
     return images
 
@@ -237,12 +237,12 @@ def all_intrinsics_given(parameters: IngestParameters) -> bool:
 
 def overridden(camera: Camera, parameters: IngestParameters) -> tuple[Camera, tuple[str, ...]]:
     """Return the camera with the intrinsics that the user gave, and a note that names them."""
-    given = {name: getattr(parameters, name) for name in ("fx", "fy", "cx", "cy")}
-    given = {name: value for name, value in given.items() if value is not None}
-    if not given:
+    given_intrinsics = {name: getattr(parameters, name) for name in ("fx", "fy", "cx", "cy")}
+    given_intrinsics = {name: value for name, value in given_intrinsics.items() if value is not None}
+    if not given_intrinsics:
         return camera, ()
-    listed = ", ".join(f"{name} {value:g}" for name, value in given.items())
-    return camera.model_copy(update=given), (f"intrinsics given by option: {listed}",)
+    listed = ", ".join(f"{name} {value:g}" for name, value in given_intrinsics.items())
+    return camera.model_copy(update=given_intrinsics), (f"intrinsics given by option: {listed}",)
 
 
 def camera_from_options(size: tuple[int, int] | None, parameters: IngestParameters, why: str) -> Camera:

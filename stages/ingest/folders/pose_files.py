@@ -28,18 +28,20 @@ from scenewright.stages.kit.formats.trajectories import (
 FILES = ("pose.txt", "poses.txt", "groundtruth.txt", "trajectory.txt", "trajectory.tum", "traj.txt", "trajectory.log")
 FOLDERS = ("pose", "poses")
 WITHOUT_STAMP = (7, 12, 16)
+"""Numbers a row without a stamp: position and quaternion, 3 x 4, 4 x 4."""
 WHOLE_NUMBER = re.compile(r"[0-9]{1,18}")
 COLUMNS = (8, *WITHOUT_STAMP)
+"""Numbers a row that are read: with a stamp, as TUM writes them, or without."""
 Pose = tuple[np.ndarray | None, str | None]
 """world_from_camera (4, 4), or the reason why there is none."""
 
 
 def pose_file(root: Path) -> Path | None:
     """Return the file or folder of poses in a folder, None without any."""
-    named = [root / name for name in FILES if (root / name).is_file()]
-    named += [path for path in files_of(root, (".txt",)) if path.name.startswith("traj")]
-    named += [root / name for name in FOLDERS if (root / name).is_dir()]
-    return named[0] if named else None
+    candidates = [root / name for name in FILES if (root / name).is_file()]
+    candidates += [path for path in files_of(root, (".txt",)) if path.name.startswith("traj")]
+    candidates += [root / name for name in FOLDERS if (root / name).is_dir()]
+    return candidates[0] if candidates else None
 
 
 def columns_of(path: Path) -> int:
@@ -63,13 +65,13 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
         return _folder(path, names)
     if path.suffix == ".log":
         matrices: list[Pose] = [(matrix, None) for matrix in read_open3d_log(path)]
-        return _counted(matrices, names, path)
+        return _check_count(matrices, names, path)
     columns = columns_of(path)
     if columns - 1 in WITHOUT_STAMP:
         rows = named_rows(path, columns)
         images = _images([label for _, label, _ in rows], names)
         if columns != 8 or _are_names([label for _, label, _ in rows], images):
-            return _named(path, rows, images, names)
+            return _poses_by_image(path, rows, images, names)
         return read_stamped_poses(path)
     if columns not in COLUMNS:
         read_text(path)
@@ -77,7 +79,7 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
             f"{path}: {columns} columns are no pose",
             hint="7, 8 (with a stamp), 12 or 16 numbers a line, after the image's name or not",
         )
-    return _counted([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
+    return _check_count([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
 
 
 def _images(labels: list[str], names: list[str]) -> list[str | None]:
@@ -86,16 +88,16 @@ def _images(labels: list[str], names: list[str]) -> list[str | None]:
     A label is a name with or without folder and ending; where no label is one, labels that are whole numbers mean the
     images whose names end in these numbers, if they differ.
     """
-    known, found = set(names), []
+    image_names, images = set(names), []
     for label in labels:
         path = PurePosixPath(label)
         stem = path.name if WHOLE_NUMBER.fullmatch(path.suffix[1:]) else path.stem  # decimals are no file's ending
-        found.append(next((text for text in (path.name, stem) if text in known), None))
-    if any(image is not None for image in found) or not all(WHOLE_NUMBER.fullmatch(label) for label in labels):
-        return found
+        images.append(next((text for text in (path.name, stem) if text in image_names), None))
+    if any(image is not None for image in images) or not all(WHOLE_NUMBER.fullmatch(label) for label in labels):
+        return images
     by_number = {_last_number(name): name for name in names}
-    if None in by_number or len(by_number) < len(known):
-        return found
+    if None in by_number or len(by_number) < len(image_names):
+        return images
     return [by_number.get(int(label)) for label in labels]
 
 
@@ -115,7 +117,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _named(
+def _poses_by_image(
     path: Path, rows: list[tuple[int, str, np.ndarray]], images: list[str | None], names: list[str]
 ) -> list[Pose]:
     """Return the pose of each image by the image that a row is of; none for images without a row.
@@ -145,7 +147,7 @@ def _pose(row: np.ndarray, where: str) -> Pose:
     return np.vstack([row.reshape(-1, 4)[:3], [0, 0, 0, 1] if len(row) == 12 else row[12:]]), None
 
 
-def _counted(poses: list[Pose], names: list[str], path: Path) -> list[Pose]:
+def _check_count(poses: list[Pose], names: list[str], path: Path) -> list[Pose]:
     if len(poses) != len(names):
         raise BadInput(f"{path}: {len(poses)} poses for {len(names)} images", hint="one pose an image, in order")
     return poses

@@ -75,18 +75,18 @@ def overridden_recording(
     recorded: RecordedCamera, parameters: IngestParameters
 ) -> tuple[RecordedCamera, tuple[str, ...]]:
     """Return the camera with the intrinsics that the user gave, and notes. All four given mean a pinhole camera."""
-    given = {name: getattr(parameters, name) for name in ("fx", "fy", "cx", "cy")}
-    given = {name: value for name, value in given.items() if value is not None}
-    if not given:
+    given_intrinsics = {name: getattr(parameters, name) for name in ("fx", "fy", "cx", "cy")}
+    given_intrinsics = {name: value for name, value in given_intrinsics.items() if value is not None}
+    if not given_intrinsics:
         return recorded, ()
     notes: tuple[str, ...] = (
-        f"intrinsics given by option: {', '.join(f'{name} {value:g}' for name, value in given.items())}",
+        f"intrinsics given by option: {', '.join(f'{name} {value:g}' for name, value in given_intrinsics.items())}",
     )
     lens = recorded.lens
-    if len(given) == 4 and not lens.is_pinhole:
+    if len(given_intrinsics) == 4 and not lens.is_pinhole:
         lens = PINHOLE
         notes = (*notes, "lens distortion of the log is not undone, as all intrinsics are given")
-    return RecordedCamera(recorded.camera.model_copy(update=given), lens), notes
+    return RecordedCamera(recorded.camera.model_copy(update=given_intrinsics), lens), notes
 
 
 def undistorted(image: np.ndarray, recorded: RecordedCamera, target: Camera, *, smooth: bool) -> np.ndarray:
@@ -102,7 +102,7 @@ def undistorted(image: np.ndarray, recorded: RecordedCamera, target: Camera, *, 
 @lru_cache(maxsize=8)
 def _maps(recorded: RecordedCamera, target: Camera) -> tuple[np.ndarray, np.ndarray]:
     matrix, coefficients = intrinsic_matrix(recorded.camera), np.array(recorded.lens.coefficients)
-    size, wanted = (target.width, target.height), intrinsic_matrix(target)
+    size, target_matrix = (target.width, target.height), intrinsic_matrix(target)
     if recorded.lens.model == "fisheye":
-        return cv2.fisheye.initUndistortRectifyMap(matrix, coefficients, np.eye(3), wanted, size, cv2.CV_32FC1)
-    return cv2.initUndistortRectifyMap(matrix, coefficients, None, wanted, size, cv2.CV_32FC1)
+        return cv2.fisheye.initUndistortRectifyMap(matrix, coefficients, np.eye(3), target_matrix, size, cv2.CV_32FC1)
+    return cv2.initUndistortRectifyMap(matrix, coefficients, None, target_matrix, size, cv2.CV_32FC1)

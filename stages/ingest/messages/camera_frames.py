@@ -44,31 +44,33 @@ def frame_entries(
     with_color, with_depth = geometry.color is not None, geometry.depth is not None
     main = content.images[topics.main if with_color or topics.depth is None else topics.depth]
     stamps, first_of_stamp = main.stamps, fresh(main.stamps)
-    wanted: dict[str, str] = {}
+    topic_of: dict[str, str] = {}
     if with_color and with_depth and topics.depth is not None:
-        wanted["depth"] = topics.depth
+        topic_of["depth"] = topics.depth
     if geometry.right is not None and topics.right is not None:
-        wanted["right"] = topics.right
+        topic_of["right"] = topics.right
     if topics.labels is not None:
-        wanted["labels"] = topics.labels
-    found = {stream: partners(stamps, content.images[topic].stamps, tolerance) for stream, topic in wanted.items()}
-    needed = [stream for stream in ("depth", "right") if stream in wanted and not (stream == "right" and with_depth)]
+        topic_of["labels"] = topics.labels
+    partner_of = {
+        stream: partners(stamps, content.images[topic].stamps, tolerance) for stream, topic in topic_of.items()
+    }
+    needed = [stream for stream in ("depth", "right") if stream in topic_of and not (stream == "right" and with_depth)]
     entries: list[Entry] = []
     without_pose: list[int] = []
     for index in range(len(stamps)):
         places: dict[str, Hashable] = {"color" if with_color else "depth": main.locations[index]}
         stamp = int(stamps[index])
         name = f"{stamp * 1e-9:.6f} s"
-        for stream, topic in wanted.items():
-            if found[stream][index] >= 0:
-                places[stream] = content.images[topic].locations[int(found[stream][index])]
+        for stream, topic in topic_of.items():
+            if partner_of[stream][index] >= 0:
+                places[stream] = content.images[topic].locations[int(partner_of[stream][index])]
         missing = next((stream for stream in needed if stream not in places), None)
         if not first_of_stamp[index] or missing is not None:
             problem = NO_PARTNER.format(missing) if first_of_stamp[index] else "duplicate_stamp"
             entries.append(Entry(name, stamp * 1e-9, None, _never, problem, topics.name))
             continue
-        if "depth" in wanted:
-            stamp = int(content.images[wanted["depth"]].stamps[int(found["depth"][index])])
+        if "depth" in topic_of:
+            stamp = int(content.images[topic_of["depth"]].stamps[int(partner_of["depth"][index])])
         pose = None if poses is None else poses.at(geometry.frame, stamp)
         if pose is not None:
             pose = pose @ geometry.frame_from_camera
@@ -77,8 +79,8 @@ def frame_entries(
         load = _loader(log, places, geometry, parameters)
         entries.append(Entry(name, stamp * 1e-9, pose, load, None, topics.name))
     notes = []
-    if "depth" in wanted:
-        unused = len(content.images[wanted["depth"]].stamps) - sum(entry.problem is None for entry in entries)
+    if "depth" in topic_of:
+        unused = len(content.images[topic_of["depth"]].stamps) - sum(entry.problem is None for entry in entries)
         if unused > 0:
             notes.append(f"{unused} depth images without a colour image of their own were left")
     if poses is not None and without_pose:
@@ -96,7 +98,7 @@ def depth_note(log: MessageLog, topic: str, content: LogContent, parameters: Ing
     images = content.images[topic]
     for location in images.locations[:1]:
         try:
-            unit = depth_unit(_fetched(log, location, "depth"))
+            unit = depth_unit(_fetch_image(log, location, "depth"))
         except Unusable:
             break
         return f"depth in {'metres' if unit == 1 else 'millimetres'} ({images.encoding}, REP-118)"
@@ -107,7 +109,7 @@ def _never() -> LoadedFrame:
     raise Unusable("missing_partner")
 
 
-def _fetched(log: MessageLog, location: Hashable, stream: str) -> ImageRecord:
+def _fetch_image(log: MessageLog, location: Hashable, stream: str) -> ImageRecord:
     message = log.fetch(location)
     decode = decoder_for(message.channel)
     try:
@@ -126,13 +128,13 @@ def _loader(
     def load() -> LoadedFrame:
         color = depth = right = labels = None
         if geometry.color is not None and "color" in places:
-            color = picture(_fetched(log, places["color"], "color"), geometry.color, geometry.camera)
+            color = picture(_fetch_image(log, places["color"], "color"), geometry.color, geometry.camera)
         if geometry.right is not None and "right" in places:
-            right = picture(_fetched(log, places["right"], "right"), geometry.right, geometry.camera)
+            right = picture(_fetch_image(log, places["right"], "right"), geometry.right, geometry.camera)
         if geometry.depth is not None and "depth" in places:
-            depth = _depth(_fetched(log, places["depth"], "depth"), geometry, parameters.depth_scale)
+            depth = _depth(_fetch_image(log, places["depth"], "depth"), geometry, parameters.depth_scale)
         if "labels" in places:
-            labels = _labels(_fetched(log, places["labels"], "labels"), geometry)
+            labels = _labels(_fetch_image(log, places["labels"], "labels"), geometry)
         return LoadedFrame(color, depth, labels, right)
 
     return load
@@ -141,15 +143,15 @@ def _loader(
 def picture(record: ImageRecord, lens: Lens, camera: Camera) -> np.ndarray | bytes:
     """Return the picture of an image message as `camera` sees it: its own JPEG or PNG bytes where nothing is to be
     done, else (H, W, 3) uint8 RGB. Raises Unusable."""
-    found = color_pixels(record)
-    if isinstance(found, bytes):
-        pixels = decode_color(found)  # whole, or it would not be used
+    pixels_or_picture = color_pixels(record)
+    if isinstance(pixels_or_picture, bytes):
+        pixels = decode_color(pixels_or_picture)  # whole, or it would not be used
         if pixels is None:
-            raise Unusable("undecodable_color", f"{len(found)} bytes")
-        if lens.maps is None and image_size(found) == (camera.width, camera.height):
-            return found
-        found = pixels
-    return fitted_color(lens.picture(found), camera)
+            raise Unusable("undecodable_color", f"{len(pixels_or_picture)} bytes")
+        if lens.maps is None and image_size(pixels_or_picture) == (camera.width, camera.height):
+            return pixels_or_picture
+        pixels_or_picture = pixels
+    return fitted_color(lens.picture(pixels_or_picture), camera)
 
 
 def _depth(record: ImageRecord, geometry: CameraGeometry, scale: float | None) -> np.ndarray:

@@ -18,6 +18,7 @@ from scenewright.stages.ingest.stereo import stereo_lenses
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 SAME_PLACE = 1e-6
+"""Largest difference of two 4 x 4 motions that are called equal [m, 1]; rounding."""
 
 
 @dataclass(frozen=True)
@@ -49,18 +50,20 @@ def geometry_of(topics: CameraTopics, content: LogContent, parameters: IngestPar
     each other. Raises BadInput when intrinsics are missing or impossible, and for pairs that are none.
     """
     if all(getattr(parameters, name) is not None for name in ("fx", "fy", "cx", "cy")):
-        return _given(topics, content, parameters, where)
+        return _geometry_by_options(topics, content, parameters, where)
     if topics.right is not None:
         geometry = _with_right(topics, content, parameters, where)
     elif topics.color is None or topics.depth is None:
         geometry = _single(topics, content, parameters, where)
     else:
         geometry = _color_and_depth(topics, content, parameters, where)
-    camera, given = overridden(geometry.camera, parameters)
-    return replace(geometry, camera=camera, notes=(*geometry.notes, *given))
+    camera, notes_of_options = overridden(geometry.camera, parameters)
+    return replace(geometry, camera=camera, notes=(*geometry.notes, *notes_of_options))
 
 
-def _given(topics: CameraTopics, content: LogContent, parameters: IngestParameters, where: str) -> CameraGeometry:
+def _geometry_by_options(
+    topics: CameraTopics, content: LogContent, parameters: IngestParameters, where: str
+) -> CameraGeometry:
     """All intrinsics are given: images are taken as they are."""
     main = content.images[topics.depth or topics.main]
     size = main.size if main.size != (0, 0) else content.images[topics.main].size
@@ -86,17 +89,17 @@ def _resized(camera: Camera, size: tuple[int, int]) -> Camera:
     return camera.model_copy(update={"width": size[0], "height": size[1]}) if size != (0, 0) else camera
 
 
-def _lens(topic: str, content: LogContent, what: str, parameters: IngestParameters, where: str) -> Lens:
+def _lens(topic: str, content: LogContent, image_kind: str, parameters: IngestParameters, where: str) -> Lens:
     """Return the lens of a topic by its own calibration. Raises BadInput when there is none."""
     name = calibration_topic(topic, content)
     size = content.images[topic].size
     if name is None:
-        zeros = [other for other, record in sorted(content.calibrations.items()) if not is_calibrated(record)]
+        zeros = [topic_name for topic_name, record in sorted(content.calibrations.items()) if not is_calibrated(record)]
         if zeros:
             check_calibrated(content.calibrations[zeros[0]], f"{where}: topic {zeros[0]}")
         why = f"{where}: no camera calibration for {topic}{content.undecodable_calibrations()}"
         return Lens(camera_from_options(size, parameters, why), size)
-    lens = lens_of(content.calibrations[name], size, is_rectified(topic), f"{where}: topic {name}", what)
+    lens = lens_of(content.calibrations[name], size, is_rectified(topic), f"{where}: topic {name}", image_kind)
     notes = [f"intrinsics of {topic} from topic {name}", *lens.notes]
     if name in content.changed_calibrations:
         notes.append(f"the calibration {name} changes within the log; the first one is used")
@@ -104,8 +107,8 @@ def _lens(topic: str, content: LogContent, what: str, parameters: IngestParamete
 
 
 def _single(topics: CameraTopics, content: LogContent, parameters: IngestParameters, where: str) -> CameraGeometry:
-    what = "colour images" if topics.color else "depth images"
-    lens = _lens(topics.main, content, what, parameters, where)
+    image_kind = "colour images" if topics.color else "depth images"
+    lens = _lens(topics.main, content, image_kind, parameters, where)
     frame = content.images[topics.main].frame_id
     color, depth = (lens, None) if topics.color else (None, lens)
     return CameraGeometry(lens.camera, frame, np.eye(4), color, depth, notes=lens.notes)
@@ -116,14 +119,14 @@ def _color_and_depth(
 ) -> CameraGeometry:
     assert topics.color is not None and topics.depth is not None
     agree = _pixels_agree(topics, content)
-    own = _own_of_color(topics, content), calibration_of(topics.depth, content)
-    if own[1] is None and not (agree and own[0] is not None):
+    calibrations = _own_of_color(topics, content), calibration_of(topics.depth, content)
+    if calibrations[1] is None and not (agree and calibrations[0] is not None):
         _lens(topics.depth, content, "depth images", parameters, where)  # asks for the intrinsics
-    if own[1] is None:
+    if calibrations[1] is None:
         depth = _as_color(topics, content, where)
     else:
         depth = _lens(topics.depth, content, "depth images", parameters, where)
-    if own[0] is None:
+    if calibrations[0] is None:
         return _uncalibrated_color(topics, content, depth, agree)
     color = _lens(topics.color, content, "colour images", parameters, where)
     notes = tuple(dict.fromkeys((*depth.notes, *color.notes)))
@@ -145,10 +148,10 @@ def _color_and_depth(
 def _own_of_color(topics: CameraTopics, content: LogContent) -> CalibrationRecord | None:
     """Return the calibration of the colour images, None when it is that of depth images of another shape."""
     assert topics.color is not None and topics.depth is not None
-    found, (width, height) = calibration_of(topics.color, content), content.images[topics.color].size
-    if found is None or found is not calibration_of(topics.depth, content):
-        return found
-    return found if abs(found.width * height - found.height * width) <= max(found.width, found.height) else None
+    record, (width, height) = calibration_of(topics.color, content), content.images[topics.color].size
+    if record is None or record is not calibration_of(topics.depth, content):
+        return record
+    return record if abs(record.width * height - record.height * width) <= max(record.width, record.height) else None
 
 
 def _pixels_agree(topics: CameraTopics, content: LogContent) -> bool:
@@ -241,13 +244,13 @@ def _with_right(topics: CameraTopics, content: LogContent, parameters: IngestPar
 
 
 def _needed_calibration(topic: str, content: LogContent, where: str) -> CalibrationRecord:
-    found = calibration_of(topic, content)
-    if found is None:
+    record = calibration_of(topic, content)
+    if record is None:
         raise BadInput(
             f"{where}: no camera calibration for {topic}, and a stereo pair needs both",
             hint="record the CameraInfo of both, or choose one with --camera or --color-topic",
         )
-    return found
+    return record
 
 
 def _with_depth(
@@ -256,9 +259,9 @@ def _with_depth(
     """Add depth to a stereo pair: carried into the rectified left eye, or left out when that cannot be."""
     assert topics.color is not None and topics.depth is not None
     frames = content.images[topics.color].frame_id, content.images[topics.depth].frame_id
-    own = calibration_of(topics.depth, content)
+    depth_record = calibration_of(topics.depth, content)
     offset = np.eye(4) if _pixels_agree(topics, content) else fixed_transform(frames[0], frames[1], content)
-    if offset is None or own is None:
+    if offset is None or depth_record is None:
         note = f"WARNING: depth of {topics.depth} left out: nothing says how it stands to {topics.color}"
         return replace(geometry, notes=(*geometry.notes, note))
     depth = _lens(topics.depth, content, "depth images", parameters, where)

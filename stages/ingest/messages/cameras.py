@@ -27,6 +27,7 @@ from scenewright.stages.ingest.stereo import is_pair
 ALMOST_ALL = 0.9
 """A topic with this share of another's images may stand in for it."""
 ENDLESS = 1 << 62
+"""Longest time over which a pose is carried [ns]: any, as only the fixed part of the tree is asked."""
 EVERY_CAMERA = "all"
 
 
@@ -60,21 +61,23 @@ def calibration_topic(topic: str, content: LogContent) -> str | None:
     that belongs to no images. Of several: the same size, then the longest common beginning of the topics.
     Calibrations without focal lengths do not count.
     """
-    known = {name: record for name, record in content.calibrations.items() if is_calibrated(record)}
+    calibrated = {name: record for name, record in content.calibrations.items() if is_calibrated(record)}
     images = content.images[topic]
-    frames = {other.frame_id for other in content.images.values()} - {images.frame_id}
-    beside = next((n for n in calibration_names(topic) if n in known and known[n].frame_id not in frames), None)
+    frames = {image_topic.frame_id for image_topic in content.images.values()} - {images.frame_id}
+    beside = next(
+        (n for n in calibration_names(topic) if n in calibrated and calibrated[n].frame_id not in frames), None
+    )
     if beside is not None:
         return beside
-    owned = {name for other in content.images for name in calibration_names(other)}
+    owned = {name for image_topic in content.images for name in calibration_names(image_topic)}
     candidates = [
         name
-        for name, record in known.items()
+        for name, record in calibrated.items()
         if record.frame_id == images.frame_id or (name not in owned and record.frame_id not in frames)
     ]
 
     def preference(name: str) -> tuple[bool, bool, int, str]:
-        record = known[name]
+        record = calibrated[name]
         other_size = (record.width, record.height) != images.size
         return record.frame_id != images.frame_id, other_size, -common_length(name, topic), name
 
@@ -104,7 +107,7 @@ def fixed_transform(target: str, source: str, content: LogContent) -> np.ndarray
 
 def find_cameras(content: LogContent) -> list[CameraTopics]:
     """Group the image topics of a log into cameras, in order of their names."""
-    colors = _preferred([name for name, images in content.images.items() if images.role == "color"], content)
+    colors = _without_duplicates([name for name, images in content.images.items() if images.role == "color"], content)
     right_of = _right_eyes(colors, content)
     lefts = [topic for topic in colors if topic not in right_of.values()]
     depths = sorted(name for name, images in content.images.items() if images.role == "depth")
@@ -116,11 +119,11 @@ def find_cameras(content: LogContent) -> list[CameraTopics]:
     names = camera_names(
         [place(camera.main) for camera in cameras], ["color" if camera.color else "depth" for camera in cameras]
     )
-    named = [replace(camera, name=name) for camera, name in zip(cameras, names, strict=True)]
-    return sorted(named, key=lambda camera: camera.name)
+    named_cameras = [replace(camera, name=name) for camera, name in zip(cameras, names, strict=True)]
+    return sorted(named_cameras, key=lambda camera: camera.name)
 
 
-def _preferred(topics: list[str], content: LogContent) -> list[str]:
+def _without_duplicates(topics: list[str], content: LogContent) -> list[str]:
     """Return the topics without those that show the same as another one: of one device and one frame."""
     groups: dict[tuple[tuple[str, ...], str], list[str]] = {}
     for topic in sorted(topics):
@@ -133,8 +136,8 @@ def _rank(group: Iterable[str], content: LogContent) -> Callable[[str], tuple[bo
 
     def rank(topic: str) -> tuple[bool, bool, bool, bool, str]:
         images = content.images[topic]
-        few = len(images.stamps) < ALMOST_ALL * most
-        return few, is_grey(images), images.compressed, not is_rectified(topic), topic
+        has_few = len(images.stamps) < ALMOST_ALL * most
+        return has_few, is_grey(images), images.compressed, not is_rectified(topic), topic
 
     return rank
 
@@ -146,13 +149,13 @@ def is_grey(images: Images) -> bool:
 
 def _right_eyes(colors: list[str], content: LogContent) -> dict[str, str]:
     """Return left topic -> right topic of the stereo pairs among colour topics."""
-    found: dict[str, str] = {}
+    right_of: dict[str, str] = {}
     for right in colors:
         for left in (*other_side(right, left=True), *_beside_right(right, colors)):
-            if left in colors and left not in found and left != right and _looks_like_pair(left, right, content):
-                found[left] = right
+            if left in colors and left not in right_of and left != right and _looks_like_pair(left, right, content):
+                right_of[left] = right
                 break
-    return found
+    return right_of
 
 
 def _beside_right(right: str, colors: list[str]) -> list[str]:
@@ -177,27 +180,27 @@ def _depth_topics(colors: list[str], depths: list[str], content: LogContent) -> 
     for color in colors:
         for depth in depths:
             same_frame = content.images[color].frame_id == content.images[depth].frame_id
-            here, there = place(color), place(depth)
-            if not (same_frame or is_within(here, there) or len(colors) == len(depths) == 1):
+            color_place, depth_place = place(color), place(depth)
+            if not (same_frame or is_within(color_place, depth_place) or len(colors) == len(depths) == 1):
                 continue
             rank = (
-                not (same_frame and here == there),
-                not (same_frame and is_within(here, there)),
-                not is_registered(depth) or not is_within(here, there),
-                here != there,
+                not (same_frame and color_place == depth_place),
+                not (same_frame and is_within(color_place, depth_place)),
+                not is_registered(depth) or not is_within(color_place, depth_place),
+                color_place != depth_place,
                 not same_frame,
                 is_grey(content.images[color]),
                 content.images[depth].compressed,
-                not is_within(here, there),
+                not is_within(color_place, depth_place),
                 color,
                 depth,
             )
             ranked.append((rank, color, depth))
-    found: dict[str, str] = {}
+    depth_of: dict[str, str] = {}
     for _, color, depth in sorted(ranked):
-        if color not in found and depth not in found.values():
-            found[color] = depth
-    return found
+        if color not in depth_of and depth not in depth_of.values():
+            depth_of[color] = depth
+    return depth_of
 
 
 def _lonely_depths(depths: list[str], depth_of: dict[str, str], content: LogContent) -> list[str]:
@@ -205,18 +208,18 @@ def _lonely_depths(depths: list[str], depth_of: dict[str, str], content: LogCont
     used = [place(topic) for topic in depth_of.values()] + [place(topic) for topic in depth_of]
     groups: dict[tuple[str, ...], list[str]] = {}
     for topic in depths:
-        if not any(is_within(place(topic), other) for other in used):
+        if not any(is_within(place(topic), used_place) for used_place in used):
             groups.setdefault(place(topic), []).append(topic)
     return sorted(min(group, key=_rank(group, content)) for group in groups.values())
 
 
 def _with_labels(camera: CameraTopics, alone: bool, content: LogContent) -> CameraTopics:
     topics = sorted(name for name, images in content.images.items() if images.role == "labels")
-    here, frame = place(camera.main), content.images[camera.main].frame_id
+    main_place, frame = place(camera.main), content.images[camera.main].frame_id
     fitting = [
         topic
         for topic in topics
-        if alone or (content.images[topic].frame_id == frame and is_within(here, place(topic)))
+        if alone or (content.images[topic].frame_id == frame and is_within(main_place, place(topic)))
     ]
     return replace(camera, labels=fitting[0] if fitting else None)
 
@@ -247,8 +250,10 @@ def chosen_cameras(
         for name in parameters.camera:
             if name not in names:
                 raise BadInput(f"{where}: has no camera {name!r}", hint=f"cameras: {', '.join(names)}")
-        wanted = [camera for name in dict.fromkeys(parameters.camera) for camera in cameras if camera.name == name]
-        return wanted, [camera for camera in cameras if camera not in wanted]
+        in_asked_order = [
+            camera for name in dict.fromkeys(parameters.camera) for camera in cameras if camera.name == name
+        ]
+        return in_asked_order, [camera for camera in cameras if camera not in in_asked_order]
 
     def preference(camera: CameraTopics) -> tuple[int, ...]:
         frame = content.images[camera.main].frame_id
@@ -262,8 +267,8 @@ def chosen_cameras(
 def _camera_by_topic(
     cameras: list[CameraTopics], content: LogContent, parameters: IngestParameters, where: str
 ) -> CameraTopics:
-    given = {"color": parameters.color_topic, "depth": parameters.depth_topic, "right": parameters.right_topic}
-    for stream, topic in given.items():
+    topic_of = {"color": parameters.color_topic, "depth": parameters.depth_topic, "right": parameters.right_topic}
+    for stream, topic in topic_of.items():
         role = "color" if stream == "right" else stream
         if topic is not None and (topic not in content.images or content.images[topic].role != role):
             has = sorted(name for name, images in content.images.items() if images.role == role)
@@ -271,16 +276,16 @@ def _camera_by_topic(
                 f"{where}: no {'colour' if role == 'color' else role} images on topic {topic!r}",
                 hint=f"topics with such images: {', '.join(has) or 'none'}",
             )
-    color, depth, right = given["color"], given["depth"], given["right"]
+    color, depth, right = topic_of["color"], topic_of["depth"], topic_of["right"]
     if color is None:
         color = _color_beside(cameras, content, depth, right)
     if depth is None and color is not None:
         depths = sorted(name for name, images in content.images.items() if images.role == "depth")
         depth = _depth_topics([color], depths, content).get(color)
-    known = next((camera for camera in cameras if color is not None and camera.color == color), None)
-    if right is None and known is not None:
-        right = known.right
-    camera = CameraTopics(known.name if known else "camera", color, depth, right)
+    same_color = next((camera for camera in cameras if color is not None and camera.color == color), None)
+    if right is None and same_color is not None:
+        right = same_color.right
+    camera = CameraTopics(same_color.name if same_color else "camera", color, depth, right)
     return _with_labels(camera, True, content)
 
 
@@ -290,9 +295,9 @@ def _color_beside(cameras: list[CameraTopics], content: LogContent, depth: str |
         for camera in cameras:
             if camera.right == right:
                 return camera.color
-        named = [topic for topic in other_side(right, left=True) if topic in content.images]
-        if named:
-            return named[0]
+        left_topics = [topic for topic in other_side(right, left=True) if topic in content.images]
+        if left_topics:
+            return left_topics[0]
     colors = [camera.color for camera in cameras if camera.color is not None and camera.color != right]
     if depth is not None:
         return next(iter(_depth_topics(colors, [depth], content)), None)
@@ -304,10 +309,10 @@ def unpaired_side(camera: CameraTopics, content: LogContent) -> str | None:
     if camera.color is None or camera.right is not None:
         return None
     for left in (True, False):
-        for other in other_side(camera.color, left=left):
-            if other in content.images and content.images[other].role == "color":
+        for partner in other_side(camera.color, left=left):
+            if partner in content.images and content.images[partner].role == "color":
                 return (
-                    f"{camera.color} and {other} look like a stereo pair by name, but neither P[3] of their "
+                    f"{camera.color} and {partner} look like a stereo pair by name, but neither P[3] of their "
                     "calibrations nor transforms between their frames give a baseline"
                 )
     return None
@@ -315,12 +320,12 @@ def unpaired_side(camera: CameraTopics, content: LogContent) -> str | None:
 
 def alternatives(camera: CameraTopics, content: LogContent) -> list[str]:
     """Return the image topics of a camera's device that are not used, but could be asked for."""
-    here = place(camera.main)
+    main_place = place(camera.main)
     return sorted(
         name
         for name, images in content.images.items()
         if images.role in ("color", "depth")
-        and place(name) == here
+        and place(name) == main_place
         and name not in camera.all
         and without_transport(name) not in camera.all
     )

@@ -21,6 +21,7 @@ from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_d
 _HEADER = struct.Struct("<iff")
 _RVL_SIZE = struct.Struct("<II")
 _TRUNCATED, _OVERRUN, _WRONG_VALUE = -1, -2, -3
+"""Codes that the compiled decoder returns in place of a count of words."""
 _RVL_FAULTS = {
     _TRUNCATED: "the RVL stream ends too early",
     _OVERRUN: "the RVL stream holds more pixels than its header says",
@@ -42,7 +43,7 @@ def decode_compressed_depth(encoding: str, data: bytes) -> np.ndarray:
         raise Unusable("undecodable_depth", f"{len(data)} bytes")
     _, a, b = _HEADER.unpack_from(data)
     body = data[_HEADER.size :]
-    stored = decode_rvl(body) if "rvl" in encoding.lower() else _decoded_png(body)
+    stored = decode_rvl(body) if "rvl" in encoding.lower() else _decode_png(body)
     if stored_as(encoding, data) == "16UC1":
         return stored
     if not (np.isfinite(a) and np.isfinite(b) and a > 0):
@@ -66,7 +67,7 @@ def stored_as(encoding: str, data: bytes) -> str:
     return "32FC1" if quantised else "16UC1"
 
 
-def _decoded_png(body: bytes) -> np.ndarray:
+def _decode_png(body: bytes) -> np.ndarray:
     if not body.startswith(PNG_START) or not may_be_decoded(body):
         raise Unusable("undecodable_depth", "no PNG of a sensible size after the header of compressed depth")
     image = decode_image(body)
@@ -84,8 +85,8 @@ def decode_rvl(body: bytes) -> np.ndarray:
     width, height = _RVL_SIZE.unpack_from(body)
     if not 0 < width * height <= LARGEST_IMAGE:
         raise Unusable("undecodable_depth", f"RVL image of {width}x{height}")
-    whole = (len(body) - _RVL_SIZE.size) // 4 * 4
-    words = np.frombuffer(body, "<u4", count=whole // 4, offset=_RVL_SIZE.size).astype(np.int64)
+    whole_bytes = (len(body) - _RVL_SIZE.size) // 4 * 4
+    words = np.frombuffer(body, "<u4", count=whole_bytes // 4, offset=_RVL_SIZE.size).astype(np.int64)
     pixels = np.zeros(height * width, np.uint16)
     fault = _unpack_rvl(words, pixels)
     if fault:
@@ -114,16 +115,16 @@ def _number(words: np.ndarray, nibble: int) -> tuple[int, int]:
 @njit(cache=True)
 def _unpack_rvl(words: np.ndarray, pixels: np.ndarray) -> int:
     """Fill `pixels` (N,) uint16, zeros so far, from RVL words (M,) int64. Return 0, or the fault."""
-    place, nibble, last = 0, 0, 0
-    while place < len(pixels):
+    position, nibble, last = 0, 0, 0
+    while position < len(pixels):
         zeros, nibble = _number(words, nibble)
         if zeros < 0:
             return zeros
-        place += zeros
+        position += zeros
         nonzeros, nibble = _number(words, nibble)
         if nonzeros < 0:
             return nonzeros
-        if place + nonzeros > len(pixels):
+        if position + nonzeros > len(pixels):
             return _OVERRUN
         for _ in range(nonzeros):
             folded, nibble = _number(words, nibble)
@@ -132,6 +133,6 @@ def _unpack_rvl(words: np.ndarray, pixels: np.ndarray) -> int:
             last += (folded >> 1) ^ -(folded & 1)
             if last <= 0 or last > 65535:
                 return _WRONG_VALUE
-            pixels[place] = last
-            place += 1
+            pixels[position] = last
+            position += 1
     return 0

@@ -23,7 +23,7 @@ class DamageLines(list[str]):
         self.salvage = salvage
         self._noted: set[str] = set()
         self._tallied: dict[str, tuple[int, int]] = {}
-        self._more = 0
+        self._unlisted = 0
 
     def found(self, what: str, times: int = 0) -> None:
         """Note a fault, once, or as many times as it occurred. Raises BadInput without `salvage`."""
@@ -42,8 +42,8 @@ class DamageLines(list[str]):
         if len(self) < LONGEST:
             self.append(line)
             return
-        self._more += 1
-        self[LONGEST - 1] = f"and {self._more + 1} faults more"
+        self._unlisted += 1
+        self[LONGEST - 1] = f"and {self._unlisted + 1} faults more"
 
     def tally(self, what: str, times: int) -> None:
         """Say `N times: what` in one line, whose N grows."""

@@ -36,14 +36,14 @@ def decoder_for(channel: Channel) -> Decoder | None:
 
     None: messages of a type that ingest has no use for, or that cannot be read; `why_unreadable` says which.
     """
-    found = _decoder(channel)
-    return None if isinstance(found, str) else found
+    decoder = _decoder(channel)
+    return None if isinstance(decoder, str) else decoder
 
 
 def why_unreadable(channel: Channel) -> str:
     """Return in words why there is no decoder for a channel; empty when there is one."""
-    found = _decoder(channel)
-    return found if isinstance(found, str) else ""
+    decoder_or_reason = _decoder(channel)
+    return decoder_or_reason if isinstance(decoder_or_reason, str) else ""
 
 
 @lru_cache(maxsize=256)
@@ -56,22 +56,22 @@ def _decoder(channel: Channel) -> Decoder | str:
         return _ros(channel, encoding)
     if encoding in ("protobuf", "json"):
         decoder = protobuf_decoder(name) if encoding == "protobuf" else json_decoder(name)
-        return decoder or f"messages of type {_shown(name)} in {encoding} are not used"
+        return decoder or f"messages of type {_quote(name)} in {encoding} are not used"
     useful = short_name(name) in ros_messages.CONVERTERS or foxglove_messages.type_of(name) is not None
-    what = f"messages of type {_shown(name)} " if useful else "messages "
-    return f"{what}in encoding {_shown(channel.message_encoding)} are not read"
+    messages = f"messages of type {_quote(name)} " if useful else "messages "
+    return f"{messages}in encoding {_quote(channel.message_encoding)} are not read"
 
 
 def _ros(channel: Channel, encoding: str) -> Decoder | str:
     name, topic = channel.type_name, channel.topic
     if short_name(name) == "geometry_msgs/Transform" and not is_stream_transform(topic):
-        return f"messages of type {_shown(name)} name no frames and are not used"
+        return f"messages of type {_quote(name)} name no frames and are not used"
     try:
         decoder = ros_messages.ros_decoder(name, encoding, channel.schema_encoding, channel.schema)
     except UnreadableDefinition as error:
-        return f"messages of type {_shown(name)} cannot be read: {error}"
+        return f"messages of type {_quote(name)} cannot be read: {error}"
     if decoder is None:
-        return f"messages of type {_shown(name)} are not used"
+        return f"messages of type {_quote(name)} are not used"
     if encoding != "ros1" or not may_state_depth_unit(topic):
         return lambda data: with_stream_frames(topic, decoder(data))
     unit = (ros_messages.DEPTH_UNIT,)
@@ -80,5 +80,5 @@ def _ros(channel: Channel, encoding: str) -> Decoder | str:
     return lambda data: with_stream_frames(topic, (longer if states_depth_unit(data) else decoder)(data))
 
 
-def _shown(name: str) -> str:
+def _quote(name: str) -> str:
     return repr(name[:80]) if name else "without a name"

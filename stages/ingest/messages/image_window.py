@@ -25,12 +25,12 @@ def of_published_images(record: CalibrationRecord, fields: Fields) -> Calibratio
     def moved(numbers: tuple[float, ...], columns: int) -> tuple[float, ...]:
         if len(numbers) < 3 * columns:
             return numbers
-        found = list(numbers)
-        found[2] = (numbers[2] - left + 0.5) / across - 0.5
-        found[columns + 2] = (numbers[columns + 2] - top + 0.5) / down - 0.5
+        shifted = list(numbers)
+        shifted[2] = (numbers[2] - left + 0.5) / across - 0.5
+        shifted[columns + 2] = (numbers[columns + 2] - top + 0.5) / down - 0.5
         for row, binning in ((0, across), (1, down)):
             for column in (0, 1, 3)[: columns - 1]:
-                found[row * columns + column] = numbers[row * columns + column] / binning
-        return tuple(found)
+                shifted[row * columns + column] = numbers[row * columns + column] / binning
+        return tuple(shifted)
 
     return replace(record, width=width // across, height=height // down, K=moved(record.K, 3), P=moved(record.P, 4))

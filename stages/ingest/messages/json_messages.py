@@ -23,9 +23,9 @@ def json_decoder(type_name: str) -> Callable[[bytes], tuple[Record, ...]] | None
     convert = CONVERTERS[name]
 
     def decode(data: bytes) -> tuple[Record, ...]:
-        fields = _lowered(parse_object(data))
+        fields = _lower_case_names(parse_object(data))
         if isinstance(fields.get("data"), str):
-            fields["data"] = _unpacked(fields["data"])
+            fields["data"] = _decode_base64(fields["data"])
         return convert(fields)
 
     return decode
@@ -50,12 +50,12 @@ def _refuse(constant: str) -> NoReturn:
     raise Undecodable(f"no JSON: {constant} is no number")
 
 
-def _lowered(fields: dict[str, Any]) -> dict[str, Any]:
+def _lower_case_names(fields: dict[str, Any]) -> dict[str, Any]:
     """D, K, R, P are upper case in some writers; what is nested has lower-case names in all of them."""
     return {name.lower(): value for name, value in fields.items()}
 
 
-def _unpacked(text: str) -> bytes:
+def _decode_base64(text: str) -> bytes:
     try:
         return base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):

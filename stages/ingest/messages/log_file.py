@@ -9,6 +9,7 @@ from pathlib import Path
 from scenewright.schemas.errors import BadInput
 
 PIECE = 1 << 20
+"""Bytes that are read at a time for a checksum; by eye."""
 
 
 class Damaged(Exception):
@@ -22,8 +23,8 @@ class LogFile:
         """Open a file. Raises BadInput when it is missing or no plain file, with `kind` as what was expected."""
         try:
             if not path.is_file():
-                what = "is a folder" if path.is_dir() else "is no file" if path.exists() else "file is missing"
-                raise BadInput(f"{path}: {what}, expected {kind}")
+                fault = "is a folder" if path.is_dir() else "is no file" if path.exists() else "file is missing"
+                raise BadInput(f"{path}: {fault}, expected {kind}")
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         except OSError as error:
             raise BadInput(f"{path}: cannot be opened: {error.strerror}") from None
@@ -43,9 +44,9 @@ class LogFile:
         try:
             data = os.pread(self._descriptor, length, offset)
             while 0 < len(data) < length and (
-                more := os.pread(self._descriptor, length - len(data), offset + len(data))
+                chunk := os.pread(self._descriptor, length - len(data), offset + len(data))
             ):
-                data += more
+                data += chunk
         except OSError as error:
             raise Damaged(f"cannot be read from the disk ({error.strerror})") from None
         return data
@@ -60,6 +61,6 @@ class LogFile:
     def checksum(self, start: int, end: int) -> int:
         """Return the CRC-32 of the bytes from start to end, read piece by piece. Raises Damaged."""
         checksum = 0
-        for place in range(start, end, PIECE):
-            checksum = zlib.crc32(self.exactly(place, min(PIECE, end - place)), checksum)
+        for start_of_piece in range(start, end, PIECE):
+            checksum = zlib.crc32(self.exactly(start_of_piece, min(PIECE, end - start_of_piece)), checksum)
         return checksum

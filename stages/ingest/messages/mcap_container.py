@@ -42,7 +42,7 @@ class McapMessages:
             count=None if counts is None else counts.get(number, 0),
         )
 
-    def _stored(self, message: LogMessage) -> StoredMessage:
+    def _as_stored(self, message: LogMessage) -> StoredMessage:
         return StoredMessage(self._channels[message.channel.id], message.log_time, message.data, message.location)
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
@@ -50,7 +50,7 @@ class McapMessages:
         left_out: Counter[str] = Counter()
         for message in self._log.messages(channel_ids):
             if message.channel.id in self._channels:
-                yield self._stored(message)
+                yield self._as_stored(message)
             else:  # defined in a chunk, and left out of a summary that has others
                 left_out[message.channel.topic] += 1
         if channel_ids is None and not self._left_out:
@@ -62,7 +62,7 @@ class McapMessages:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         if not isinstance(location, Location):
             raise BadInput(f"{self.path}: {location!r} is no place in an MCAP file")
-        return self._stored(self._log.fetch(location))
+        return self._as_stored(self._log.fetch(location))
 
     def close(self) -> None:
         """Close the file."""

@@ -66,7 +66,7 @@ class McapLog:
         self.damage = DamageLines(self.path, salvage=salvage)
         self.message_counts: dict[int, int] | None = None
         """Channel id -> messages, where the file states them or had to be read for its channels."""
-        self._found: Counter[int] = Counter()
+        self._counts: Counter[int] = Counter()
         """Channel id -> messages in what was examined."""
         self._examined: set[int] = set()
         """Offsets of chunks that were read to their end."""
@@ -107,18 +107,18 @@ class McapLog:
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[LogMessage]:
         """Yield messages of the channels (all of them: None) in file order."""
-        wanted = None if channel_ids is None else set(channel_ids)
+        wanted_ids = None if channel_ids is None else set(channel_ids)
         chunks = sorted((offset, index) for index, offset in enumerate(self._chunks))
         for offset, index in heapq.merge(chunks, ((offset, -1) for offset in self._loose)):
             if index >= 0:
-                yield from self._chunk_messages(index, wanted)
+                yield from self._chunk_messages(index, wanted_ids)
             else:
                 message = self._loose_message(offset)
-                if message is not None and (wanted is None or message.channel.id in wanted):
+                if message is not None and (wanted_ids is None or message.channel.id in wanted_ids):
                     yield message
-        stated, found = self._structure.stated_messages, self._found.total()
-        if stated not in (None, found) and not self.damage:
-            self.damage.found(f"states {stated} messages and holds {found}")
+        stated, counted = self._structure.stated_messages, self._counts.total()
+        if stated not in (None, counted) and not self.damage:
+            self.damage.found(f"states {stated} messages and holds {counted}")
 
     def indexed(self, channel_id: int) -> Iterator[tuple[int, Location]]:
         """Yield (log time [ns], where) of a channel's messages, as far as the file has message indexes.
@@ -131,8 +131,8 @@ class McapLog:
                 entries = np.frombuffer(self._file.exactly(offset, number * 16), "<u8").reshape(-1, 2)
             except Damaged as fault:
                 raise self._bad(f"message index at byte {offset} {fault}") from None
-            for time, place in entries.tolist():
-                yield time, Location(chunk, place + HEAD.size)
+            for time, record_offset in entries.tolist():
+                yield time, Location(chunk, record_offset + HEAD.size)
 
     def fetch(self, location: Location) -> LogMessage:
         """Return the message at a location that `messages` or `indexed` gave. Raises BadInput when it is damaged."""
@@ -150,8 +150,8 @@ class McapLog:
             if length < MESSAGE_HEAD.size:
                 raise Damaged("holds a message that is shorter than its header")
         except Damaged as fault:
-            what = f"chunk at byte {self._chunks[location.chunk]}" if location.chunk >= 0 else "message"
-            raise self._bad(f"{what} {fault}") from None
+            subject = f"chunk at byte {self._chunks[location.chunk]}" if location.chunk >= 0 else "message"
+            raise self._bad(f"{subject} {fault}") from None
         channel_id, _, log_time, _ = MESSAGE_HEAD.unpack_from(body, start)
         if channel_id not in self.channels:
             raise self._bad(f"a message belongs to channel {channel_id}, which the file does not define")
@@ -161,15 +161,15 @@ class McapLog:
     @property
     def notes(self) -> list[str]:
         """What cannot be known of the file, for people."""
-        said = []
+        lines = []
         if self.unchecked_chunks:
-            said.append(f"{self.unchecked_chunks} of {len(self._chunks)} chunks carry no checksum")
+            lines.append(f"{self.unchecked_chunks} of {len(self._chunks)} chunks carry no checksum")
         if self._loose and not self._structure.data_checked:
-            said.append(f"{len(self._loose)} messages outside of chunks carry no checksum")
-        said = [line + ": changed bytes in them cannot be noticed" for line in said]
+            lines.append(f"{len(self._loose)} messages outside of chunks carry no checksum")
+        lines = [line + ": changed bytes in them cannot be noticed" for line in lines]
         if self._structure.unknown_records:
-            said.append(f"{self._structure.unknown_records} records of unknown kinds were skipped")
-        return said
+            lines.append(f"{self._structure.unknown_records} records of unknown kinds were skipped")
+        return lines
 
     # --- what the chunks have to be read for -----------------------------------------------------------------
 
@@ -190,17 +190,17 @@ class McapLog:
         """Collect schemas and channels from the chunks of a file that does not repeat them in its summary."""
         counts: Counter[int] = Counter()
         for index in range(len(self._chunks)):
-            found: Counter[int] = Counter()
+            counts_here: Counter[int] = Counter()
             try:
                 data = self._unpack(index)
                 for opcode, start, length in _records(data):
                     if opcode != Opcode.MESSAGE:
                         self._define(opcode, data[start : start + length])
                     elif length >= MESSAGE_HEAD.size:
-                        found[int.from_bytes(data[start : start + 2], "little")] += 1
+                        counts_here[int.from_bytes(data[start : start + 2], "little")] += 1
             except Damaged as fault:
-                self._lost_chunk(index, fault, found.total())
-            counts.update(found)
+                self._report_lost_chunk(index, fault, counts_here.total())
+            counts.update(counts_here)
         for offset in self._loose:
             counts[int.from_bytes(self._file.read(offset + HEAD.size, 2), "little")] += 1
         self.message_counts = dict(counts)
@@ -219,9 +219,9 @@ class McapLog:
 
     # --- reading ---------------------------------------------------------------------------------------------
 
-    def _chunk_messages(self, index: int, wanted: set[int] | None) -> Iterator[LogMessage]:
+    def _chunk_messages(self, index: int, wanted_ids: set[int] | None) -> Iterator[LogMessage]:
         """Yield the wanted messages of a chunk; what is wrong in it is noted when it is read to its end."""
-        found: Counter[int] = Counter()
+        counts_here: Counter[int] = Counter()
         short = 0
         try:
             data = self._unpack(index)
@@ -233,24 +233,24 @@ class McapLog:
                     short += 1
                     continue
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack_from(data, start)
-                found[channel_id] += 1
+                counts_here[channel_id] += 1
                 channel = self.channels.get(channel_id)
-                if channel is not None and (wanted is None or channel_id in wanted):
+                if channel is not None and (wanted_ids is None or channel_id in wanted_ids):
                     content = data[start + MESSAGE_HEAD.size : start + length]
                     yield LogMessage(channel, log_time, content, Location(index, start))
         except Damaged as fault:
-            self._lost_chunk(index, fault, found.total())
+            self._report_lost_chunk(index, fault, counts_here.total())
         else:
             indexed = self._structure.indexed_messages(index)
-            if indexed is not None and found.total() < indexed:
+            if indexed is not None and counts_here.total() < indexed:
                 where = f"chunk at byte {self._chunks[index]}"
-                self.damage.found(f"{where} holds {found.total()} messages, its index names {indexed}")
+                self.damage.found(f"{where} holds {counts_here.total()} messages, its index names {indexed}")
         if self._chunks[index] not in self._examined:
             self._examined.add(self._chunks[index])
-            self._take_counts(found, short)
+            self._take_counts(counts_here, short)
 
     def _loose_message(self, offset: int) -> LogMessage | None:
-        found: Counter[int] = Counter()
+        counts_here: Counter[int] = Counter()
         short, message = 0, None
         try:
             body = self._loose_body(offset)
@@ -258,15 +258,15 @@ class McapLog:
                 short = 1
             else:
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack_from(body)
-                found[channel_id] = 1
+                counts_here[channel_id] = 1
                 if channel_id in self.channels:
-                    place = Location(-1, offset + HEAD.size)
-                    message = LogMessage(self.channels[channel_id], log_time, body[MESSAGE_HEAD.size :], place)
+                    location = Location(-1, offset + HEAD.size)
+                    message = LogMessage(self.channels[channel_id], log_time, body[MESSAGE_HEAD.size :], location)
         except Damaged as fault:
             self.damage.found(f"message at byte {offset} {fault}: it is lost")
         if offset > self._loose_examined:
             self._loose_examined = offset
-            self._take_counts(found, short)
+            self._take_counts(counts_here, short)
         return message
 
     def _loose_body(self, offset: int) -> bytes:
@@ -277,9 +277,9 @@ class McapLog:
             raise Damaged(f"has {length} bytes, more than {LARGEST_CHUNK}")
         return self._file.exactly(offset + HEAD.size, length)
 
-    def _take_counts(self, found: Counter[int], short: int) -> None:
-        self._found.update(found)
-        for channel_id, number in sorted(found.items()):
+    def _take_counts(self, counts_here: Counter[int], short: int) -> None:
+        self._counts.update(counts_here)
+        for channel_id, number in sorted(counts_here.items()):
             if channel_id not in self.channels:
                 self.damage.found(f"a message belongs to channel {channel_id}, which the file does not define", number)
         if short:
@@ -301,14 +301,14 @@ class McapLog:
             raise Damaged("has a wrong checksum")
         return data
 
-    def _lost_chunk(self, index: int, fault: Damaged, read: int) -> None:
+    def _report_lost_chunk(self, index: int, fault: Damaged, messages_read: int) -> None:
         messages = self._structure.indexed_messages(index)
         count = "no index says how many messages" if messages is None else f"{messages} messages by its index"
-        rest = f"all but its first {read} messages are lost" if read else "it is lost"
-        self.damage.found(f"chunk at byte {self._chunks[index]} ({count}) {fault}: {rest}")
+        consequence = f"all but its first {messages_read} messages are lost" if messages_read else "it is lost"
+        self.damage.found(f"chunk at byte {self._chunks[index]} ({count}) {fault}: {consequence}")
 
-    def _bad(self, what: str) -> BadInput:
-        return BadInput(f"{self.path}: {what}", hint=HINT)
+    def _bad(self, fault: str) -> BadInput:
+        return BadInput(f"{self.path}: {fault}", hint=HINT)
 
 
 def _records(data: bytes) -> Iterator[tuple[int, int, int]]:

@@ -20,11 +20,15 @@ HEAD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 FOOTER_SIZE = 20
+"""Bytes of an MCAP footer without its record head (MCAP specification)."""
 DATA_END_SIZE = 4
+"""Bytes of an MCAP data-end record without its record head (MCAP specification)."""
 COMPRESSIONS = ("", "lz4", "zstd")
 _CHUNK = struct.Struct("<QQQI")
 _LONGEST_CHUNK_HEAD = _CHUNK.size + 4 + 64 + 8
+"""Bytes of a chunk's head with the longest name of a compression that is read."""
 _WINDOW = 4 << 20
+"""Bytes that are searched at a time for a chunk; by eye."""
 
 
 class _Fields:
@@ -32,13 +36,13 @@ class _Fields:
 
     def __init__(self, body: bytes) -> None:
         self._body = body
-        self._place = 0
+        self._position = 0
 
     def take(self, length: int) -> bytes:
-        piece = self._body[self._place : self._place + length]
+        piece = self._body[self._position : self._position + length]
         if len(piece) != length:
             raise Damaged(f"claims a field of {length} bytes and has {len(piece)} left")
-        self._place += length
+        self._position += length
         return piece
 
     def number(self, size: int) -> int:
@@ -52,11 +56,11 @@ class _Fields:
 
     def texts(self) -> dict[str, str]:
         inside = _Fields(self.take(self.number(4)))
-        found = {}
-        while inside._place < len(inside._body):
+        text_of = {}
+        while inside._position < len(inside._body):
             key = inside.text()
-            found[key] = inside.text()
-        return found
+            text_of[key] = inside.text()
+        return text_of
 
 
 def read_header(body: bytes) -> str:
@@ -97,7 +101,7 @@ def read_statistics(body: bytes) -> tuple[int, int, dict[int, int]]:
     fields.take(4 + 4 + 4 + 8 + 8)
     inside = _Fields(fields.take(fields.number(4)))
     counts = {}
-    while inside._place < len(inside._body):
+    while inside._position < len(inside._body):
         channel = inside.number(2)
         counts[channel] = inside.number(8)
     return messages, channels, counts
@@ -154,9 +158,11 @@ def find_chunk(file: LogFile, start: int) -> int | None:
             return None
         places = np.flatnonzero(window[:last] == Opcode.CHUNK)
         plausible = (window[places + head] <= 4) & (window[places + head + 1] == 0) & (window[places + 8] == 0)
-        for place in places[plausible]:
-            if place < _WINDOW and _is_chunk(window[place : place + overlap].tobytes(), begin + int(place), file.size):
-                return begin + int(place)
+        for candidate in places[plausible]:
+            if candidate < _WINDOW and _is_chunk(
+                window[candidate : candidate + overlap].tobytes(), begin + int(candidate), file.size
+            ):
+                return begin + int(candidate)
     return None
 
 

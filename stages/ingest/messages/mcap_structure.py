@@ -40,7 +40,9 @@ MOST_DEFINITIONS = 256 << 20
 _PER_DEFINITION = 500
 """Bytes that a definition costs besides its own."""
 _INDEX_HEAD = 6
+"""Bytes of a message index before its entries: channel and length (MCAP specification)."""
 _INDEX_ENTRY = 16
+"""Bytes of an entry of a message index: time and offset (MCAP specification)."""
 _KNOWN = {int(code) for code in Opcode}
 _PARSED = {Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT}
 """Opcodes whose records prove in another way that they are what they say, or are too many to look at twice."""
@@ -99,8 +101,8 @@ class McapStructure:
         """Messages that indexes of damaged chunks name."""
         magic = file.read(0, len(MAGIC))
         if magic != MAGIC:
-            what = "is empty" if not magic else "is no MCAP file (wrong first bytes)"
-            raise BadInput(f"{damage.path}: {what}", hint=HINT)
+            fault = "is empty" if not magic else "is no MCAP file (wrong first bytes)"
+            raise BadInput(f"{damage.path}: {fault}", hint=HINT)
         footer = self._walk()
         self.indexes = np.array(self._index_rows, np.uint64).reshape(-1, 4)
         """Of every MessageIndex: channel, chunk, offset of its entries, number of entries."""
@@ -112,8 +114,8 @@ class McapStructure:
     @property
     def complete(self) -> bool:
         """Whether all channels of the messages are known without reading the chunks."""
-        known = np.isin(self.indexes[:, 0], list(self.channels)).all() if self.channels else not len(self.indexes)
-        return bool(self._late) and self._stated_channels <= len(self.channels) and bool(known)
+        all_defined = np.isin(self.indexes[:, 0], list(self.channels)).all() if self.channels else not len(self.indexes)
+        return bool(self._late) and self._stated_channels <= len(self.channels) and bool(all_defined)
 
     def head(self, offset: int) -> tuple[int, int]:
         """Return opcode and length of the top-level record at an offset. Raises Damaged when there is none."""
@@ -132,10 +134,12 @@ class McapStructure:
     def define(self, record: Schema | Channel) -> None:
         """Take in a definition; one that contradicts an earlier one is damage, and the earlier one stays."""
         table: dict[int, Any] = self.schemas if isinstance(record, Schema) else self.channels
-        known = table.setdefault(record.id, record)
-        if _meaning(known) != _meaning(record):
-            kind, name, other = type(record).__name__.lower(), _meaning(known)[0], _meaning(record)[0]
-            self.damage.found(f"{kind} {record.id} is defined twice, as {name!r} and as {other!r}: the first is used")
+        first_record = table.setdefault(record.id, record)
+        if _meaning(first_record) != _meaning(record):
+            kind, name, second_name = type(record).__name__.lower(), _meaning(first_record)[0], _meaning(record)[0]
+            self.damage.found(
+                f"{kind} {record.id} is defined twice, as {name!r} and as {second_name!r}: the first is used"
+            )
 
     def indexed_messages(self, chunk: int) -> int | None:
         """Return how many messages a chunk holds by its index; None when it has none."""
@@ -235,8 +239,8 @@ class McapStructure:
             return False
 
     def _visit_footer(self, offset: int, length: int) -> Footer:
-        rest = self._file.read(offset + HEAD.size + length, len(MAGIC))
-        if not MAGIC.startswith(rest):
+        closing = self._file.read(offset + HEAD.size + length, len(MAGIC))
+        if not MAGIC.startswith(closing):
             raise Damaged("is a footer with something else than the end of the file behind it")
         if self._data_end is None and not self.damage:
             raise Damaged("is a footer without an end of data before it")
@@ -254,7 +258,7 @@ class McapStructure:
     def _visit_index(self, offset: int, length: int) -> None:
         head = self._file.exactly(offset + HEAD.size, min(length, _INDEX_HEAD))
         entries = int.from_bytes(head[2:], "little")
-        if len(head) < _INDEX_HEAD or entries % _INDEX_ENTRY or entries != _bounded(length) - _INDEX_HEAD:
+        if len(head) < _INDEX_HEAD or entries % _INDEX_ENTRY or entries != _check_length(length) - _INDEX_HEAD:
             raise Damaged(f"is a message index of {length} bytes that claims {entries} bytes of entries")
         if self._data_end is not None:
             return
@@ -281,7 +285,7 @@ class McapStructure:
         return self._body(offset, length)
 
     def _body(self, offset: int, length: int) -> bytes:
-        return self._file.exactly(offset + HEAD.size, _bounded(length))
+        return self._file.exactly(offset + HEAD.size, _check_length(length))
 
     # --- after a damaged record ------------------------------------------------------------------------------
 
@@ -289,23 +293,23 @@ class McapStructure:
         """Return where reading goes on after a damaged record, and note what is lost; None: nothing follows."""
         self._indexed_chunk = -1
         size, reason = self._file.size, str(fault)
-        what = f"ends within the record at byte {offset}" if reason == _CUT else f"record at byte {offset} {fault}"
+        subject = f"ends within the record at byte {offset}" if reason == _CUT else f"record at byte {offset} {fault}"
         if not self.damage.salvage:
             messages = sum(self._index_rows[3::4]) + len(self.loose)
             before = f"{len(self.chunks)} whole chunks with {messages} indexed messages were found before it"
-            self.damage.found(f"{reason if offset >= size else what}, of {size} bytes: {before}")
+            self.damage.found(f"{reason if offset >= size else subject}, of {size} bytes: {before}")
         if offset >= size:
             lost = "no message is lost" if self._data_end is not None else "what was not written is lost"
             self.damage.note(f"{_UNFINISHED}; {lost}")
             return None
         following = self._following(offset, scan_from)
         if self._data_end is not None:
-            self.damage.note(f"{what}: the summary is damaged, no message is lost")
+            self.damage.note(f"{subject}: the summary is damaged, no message is lost")
         elif following is None:
-            self.damage.note(f"{what}: the last {size - offset} bytes are lost, and what was not written")
+            self.damage.note(f"{subject}: the last {size - offset} bytes are lost, and what was not written")
         else:
             lost_bytes = max(following - offset, 0)
-            self.damage.note(f"{what}: {lost_bytes} bytes are lost; reading goes on at byte {following}")
+            self.damage.note(f"{subject}: {lost_bytes} bytes are lost; reading goes on at byte {following}")
         return following
 
     def _following(self, offset: int, scan_from: int) -> int | None:
@@ -316,7 +320,9 @@ class McapStructure:
         places = [find_chunk(self._file, scan_from)]
         if self._data_end is None:
             places.append(find_data_end(self._file))
-        return min((place for place in places if place is not None and place >= scan_from), default=None)
+        return min(
+            (candidate for candidate in places if candidate is not None and candidate >= scan_from), default=None
+        )
 
     def _own_end(self, offset: int) -> int | None:
         """Return the end that a damaged record claims when another record begins there."""
@@ -331,11 +337,11 @@ class McapStructure:
     # --- the end of the file ---------------------------------------------------------------------------------
 
     def _is_closed(self, end: int) -> bool:
-        rest = self._file.read(end, len(MAGIC) + 1)
-        if rest != MAGIC:
-            what = "more bytes" if rest.startswith(MAGIC) else "no closing magic"
-            self.damage.found(f"has {what} after the footer, at byte {end}: no message is lost")
-        return rest.startswith(MAGIC)
+        closing = self._file.read(end, len(MAGIC) + 1)
+        if closing != MAGIC:
+            fault = "more bytes" if closing.startswith(MAGIC) else "no closing magic"
+            self.damage.found(f"has {fault} after the footer, at byte {end}: no message is lost")
+        return closing.startswith(MAGIC)
 
     def _take_summary(self, footer: Footer | None) -> None:
         if footer is None or not self._summary_holds(footer):
@@ -385,7 +391,7 @@ class McapStructure:
             self.damage.found("checksum of the data section is wrong: something in it has changed")
 
 
-def _bounded(length: int) -> int:
+def _check_length(length: int) -> int:
     if length > LARGEST_RECORD:
         raise Damaged(f"has {length} bytes, more than the {LARGEST_RECORD} that are accepted")
     return length

@@ -62,26 +62,26 @@ def _source(
     stated = log.metadata.get(WORLD_METADATA, {})
     world = None if main.poses is None else main.poses.world
     up, up_note = _up(content, main.poses)
-    worlds = {one.poses.world for one in built if one.poses is not None}
+    worlds = {each.poses.world for each in built if each.poses is not None}
     if len(worlds) > 1:
         raise BadInput(
             f"{where}: the cameras have poses in different worlds, {' and '.join(sorted(worlds))}",
             hint="give --world-frame, or choose one with --camera",
         )
-    entries = [entry for one in built for entry in one.entries]
+    entries = [entry for each in built for entry in each.entries]
     entries.sort(key=lambda entry: entry.time)
-    notes = [note for one in built for note in one.notes(len(built) > 1)] + content.notes + up_note + log.notes
+    notes = [note for each in built for note in each.notes(len(built) > 1)] + content.notes + up_note + log.notes
     return LogSource(
         format=log.format,
-        rule="; ".join([rule, *(one.rule(len(built) > 1) for one in built)]),
-        cameras=tuple(one.camera(stated.get("registered") != "no") for one in built),
+        rule="; ".join([rule, *(each.rule(len(built) > 1) for each in built)]),
+        cameras=tuple(each.camera(stated.get("registered") != "no") for each in built),
         entries=tuple(entries),
         notes=tuple(dict.fromkeys(notes)),
         world_up="z" if stated.get("world_up") == "z" and stated.get("world_frame") == world else "unknown",
         world_up_detail=f"metadata record {WORLD_METADATA!r} of the log says that z of frame {world!r} is up",
         up_in_log=up,
         label_table=_label_table(log.metadata.get(LABELS_METADATA, {}), where),
-        has_labels=any(one.topics.labels is not None for one in built),
+        has_labels=any(each.topics.labels is not None for each in built),
         damage=damage,
         streams=content.streams(),
         other_cameras=tuple(camera.name for camera in others),
@@ -122,20 +122,20 @@ class _Built:
     def rule(self, named: bool) -> str:
         """Return in words which topics were used."""
         geometry, topics = self._geometry, self.topics
-        parts = []
+        phrases = []
         if geometry.color is not None:
-            parts.append(f"{'left' if geometry.right is not None else 'colour'} from {topics.color}")
+            phrases.append(f"{'left' if geometry.right is not None else 'colour'} from {topics.color}")
         if geometry.right is not None:
-            parts.append(f"right from {topics.right}")
+            phrases.append(f"right from {topics.right}")
         if geometry.depth is not None and topics.depth is not None:
-            parts.append(f"depth from {topics.depth} ({self._content.images[topics.depth].encoding})")
+            phrases.append(f"depth from {topics.depth} ({self._content.images[topics.depth].encoding})")
         if topics.labels is not None:
-            parts.append(f"labels from {topics.labels}")
+            phrases.append(f"labels from {topics.labels}")
         calibration = calibration_topic(topics.main, self._content)
         if calibration is not None:
-            parts.append(f"calibration from {calibration}")
-        parts.append("no poses" if self.poses is None else self.poses.rule)
-        return (f"{topics.name}: " if named else "") + ", ".join(parts)
+            phrases.append(f"calibration from {calibration}")
+        phrases.append("no poses" if self.poses is None else self.poses.rule)
+        return (f"{topics.name}: " if named else "") + ", ".join(phrases)
 
 
 def _without_frames(log: MessageLog, content: LogContent, damage: tuple[str, ...], rule: str) -> LogSource:

@@ -19,6 +19,7 @@ _OPENERS: dict[str, Callable[..., MessageLog]] = {"mcap": open_mcap, "rosbag1": 
 _SUFFIXES = {".mcap": "mcap", ".bag": "rosbag1", ".db3": "rosbag2"}
 _ROSBAG1_MAGIC = b"#ROSBAG V"
 _METADATA_HEAD = 4096
+"""Bytes of a file in which the key of rosbag2's metadata is looked for; by eye."""
 
 
 def container_of(path: Path) -> str | None:

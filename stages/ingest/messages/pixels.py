@@ -76,6 +76,7 @@ PICTURE = "a picture of depth or labels for people, without the values"
 GREY_OR_PALETTE = (b"\0", b"\3")
 """Colour types in the header of a PNG."""
 LARGEST_LABEL = 65535
+"""Largest label that is stored: labels are kept in 16 bits."""
 
 
 # --- what a topic's images are ---------------------------------------------------------------------------------
@@ -133,8 +134,8 @@ def _role_of_compressed(record: ImageRecord, subject: str, words: list[str]) -> 
 def _color_or_picture(subject: str, words: list[str]) -> tuple[Role, str]:
     """Three channels of a topic about depth are made for people, and so are overlays on anything but colour."""
     values = DEPTH_WORDS | LABEL_WORDS | DISPARITY_WORDS
-    shown = PICTURE_WORDS.intersection(words) and values.intersection(words)
-    return ("other", PICTURE) if shown or subject in DEPTH_WORDS else ("color", "")
+    is_picture = PICTURE_WORDS.intersection(words) and values.intersection(words)
+    return ("other", PICTURE) if is_picture or subject in DEPTH_WORDS else ("color", "")
 
 
 def _telling_words(topic: str) -> list[str]:
@@ -144,8 +145,8 @@ def _telling_words(topic: str) -> list[str]:
     """
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", topic).lower()
     spaced = re.sub(r"(?:_to_|2)(?:color|colour|rgb|left|right|infra)|depth_?cam(?:era)?(?![a-z])", " ", spaced)
-    known = LABEL_WORDS | DEPTH_WORDS | COLOR_WORDS | INFRARED_WORDS | DISPARITY_WORDS | PICTURE_WORDS
-    return [word for word in re.findall(r"[a-z]+", spaced) if word in known]
+    telling = LABEL_WORDS | DEPTH_WORDS | COLOR_WORDS | INFRARED_WORDS | DISPARITY_WORDS | PICTURE_WORDS
+    return [word for word in re.findall(r"[a-z]+", spaced) if word in telling]
 
 
 # --- colour ----------------------------------------------------------------------------------------------------
@@ -165,10 +166,10 @@ def color_pixels(record: ImageRecord) -> np.ndarray | bytes:
     pixels = _raw(record, packing.dtype, packing.channels, "undecodable_color")
     if pixels.dtype == np.uint16:
         pixels = (pixels >> 8).astype(np.uint8)
-    return pixels.copy() if packing.to_rgb is None else _converted(pixels, packing.to_rgb)
+    return pixels.copy() if packing.to_rgb is None else _convert_color(pixels, packing.to_rgb)
 
 
-def _converted(pixels: np.ndarray, conversion: int) -> np.ndarray:
+def _convert_color(pixels: np.ndarray, conversion: int) -> np.ndarray:
     try:
         return cv2.cvtColor(pixels, conversion)
     except cv2.error as error:
@@ -179,7 +180,7 @@ def _planar_color(record: ImageRecord, conversion: int) -> np.ndarray:
     width, height = record.width, record.height
     if width % 2 or height % 2:
         raise Unusable("undecodable_color", f"{record.encoding} of odd size {width}x{height}")
-    return _converted(_rows(record, width, height * 3 // 2, width * height, "undecodable_color"), conversion)
+    return _convert_color(_rows(record, width, height * 3 // 2, width * height, "undecodable_color"), conversion)
 
 
 def _compressed_color(record: ImageRecord) -> np.ndarray | bytes:
@@ -190,7 +191,7 @@ def _compressed_color(record: ImageRecord) -> np.ndarray | bytes:
         raise Unusable(reason, f"{len(data)} bytes of {record.encoding!r:.40}, neither JPEG, PNG nor WebP")
     _check_whole(data, "undecodable_color")
     if not may_be_decoded(data):
-        raise Unusable("undecodable_color", _claimed(data))
+        raise Unusable("undecodable_color", _claimed_size(data))
     image = decode_color(data)
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes of {record.encoding!r:.40}")
@@ -223,7 +224,7 @@ def depth_pixels(record: ImageRecord) -> np.ndarray:
     if record.compressed:
         if is_compressed_depth(record.encoding, record.data):
             return decode_compressed_depth(record.encoding, record.data)
-        image = _decoded_png(record, "undecodable_depth")
+        image = _decode_png(record, "undecodable_depth")
         if image.dtype != np.uint16 or image.ndim != 2:
             raise Unusable("depth_not_16_bit", f"PNG of shape {image.shape}, {image.dtype}: a picture of depth")
         return image
@@ -248,7 +249,7 @@ def depth_unit(record: ImageRecord) -> float:
 def label_pixels(record: ImageRecord) -> np.ndarray:
     """Return labels (H, W) uint16. Raises Unusable."""
     if record.compressed:
-        image = _decoded_png(record, "undecodable_labels")
+        image = _decode_png(record, "undecodable_labels")
         if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
             raise Unusable("undecodable_labels", f"PNG of shape {image.shape}, {image.dtype}")
         return image.astype(np.uint16)
@@ -261,7 +262,7 @@ def label_pixels(record: ImageRecord) -> np.ndarray:
     return image.astype(np.uint16)
 
 
-def _decoded_png(record: ImageRecord, reason: str) -> np.ndarray:
+def _decode_png(record: ImageRecord, reason: str) -> np.ndarray:
     data = record.data
     if data.startswith(JPEG_START):
         raise Unusable("depth_not_16_bit" if "depth" in reason else reason, "JPEG does not keep values")
@@ -269,7 +270,7 @@ def _decoded_png(record: ImageRecord, reason: str) -> np.ndarray:
         raise Unusable(reason, f"{len(data)} bytes of {record.encoding!r:.40}, no PNG")
     _check_whole(data, reason)
     if not may_be_decoded(data):
-        raise Unusable(reason, _claimed(data))
+        raise Unusable(reason, _claimed_size(data))
     image = decode_image(data)
     if image is None:
         raise Unusable(reason, f"PNG of {len(data)} bytes")
@@ -308,7 +309,7 @@ def _is_webp(data: bytes) -> bool:
     return data.startswith(b"RIFF") and data[8:12] == b"WEBP"
 
 
-def _claimed(data: bytes) -> str:
+def _claimed_size(data: bytes) -> str:
     size = image_size(data)
     claim = f"claims {size[0]}x{size[1]} pixels" if size else "has no readable header"
     return f"an image of {len(data)} bytes that {claim}"
@@ -324,32 +325,32 @@ def _check_whole(data: bytes, reason: str) -> None:
 
 def _jpeg_layout(data: bytes) -> tuple[int, int]:
     """Return where the compressed data of a JPEG begins, and how many channels it has; 0 where it does not say."""
-    place, channels = 2, 0
-    while place + 4 <= len(data) and data[place] == 0xFF:
-        marker = data[place + 1]
+    position, channels = 2, 0
+    while position + 4 <= len(data) and data[position] == 0xFF:
+        marker = data[position + 1]
         if marker == 0xFF:
-            place += 1
+            position += 1
         elif marker in JPEG_BARE_MARKERS:
-            place += 2
+            position += 2
         elif marker == 0xDA:
-            return place, channels
+            return position, channels
         else:
-            if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC) and place + 9 < len(data):
-                channels = data[place + 9]
-            place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
-    return place, channels
+            if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC) and position + 9 < len(data):
+                channels = data[position + 9]
+            position += 2 + int.from_bytes(data[position + 2 : position + 4], "big")
+    return position, channels
 
 
 def _check_png(data: bytes, reason: str) -> None:
-    place, view = len(PNG_START), memoryview(data)
-    while place + 12 <= len(data):
-        length = int.from_bytes(view[place : place + 4], "big")
-        end = place + 12 + length
+    position, view = len(PNG_START), memoryview(data)
+    while position + 12 <= len(data):
+        length = int.from_bytes(view[position : position + 4], "big")
+        end = position + 12 + length
         if end > len(data):
             break
-        if zlib.crc32(view[place + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
-            raise Unusable(reason, f"a PNG with a wrong checksum at byte {place}")
-        if view[place + 4 : place + 8] == b"IEND":
+        if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+            raise Unusable(reason, f"a PNG with a wrong checksum at byte {position}")
+        if view[position + 4 : position + 8] == b"IEND":
             return
-        place = end
+        position = end
     raise Unusable(reason, f"truncated: a PNG of {len(data)} bytes without an end")

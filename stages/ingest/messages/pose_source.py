@@ -78,42 +78,42 @@ def find_poses(
     """
     content.tree.prefer(parameters.world_frame)
     if parameters.pose_topic is not None:
-        asked_for = _asked_for(content, frame, parameters, where)
+        asked_for = _from_given_topic(content, frame, parameters, where)
         return asked_for, list(asked_for.notes)
     notes: list[str] = []
-    found = _from_tree(content, frame, parameters, where, notes)
-    if found is None:
-        found = _from_topics(content, frame, parameters, where, notes)
-    if found is None and parameters.world_frame is not None:
+    poses = _from_tree(content, frame, parameters, where, notes)
+    if poses is None:
+        poses = _from_topics(content, frame, parameters, where, notes)
+    if poses is None and parameters.world_frame is not None:
         raise BadInput(
             f"{where}: nothing leads from {parameters.world_frame!r} to the camera frame {frame!r}",
             hint="leave out --world-frame, or record tf and tf_static",
         )
-    if found is None:
+    if poses is None:
         return None, [*notes, "frames have no poses"] if notes else [
             f"no transforms lead to the camera frame {frame!r}: frames have no poses"
         ]
-    return found, [*notes, *found.notes]
+    return poses, [*notes, *poses.notes]
 
 
 def _from_tree(
     content: LogContent, frame: str, parameters: IngestParameters, where: str, notes: list[str]
 ) -> PoseSource | None:
-    tree, wanted = content.tree, parameters.world_frame
-    if wanted is not None:
-        _check_frame(wanted, content, where)
-        if not (frame in tree.frames and wanted in tree.frames and tree.connected(wanted, frame)):
+    tree, world_frame = content.tree, parameters.world_frame
+    if world_frame is not None:
+        _check_frame(world_frame, content, where)
+        if not (frame in tree.frames and world_frame in tree.frames and tree.connected(world_frame, frame)):
             return None
     elif not tree.has_parent(frame):
         return None
-    world = wanted or _world_of(tree.chain(frame))
+    world = world_frame or _world_of(tree.chain(frame))
     edges = tree.between(world, frame)
     _check_parents(tree, edges, where)
     stands_still = f"all transforms from {world!r} to the camera {frame!r} are constant"
     if edges and all(tree.is_constant(edge) for edge in edges):
         if _odometry_of(content, frame) is not None:
             return None
-        if all(tree.is_static(edge) for edge in edges) and wanted is None and not _is_world(world):
+        if all(tree.is_static(edge) for edge in edges) and world_frame is None and not _is_world(world):
             notes.append(
                 f"{stands_still} and static, and nothing says that {world!r} stands still "
                 f"(--world-frame {world} takes it so)"
@@ -139,18 +139,18 @@ def _limits(parameters: IngestParameters) -> tuple[int, int]:
 
 
 def _check_frame(frame: str, content: LogContent, where: str) -> None:
-    known = sorted({*content.tree.frames, *(poses.frame_id for poses in content.poses.values())})
-    if frame not in known:
-        raise BadInput(f"{where}: no frame {frame!r}", hint=f"frames: {', '.join(known) or 'none'}")
+    frames = sorted({*content.tree.frames, *(poses.frame_id for poses in content.poses.values())})
+    if frame not in frames:
+        raise BadInput(f"{where}: no frame {frame!r}", hint=f"frames: {', '.join(frames) or 'none'}")
 
 
 def _check_parents(tree: TransformTree, frames: list[str], where: str) -> None:
     for frame in frames:
         parents = tree.parents(frame)
         if len(parents) > 1 and not tree.is_preferred(frame):
-            named = " and ".join(repr(parent) for parent in parents)
+            parent_names = " and ".join(repr(parent) for parent in parents)
             raise BadInput(
-                f"{where}: frame {frame!r}, above the camera, has two parents, {named}: poses are not known",
+                f"{where}: frame {frame!r}, above the camera, has two parents, {parent_names}: poses are not known",
                 hint="--world-frame says which of them leads to the world",
             )
 
@@ -160,12 +160,12 @@ def _odometry_of(content: LogContent, frame: str) -> Poses | None:
     fitting = [
         poses
         for poses in content.poses.values()
-        if poses.child_frame_id and not NOT_MEASURED & set(words(poses.topic)) and _joined(content, poses, frame)
+        if poses.child_frame_id and not NOT_MEASURED & set(words(poses.topic)) and _are_connected(content, poses, frame)
     ]
     return min(fitting, key=lambda poses: (-poses.track.count, poses.topic), default=None)
 
 
-def _joined(content: LogContent, poses: Poses, frame: str) -> bool:
+def _are_connected(content: LogContent, poses: Poses, frame: str) -> bool:
     if poses.child_frame_id == frame:
         return True
     tree = content.tree
@@ -177,7 +177,7 @@ def _from_topics(
 ) -> PoseSource | None:
     odometry = _odometry_of(content, frame)
     if odometry is not None:
-        return _posed_by(odometry, content, frame, parameters, where)
+        return _source_of_topic(odometry, content, frame, parameters, where)
     bare = [
         poses
         for poses in content.poses.values()
@@ -185,7 +185,7 @@ def _from_topics(
     ]
     best = min(bare, key=lambda poses: (-poses.track.count, poses.topic), default=None)
     if best is not None:
-        return _posed_by(best, content, frame, parameters, where)
+        return _source_of_topic(best, content, frame, parameters, where)
     for poses in sorted(content.poses.values(), key=lambda poses: poses.topic):
         if poses.child_frame_id:
             notes.append(
@@ -195,21 +195,23 @@ def _from_topics(
     return None
 
 
-def _asked_for(content: LogContent, frame: str, parameters: IngestParameters, where: str) -> PoseSource:
+def _from_given_topic(content: LogContent, frame: str, parameters: IngestParameters, where: str) -> PoseSource:
     poses = content.poses.get(str(parameters.pose_topic))
     if poses is None:
-        known = ", ".join(sorted(content.poses)) or "none"
-        raise BadInput(f"{where}: no poses on topic {parameters.pose_topic!r}", hint=f"topics with poses: {known}")
-    if poses.child_frame_id and not _joined(content, poses, frame):
+        topics = ", ".join(sorted(content.poses)) or "none"
+        raise BadInput(f"{where}: no poses on topic {parameters.pose_topic!r}", hint=f"topics with poses: {topics}")
+    if poses.child_frame_id and not _are_connected(content, poses, frame):
         raise BadInput(
             f"{where}: {poses.topic} says where {poses.child_frame_id!r} is, and no transforms lead from there to the "
             f"camera {frame!r}",
             hint="record tf_static",
         )
-    return _posed_by(poses, content, frame, parameters, where)
+    return _source_of_topic(poses, content, frame, parameters, where)
 
 
-def _posed_by(poses: Poses, content: LogContent, frame: str, parameters: IngestParameters, where: str) -> PoseSource:
+def _source_of_topic(
+    poses: Poses, content: LogContent, frame: str, parameters: IngestParameters, where: str
+) -> PoseSource:
     world = parameters.world_frame or poses.frame_id
     if world != poses.frame_id:
         _check_frame(world, content, where)

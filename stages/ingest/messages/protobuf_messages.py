@@ -53,13 +53,13 @@ def protobuf_decoder(type_name: str) -> Callable[[bytes], tuple[Record, ...]] | 
 
 
 def _fields(message: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for field in message.DESCRIPTOR.fields:
         if field.name in UNREAD:
             continue
         value = getattr(message, field.name)
         if field.message_type is not None:
-            found[field.name] = [_fields(part) for part in value] if field.is_repeated else _fields(value)
+            values[field.name] = [_fields(part) for part in value] if field.is_repeated else _fields(value)
         else:
-            found[field.name.lower()] = list(value) if field.is_repeated else value
-    return found
+            values[field.name.lower()] = list(value) if field.is_repeated else value
+    return values

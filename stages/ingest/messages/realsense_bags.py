@@ -41,11 +41,11 @@ def with_stream_frames(topic: str, records: tuple[Record, ...]) -> tuple[Record,
     if match is None:
         return records
     frame = f"{match['device']}/{match['sensor']}/{match['stream']}"
-    found: list[Record] = []
+    with_frames: list[Record] = []
     for record in records:
         if isinstance(record, TransformRecord):
             reference = f"{match['device']}/reference_{match['reference']}"
-            found.append(TransformRecord(record.stamp, reference, frame, inverse(record.parent_from_child)))
+            with_frames.append(TransformRecord(record.stamp, reference, frame, inverse(record.parent_from_child)))
         else:
-            found.append(replace(record, frame_id=frame))
-    return tuple(found)
+            with_frames.append(replace(record, frame_id=frame))
+    return tuple(with_frames)

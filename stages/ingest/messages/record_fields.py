@@ -14,11 +14,13 @@ from scenewright.stages.ingest.messages.records import Undecodable
 LONGEST_NAME = 4096
 """Characters of a frame, an encoding or a model; what is longer is no name."""
 LARGEST_SIZE = 2**32 - 1
+"""Largest width, height or offset that a message may state: an unsigned 32-bit number."""
 LARGEST_SECONDS = 2**33
 """About the year 2242: stamps stay far within 64 bits of nanoseconds."""
 MOST_NUMBERS = 256
+"""Most numbers of a list in a message; a bound, by eye."""
 NORM_TOLERANCE = 0.02
-"""Of the norm of a quaternion from 1."""
+"""Largest difference of the norm of a quaternion from 1; by eye."""
 
 Fields = dict[str, Any]
 

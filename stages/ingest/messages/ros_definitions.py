@@ -43,6 +43,7 @@ PRIMITIVES = {
 """Name in `.msg` or `.idl` -> code of the struct module."""
 TEXT = "string"
 SEQUENCE = -1
+"""Count of a field that is a sequence: any number of values."""
 EMPTY_STRUCT_MEMBER = "structure_needs_at_least_one_member"
 """The one byte that ROS 2 gives a struct without fields, as C has no empty structs; ROS 1 gives it none."""
 
@@ -81,19 +82,19 @@ def definitions_of(type_name: str, schema_encoding: str, schema: bytes) -> Defin
     if len(schema) > LARGEST_DEFINITION:
         raise UnreadableDefinition(f"its definition has {len(schema)} bytes, more than {LARGEST_DEFINITION}")
     text = schema.decode("utf-8", "replace").replace("\r\n", "\n")
-    found: Definitions = {}
+    definitions: Definitions = {}
     if text.strip():
-        found = parse_idl(text) if schema_encoding in ("ros2idl", "omgidl") else parse_msg(text, type_name)
+        definitions = parse_idl(text) if schema_encoding in ("ros2idl", "omgidl") else parse_msg(text, type_name)
     name = short_name(type_name)
-    if name in found and schema_encoding == "ros1msg":
-        found |= {"builtin_interfaces/Time": ROS1_TIME, "builtin_interfaces/Duration": ROS1_TIME}
-    return _completed(name, found, "ros1" if schema_encoding == "ros1msg" else "ros2")
+    if name in definitions and schema_encoding == "ros1msg":
+        definitions |= {"builtin_interfaces/Time": ROS1_TIME, "builtin_interfaces/Duration": ROS1_TIME}
+    return _collect_needed(name, definitions, "ros1" if schema_encoding == "ros1msg" else "ros2")
 
 
 ROS1_TIME = (Field("sec", "I"), Field("nanosec", "I"))
 
 
-def _completed(name: str, found: Definitions, version: str) -> Definitions:
+def _collect_needed(name: str, definitions: Definitions, version: str) -> Definitions:
     """Keep what `name` refers to, directly or not; take missing types from the bundled ones."""
     needed: Definitions = {}
     waiting = [name]
@@ -101,7 +102,7 @@ def _completed(name: str, found: Definitions, version: str) -> Definitions:
         current = waiting.pop()
         if current in needed:
             continue
-        fields = found.get(current)
+        fields = definitions.get(current)
         if fields is None:
             fields = bundled_definitions(version).get(current)
         if fields is None:
@@ -132,14 +133,14 @@ def bundled_definitions(version: str) -> Definitions:
         return Field(name, short_name(detail))
 
     transforms = (Field("transforms", "geometry_msgs/TransformStamped", SEQUENCE),)
-    found: Definitions = {"tf2_msgs/TFMessage": transforms, "tf/tfMessage": transforms}
+    definitions: Definitions = {"tf2_msgs/TFMessage": transforms, "tf/tfMessage": transforms}
     for type_name, (_, fields) in FIELDDEFS.items():
-        found[short_name(type_name)] = tuple(
+        definitions[short_name(type_name)] = tuple(
             field(name.lower(), description) for name, description in fields if name != EMPTY_STRUCT_MEMBER
         )
     if version == "ros1":
-        found |= {"builtin_interfaces/Time": ROS1_TIME, "builtin_interfaces/Duration": ROS1_TIME}
-    return found
+        definitions |= {"builtin_interfaces/Time": ROS1_TIME, "builtin_interfaces/Duration": ROS1_TIME}
+    return definitions
 
 
 # --- .msg ------------------------------------------------------------------------------------------------------
@@ -158,14 +159,14 @@ _SHORTHANDS = {
 
 def parse_msg(text: str, type_name: str) -> Definitions:
     """Return the types of concatenated `.msg` text, the first of which is `type_name`. Raises UnreadableDefinition."""
-    found: dict[str, list[Field]] = {}
+    fields_of: dict[str, list[Field]] = {}
     name = short_name(type_name)
-    fields = found.setdefault(name, [])
+    fields = fields_of.setdefault(name, [])
     for number, line in enumerate(text.split("\n"), start=1):
         line = line.strip()
         if line.startswith("MSG: "):
             name = short_name(line.removeprefix("MSG: ").strip())
-            fields = found[name] = []
+            fields = fields_of[name] = []
             continue
         if not line or line.startswith(("#", "@")) or _SEPARATOR.fullmatch(line):
             continue
@@ -174,7 +175,7 @@ def parse_msg(text: str, type_name: str) -> Definitions:
             raise UnreadableDefinition(f"line {number} of its definition is not understood: {line[:60]!r}")
         if not match["rest"].startswith("="):  # else a constant
             fields.append(Field(match["name"].lower(), _msg_kind(match["kind"], name), _msg_count(match)))
-    return {name: tuple(fields) for name, fields in found.items()}
+    return {name: tuple(fields) for name, fields in fields_of.items()}
 
 
 def _msg_kind(kind: str, owner: str) -> str:
@@ -216,9 +217,9 @@ class _IdlReader:
         self._next: str = next(self._tokens, "")
         self._scope: list[str] = []
         self._constants: dict[str, int] = {}
-        self._named: dict[str, tuple[str, int | None]] = {}
+        self._type_of_name: dict[str, tuple[str, int | None]] = {}
         """Path of a typedef, enum or struct -> kind and count."""
-        self._found: Definitions = {}
+        self._definitions: Definitions = {}
 
     def read(self) -> Definitions:
         while self._next:
@@ -236,20 +237,20 @@ class _IdlReader:
             elif word == "typedef":
                 kind = self._kind()
                 for name, dimensioned in self._declarators(kind):
-                    self._named[self._path(name)] = dimensioned
+                    self._type_of_name[self._path(name)] = dimensioned
             elif word == "enum":
-                self._named[self._path(self._take())] = ("I", None)
+                self._type_of_name[self._path(self._take())] = ("I", None)
                 self._skip_to(";")
             elif word == "struct":
                 self._struct()
             else:
                 raise UnreadableDefinition(f"{word[:40]!r} in its definition is not understood")
-        return self._found
+        return self._definitions
 
     def _struct(self) -> None:
         path = self._path(self._take())
         name = short_name(path)
-        self._named[path] = (name, None)
+        self._type_of_name[path] = (name, None)
         self._expect("{")
         fields: list[Field] = []
         while self._next != "}":
@@ -261,7 +262,7 @@ class _IdlReader:
             fields += [Field(field.lower(), *dimensioned) for field, dimensioned in self._declarators(kind)]
         self._expect("}")
         self._expect(";")
-        self._found[name] = tuple(fields)
+        self._definitions[name] = tuple(fields)
 
     def _constant(self) -> None:
         words = []
@@ -292,20 +293,20 @@ class _IdlReader:
             word = f"{word} {self._take()}"
         if word in PRIMITIVES:
             return PRIMITIVES[word], None
-        return self._resolved(word)
+        return self._resolve(word)
 
-    def _resolved(self, name: str) -> tuple[str, int | None]:
+    def _resolve(self, name: str) -> tuple[str, int | None]:
         path = name.removeprefix("::").replace("::", "/")
         if not re.fullmatch(r"[A-Za-z_][\w/]*", path):
             raise UnreadableDefinition(f"{name[:40]!r} in its definition is no type")
         for depth in range(0 if name.startswith("::") else len(self._scope), -1, -1):
             candidate = "/".join([*self._scope[:depth], path])
-            if candidate in self._named:
-                return self._named[candidate]
+            if candidate in self._type_of_name:
+                return self._type_of_name[candidate]
         return (short_name(path) if "/" in path else short_name(self._path(path))), None
 
     def _declarators(self, kind: tuple[str, int | None]) -> list[tuple[str, tuple[str, int | None]]]:
-        found = []
+        declarators = []
         while True:
             name, dimensioned = self._take(), kind
             if self._next == "[":
@@ -314,10 +315,10 @@ class _IdlReader:
                     raise UnreadableDefinition("its definition has an array of arrays")
                 dimensioned = (kind[0], self._bound())
                 self._expect("]")
-            found.append((name, dimensioned))
+            declarators.append((name, dimensioned))
             separator = self._take()
             if separator == ";":
-                return found
+                return declarators
             if separator != ",":
                 raise UnreadableDefinition(f"{separator[:40]!r} in its definition is not understood")
 
@@ -346,10 +347,10 @@ class _IdlReader:
     def _path(self, name: str) -> str:
         return "/".join([*self._scope, name])
 
-    def _expect(self, wanted: str) -> None:
+    def _expect(self, expected: str) -> None:
         word = self._take()
-        if word != wanted:
-            raise UnreadableDefinition(f"{word[:40]!r} in its definition where {wanted!r} is due")
+        if word != expected:
+            raise UnreadableDefinition(f"{word[:40]!r} in its definition where {expected!r} is due")
 
     def _take(self) -> str:
         word = self._next

@@ -27,6 +27,7 @@ MOST_VALUES = 250_000
 DEEPEST = 24
 """Levels of messages within messages."""
 _ENCAPSULATION = 4
+"""Bytes of the CDR encapsulation header (OMG DDSI-RTPS)."""
 _PADDING = 8
 """Bytes that a CDR message may be longer than its fields: writers round up."""
 
@@ -92,8 +93,8 @@ class RosReader:
             view = view[_ENCAPSULATION:]
         cursor = _Cursor(view, self._plans[order], order, self._aligned)
         fields = cursor.message(self._type_name)
-        left = len(view) - cursor.position
-        if left > (_PADDING if self._aligned else 0):
+        remaining = len(view) - cursor.position
+        if remaining > (_PADDING if self._aligned else 0):
             raise Undecodable("bytes are left over: the message does not fit its definition")
         return fields
 

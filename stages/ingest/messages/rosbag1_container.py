@@ -35,10 +35,11 @@ from scenewright.stages.kit.formats.bounded_unpacking import unpacked
 from scenewright.stages.kit.formats.chunk_cache import ChunkCache
 
 LARGEST_CHUNK = 1 << 30
-"""Unpacked bytes of one chunk that are accepted; what claims more is taken for a bomb."""
+"""Most unpacked bytes of a chunk; what claims more is taken for a bomb."""
 LARGEST_CONNECTION = 16 << 20
 """Bytes of one connection record that are accepted."""
 MOST_CONNECTIONS = 65_536
+"""Most connections of a bag; a bound against damaged files."""
 
 
 class Place(NamedTuple):
@@ -94,9 +95,9 @@ class Rosbag1Messages:
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield messages of the channels (None: all) in file order."""
-        wanted = None if channel_ids is None else set(channel_ids)
+        wanted_ids = None if channel_ids is None else set(channel_ids)
         for index, _ in sorted(enumerate(self._chunks), key=lambda pair: pair[1]):
-            yield from self._chunk_messages(index, wanted)
+            yield from self._chunk_messages(index, wanted_ids)
 
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
@@ -131,8 +132,8 @@ class Rosbag1Messages:
         for channel in self._in_index:
             self._define(channel)
         if self._plain_chunks:
-            many = f"{self._plain_chunks} of {len(self._chunks)} chunks"
-            self.notes.append(f"{many} carry no checksum: changed bytes in them cannot be noticed")
+            share = f"{self._plain_chunks} of {len(self._chunks)} chunks"
+            self.notes.append(f"{share} carry no checksum: changed bytes in them cannot be noticed")
         self.channels = tuple(self._channel(number) for number in sorted(self._connections))
         self._connections = {channel.id: channel for channel in self.channels}
 
@@ -218,9 +219,9 @@ class Rosbag1Messages:
         data = self._data(record)
         if record.number(b"count") * 8 != len(data):
             raise Damaged("is a chunk info that lies about its length")
-        for place in range(0, len(data), 8):
-            connection = int.from_bytes(data[place : place + 4], "little")
-            self._stated[connection] += int.from_bytes(data[place + 4 : place + 8], "little")
+        for start_of_entry in range(0, len(data), 8):
+            connection = int.from_bytes(data[start_of_entry : start_of_entry + 4], "little")
+            self._stated[connection] += int.from_bytes(data[start_of_entry + 4 : start_of_entry + 8], "little")
 
     def _skip(self, offset: int, scan_from: int, fault: Damaged) -> int | None:
         """Return where reading goes on after a damaged record, and note what is lost; None: nothing follows."""
@@ -229,13 +230,13 @@ class Rosbag1Messages:
         if following is None:
             following = find_chunk(self._file, scan_from + (scan_from == offset))
         lost = (self._size if following is None else following) - offset
-        what = f"record at byte {offset} of {self._size} {fault}"
+        fault_text = f"record at byte {offset} of {self._size} {fault}"
         if str(fault) == "ends within it":
-            what = f"ends within the record at byte {offset} of {self._size}"
+            fault_text = f"ends within the record at byte {offset} of {self._size}"
         if following is None:
-            self._lines.found(f"{what}: the last {lost} bytes are lost, and what was not written")
+            self._lines.found(f"{fault_text}: the last {lost} bytes are lost, and what was not written")
         else:
-            self._lines.found(f"{what}: {max(lost, 0)} bytes are lost; reading goes on at byte {following}")
+            self._lines.found(f"{fault_text}: {max(lost, 0)} bytes are lost; reading goes on at byte {following}")
         return following
 
     def _own_end(self, offset: int) -> int | None:
@@ -267,7 +268,7 @@ class Rosbag1Messages:
         """Collect the connections from the chunks of a bag without a whole index."""
         self._stated = Counter()
         for index in range(len(self._chunks)):
-            found: Counter[int] = Counter()
+            counts_here: Counter[int] = Counter()
             try:
                 data, offset = self._unpack(index), 0
                 while offset < len(data):
@@ -275,20 +276,24 @@ class Rosbag1Messages:
                     if record.op == CONNECTION:
                         self._define(_connection(record, data[record.start : record.end]))
                     elif record.op == MESSAGE:
-                        found[record.number(b"conn")] += 1
+                        counts_here[record.number(b"conn")] += 1
                     offset = record.end
             except Damaged as fault:
-                self._chunk_damage(index, fault, found)
-            self._stated.update(found)
+                self._chunk_damage(index, fault, counts_here)
+            self._stated.update(counts_here)
 
     def _define(self, channel: Channel) -> None:
         """Take in a connection; one that contradicts an earlier one is damage, and the earlier one stays."""
         number = channel.id
         if number not in self._connections and len(self._connections) >= MOST_CONNECTIONS:
             raise Damaged(f"has more than the {MOST_CONNECTIONS} connections that are accepted")
-        known = self._connections.setdefault(number, channel)
-        if (known.topic, known.type_name, known.schema) != (channel.topic, channel.type_name, channel.schema):
-            names = f"as {known.topic!r} and as {channel.topic!r}"
+        first_channel = self._connections.setdefault(number, channel)
+        if (first_channel.topic, first_channel.type_name, first_channel.schema) != (
+            channel.topic,
+            channel.type_name,
+            channel.schema,
+        ):
+            names = f"as {first_channel.topic!r} and as {channel.topic!r}"
             self._lines.found(f"connection {number} is defined twice, {names}: the first is used")
 
     def _channel(self, number: int) -> Channel:
@@ -299,9 +304,9 @@ class Rosbag1Messages:
 
     # --- reading ---------------------------------------------------------------------------------------------
 
-    def _chunk_messages(self, index: int, wanted: set[int] | None) -> Iterator[StoredMessage]:
+    def _chunk_messages(self, index: int, wanted_ids: set[int] | None) -> Iterator[StoredMessage]:
         """Yield the wanted messages of a chunk; what is wrong in it is noted when it is read to its end."""
-        found: Counter[int] = Counter()
+        counts_here: Counter[int] = Counter()
         first = index not in self._examined
         try:
             data, offset = self._unpack(index), 0
@@ -309,33 +314,33 @@ class Rosbag1Messages:
                 record = record_within(data, offset)
                 if record.op == MESSAGE:
                     number, time = record.number(b"conn"), record.time(b"time")
-                    found[number] += 1
+                    counts_here[number] += 1
                     channel = self._connections.get(number)
-                    if channel is not None and (wanted is None or number in wanted):
-                        place = Place(index, offset)
-                        yield StoredMessage(channel, time, data[record.start : record.end], place)
+                    if channel is not None and (wanted_ids is None or number in wanted_ids):
+                        location = Place(index, offset)
+                        yield StoredMessage(channel, time, data[record.start : record.end], location)
                 elif record.op == CONNECTION:
                     self._define(_connection(record, data[record.start : record.end]))
                 offset = record.end
         except Damaged as fault:
-            self._chunk_damage(index, fault, found)
+            self._chunk_damage(index, fault, counts_here)
         else:
             stated = self._indexed.get(index)
-            if first and stated is not None and found.total() < stated.total():
+            if first and stated is not None and counts_here.total() < stated.total():
                 self._lines.found(
-                    f"chunk at byte {self._chunks[index]} holds {found.total()} messages, "
+                    f"chunk at byte {self._chunks[index]} holds {counts_here.total()} messages, "
                     f"its index names {stated.total()}"
                 )
         self._examined.add(index)
-        for number, times in sorted(found.items() if first else ()):
+        for number, times in sorted(counts_here.items() if first else ()):
             if number not in self._connections:
                 self._lines.found(f"a message belongs to connection {number}, which the bag does not define", times)
 
-    def _chunk_damage(self, index: int, fault: Damaged, found: Counter[int]) -> None:
+    def _chunk_damage(self, index: int, fault: Damaged, counts_here: Counter[int]) -> None:
         stated = self._indexed.get(index)
         count = "no index says how many messages" if stated is None else f"{stated.total()} messages by its index"
-        rest = f"all but its first {found.total()} messages are lost" if found else "it is lost"
-        self._lines.found(f"chunk at byte {self._chunks[index]} ({count}) {fault}: {rest}")
+        consequence = f"all but its first {counts_here.total()} messages are lost" if counts_here else "it is lost"
+        self._lines.found(f"chunk at byte {self._chunks[index]} ({count}) {fault}: {consequence}")
 
     def _unpack(self, index: int) -> bytes:
         record = read_record(self._file, self._chunks[index])
@@ -355,8 +360,8 @@ class Rosbag1Messages:
             raise Damaged(f"has {record.length} bytes, more than the {LARGEST_CONNECTION} that are accepted")
         return self._file.exactly(record.start, record.length)
 
-    def _bad(self, what: str) -> BadInput:
-        return BadInput(f"{self.path}: {what}", hint=HINT)
+    def _bad(self, fault: str) -> BadInput:
+        return BadInput(f"{self.path}: {fault}", hint=HINT)
 
 
 def open_rosbag1(path: Path, *, salvage: bool) -> Rosbag1Messages:

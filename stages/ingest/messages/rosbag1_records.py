@@ -14,14 +14,18 @@ from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
+"""Values of `op` in a record's header (ROS bag format 2.0)."""
 COMPRESSIONS = (b"none", b"bz2", b"lz4")
 LARGEST_HEADER = 1 << 20
-"""Bytes of a record's header that are accepted."""
+"""Most bytes of a record's header; a bound against damaged files."""
 _USUAL_HEADER = 256
+"""Bytes that are read first of a record's header: most are no longer."""
 _LENGTH = struct.Struct("<I")
 _WINDOW = 4 << 20
+"""Bytes that are searched at a time for a chunk; by eye."""
 _CHUNK_START = re.compile(rb"[\x10-\x80]\0{3}[\x04-\x40]\0{3}(?:op=\x05|size=|compression=)", re.DOTALL)
 _LONGEST_HEADER = 0x80
+"""Longest header of a chunk that is searched for [bytes]; by eye."""
 _MARK = b"op=" + bytes([CHUNK])
 
 
@@ -50,21 +54,21 @@ class Record:
 
     def time(self, name: bytes) -> int:
         """Return a field that holds seconds and nanoseconds [ns]. Raises Damaged."""
-        both = self.number(name, 8)
-        return (both & 0xFFFFFFFF) * 1_000_000_000 + (both >> 32)
+        packed = self.number(name, 8)
+        return (packed & 0xFFFFFFFF) * 1_000_000_000 + (packed >> 32)
 
 
 def read_fields(header: bytes) -> dict[bytes, bytes]:
     """Return the fields of a header. Raises Damaged when they do not fill it exactly."""
-    fields, place = {}, 0
-    while place < len(header):
-        if place + 4 > len(header):
+    fields, position = {}, 0
+    while position < len(header):
+        if position + 4 > len(header):
             raise Damaged("has a header that ends within a field")
-        (length,) = _LENGTH.unpack_from(header, place)
-        place += 4 + length
-        if place > len(header):
+        (length,) = _LENGTH.unpack_from(header, position)
+        position += 4 + length
+        if position > len(header):
             raise Damaged("has a header that ends within a field")
-        name, mark, value = header[place - length : place].partition(b"=")
+        name, mark, value = header[position - length : position].partition(b"=")
         if not mark:
             raise Damaged("has a header field without a value")
         fields[name] = value
@@ -117,12 +121,12 @@ def find_chunk(file: LogFile, start: int) -> int | None:
             window = file.read(begin, _WINDOW + _LONGEST_HEADER)
         except Damaged:  # a part of the disk that cannot be read
             continue
-        place = window.find(_MARK)
-        while place >= 0:
-            for match in _CHUNK_START.finditer(window, max(0, place - _LONGEST_HEADER), place + len(_MARK)):
+        mark_at = window.find(_MARK)
+        while mark_at >= 0:
+            for match in _CHUNK_START.finditer(window, max(0, mark_at - _LONGEST_HEADER), mark_at + len(_MARK)):
                 if _is_chunk(file, begin + match.start()):
                     return begin + match.start()
-            place = window.find(_MARK, place + 1)
+            mark_at = window.find(_MARK, mark_at + 1)
     return None
 
 

@@ -23,9 +23,11 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 GREATEST_RATIO = 100
 """Unpacked over packed bytes of a part that states no size; 64 MiB are always accepted."""
 GREATEST_STATED_RATIO = 1000
+"""Largest ratio of unpacked to packed size where the metadata states the packing; by eye."""
 ALWAYS_ACCEPTED = 64 << 20
+"""Bytes up to which a part is unpacked whatever its ratio; by eye."""
 MOST_OPEN = 8
-"""Parts that are open at a time."""
+"""Most parts that are open at a time."""
 Part = McapMessages | SqliteMessages
 
 
@@ -47,7 +49,7 @@ class Rosbag2Messages:
         self.damage: list[str] = []
         self.notes: list[str] = []
         self._salvage = salvage
-        self._own = DamageLines(path, salvage=salvage)
+        self._lines = DamageLines(path, salvage=salvage)
         self._of_parts: dict[int, list[str]] = {}
         self._open: dict[int, Part] = {}
         self._in_use: list[int] = []
@@ -68,28 +70,30 @@ class Rosbag2Messages:
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield messages of the channels (None: all), part by part in the order in which they were stored."""
-        wanted = None if channel_ids is None else set(channel_ids)
+        wanted_ids = None if channel_ids is None else set(channel_ids)
         for index in self._readable:
-            inside = {own: number for (part, own), number in self._numbers.items() if part == index}
-            chosen = [own for own, number in inside.items() if wanted is None or number in wanted]
-            if wanted is not None and not chosen:
+            inside = {part_channel: number for (part, part_channel), number in self._numbers.items() if part == index}
+            chosen = [
+                part_channel for part_channel, number in inside.items() if wanted_ids is None or number in wanted_ids
+            ]
+            if wanted_ids is not None and not chosen:
                 continue
             part = self._part(index)
             self._in_use.append(index)
             faults: Counter[str] = Counter()
             try:
-                for message in part.messages(None if wanted is None else chosen):
+                for message in part.messages(None if wanted_ids is None else chosen):
                     try:
-                        stored = self._stored(index, message)
+                        stored = self._as_stored(index, message)
                     except ValueError as error:
                         faults[f"a packed message {error}"] += 1
                         continue
                     yield stored
             except BadInput as error:
-                raise self._named(index, error) from None
+                raise self._with_part_name(index, error) from None
             finally:
                 self._in_use.remove(index)
-            packed = [f"{number} times: {what}" for what, number in sorted(faults.items())]
+            packed = [f"{number} times: {reason}" for reason, number in sorted(faults.items())]
             if packed and not self._salvage:
                 raise BadInput(f"{self.path}: {self._name(index)}: {packed[0]}", hint=HINT)
             self._of_parts[index] = [*part.damage, *packed]
@@ -100,13 +104,13 @@ class Rosbag2Messages:
         if not isinstance(location, Place) or location.part not in self._readable:
             raise BadInput(f"{self.path}: {location!r} is no place in the bag")
         try:
-            return self._stored(location.part, self._part(location.part).fetch(location.inside))
+            return self._as_stored(location.part, self._part(location.part).fetch(location.inside))
         except BadInput as error:
-            raise self._named(location.part, error) from None
+            raise self._with_part_name(location.part, error) from None
         except ValueError as error:
             raise BadInput(f"{self.path}: {self._name(location.part)}: a packed message {error}", hint=HINT) from None
 
-    def _stored(self, index: int, message: StoredMessage) -> StoredMessage:
+    def _as_stored(self, index: int, message: StoredMessage) -> StoredMessage:
         channel = self.channels[self._numbers[index, message.channel.id]]
         data = unpacked_within(message.data, LARGEST_MESSAGE) if self._bag.packed_messages else message.data
         return StoredMessage(channel, message.log_time, data, Place(index, message.location))
@@ -124,7 +128,7 @@ class Rosbag2Messages:
         except BadInput as error:
             if not self._salvage or "outside of the folder" in error.message:
                 raise
-            self._own.note(f"{error.message}: the parts are taken in the order of their names")
+            self._lines.note(f"{error.message}: the parts are taken in the order of their names")
             return BagMetadata(listed_parts(self.path))
 
     def _survey(self) -> None:
@@ -137,7 +141,7 @@ class Rosbag2Messages:
                 part = self._part(index)
             except BadInput as error:
                 reasons.append(f"{path.name}: {error.message.removeprefix(f'{path}: ')}")
-                self._own.found(f"part {reasons[-1]}")
+                self._lines.found(f"part {reasons[-1]}")
                 continue
             self._readable.append(index)
             self._of_parts[index] = list(part.damage)
@@ -168,14 +172,14 @@ class Rosbag2Messages:
     def _compare_counts(self) -> None:
         counts = [channel.count for channel in self.channels]
         stated = self._bag.message_count
-        if stated is None or None in counts or any(self._of_parts.values()) or self._own:
+        if stated is None or None in counts or any(self._of_parts.values()) or self._lines:
             return
-        held = sum(count or 0 for count in counts)
-        if held < stated:
-            self._own.found(f"{NAME} counts {stated} messages, the parts hold {held}")
+        count_of_parts = sum(count or 0 for count in counts)
+        if count_of_parts < stated:
+            self._lines.found(f"{NAME} counts {stated} messages, the parts hold {count_of_parts}")
 
     def _refresh(self) -> None:
-        lines = list(self._own)
+        lines = list(self._lines)
         for index, of_part in sorted(self._of_parts.items()):
             prefix = f"{self._name(index)}: " if self.path.is_dir() else ""
             lines += [prefix + line for line in of_part]
@@ -188,10 +192,10 @@ class Rosbag2Messages:
         """Return a part, opened; the one that was used longest ago is closed when many are open."""
         part = self._open.pop(index, None)
         if part is None:
-            idle = [other for other in self._open if other not in self._in_use]
+            idle = [part_index for part_index in self._open if part_index not in self._in_use]
             if len(self._open) >= MOST_OPEN and idle:
                 self._close_part(idle[0])
-            part = self._opened(index)
+            part = self._open_part(index)
         self._open[index] = part
         return part
 
@@ -201,7 +205,7 @@ class Rosbag2Messages:
         if index in self._unpacked:
             self._unpacked.pop(index).cleanup()
 
-    def _opened(self, index: int) -> Part:
+    def _open_part(self, index: int) -> Part:
         """Open a part; one that is packed as a whole is unpacked into a temporary folder first."""
         path = self._bag.parts[index]
         opened = path
@@ -213,17 +217,17 @@ class Rosbag2Messages:
                 return McapMessages(opened, salvage=self._salvage)
             if head.startswith(SQLITE_MAGIC):
                 return SqliteMessages(opened, salvage=self._salvage)
-            what = "is neither MCAP nor SQLite (wrong first bytes)" if head else "is empty"
-            raise BadInput(f"{path}: {what}", hint=HINT)
+            fault = "is neither MCAP nor SQLite (wrong first bytes)" if head else "is empty"
+            raise BadInput(f"{path}: {fault}", hint=HINT)
         except BadInput as error:
-            error = self._named(index, error)
+            error = self._with_part_name(index, error)
             self._close_part(index)
             raise error from None
         except BaseException:
             self._close_part(index)
             raise
 
-    def _named(self, index: int, error: BadInput) -> BadInput:
+    def _with_part_name(self, index: int, error: BadInput) -> BadInput:
         """Return an error with the name of the part, where it has that of the unpacked file."""
         if index not in self._unpacked:
             return error
@@ -243,7 +247,7 @@ class Rosbag2Messages:
                 limit = max(ALWAYS_ACCEPTED, ratio * path.stat().st_size)
                 unpack_file(packed, file, limit if stated is None else min(limit, stated))
         except ValueError as error:
-            self._own.found(f"part {path.name} {error}")
+            self._lines.found(f"part {path.name} {error}")
         except OSError as error:
             raise MachineFailure(
                 f"{path}: cannot be unpacked into {folder.name}: {error.strerror}", hint="free space, or set TMPDIR"

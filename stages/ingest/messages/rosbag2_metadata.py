@@ -23,7 +23,7 @@ from scenewright.schemas.outside import file_text
 NAME = "metadata.yaml"
 KEY = "rosbag2_bagfile_information"
 LARGEST = 2 << 20
-"""Bytes of a metadata.yaml that are accepted; a bag of 1,000 parts has about a tenth of it."""
+"""Most bytes of a metadata.yaml; a bag of 1,000 parts has about a tenth of it."""
 DEEPEST = 20
 """Maps and lists within each other that are accepted."""
 PART_SUFFIXES = (".db3", ".mcap")
@@ -48,7 +48,7 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
         tree = _tree(file_text(path, LARGEST))
         if not isinstance(tree, dict) or not isinstance(tree.get(KEY), dict):
             raise ValueError("it does not describe a bag")
-        return _described(folder, tree[KEY])
+        return _metadata_of(folder, tree[KEY])
     except BadInput:
         raise
     except (OSError, ValueError, YAMLError) as error:
@@ -94,7 +94,7 @@ def _tree(text: str) -> Any:
     return top[0] if top else None
 
 
-def _described(folder: Path, information: dict[str, Any]) -> BagMetadata:
+def _metadata_of(folder: Path, information: dict[str, Any]) -> BagMetadata:
     mode, packing = str(information.get("compression_mode", "")).lower(), information.get("compression_format", "")
     if mode not in ("", "none") and packing != "zstd":
         raise ValueError(f"messages are packed with {packing!r:.40}, only zstd is read")

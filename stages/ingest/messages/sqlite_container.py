@@ -23,15 +23,18 @@ from scenewright.stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"SQLite format 3\x00"
 _HEAD_SIZE = 100
+"""Bytes of the head of an SQLite file (SQLite file format)."""
 _MOST_STEPS = 4000
 """Millions of steps of SQLite's machine that opening may take; a sound bag of 10 million messages takes about 300."""
 _FAULTS = (sqlite3.Error, UnicodeDecodeError, MemoryError)
 """What Python makes of a damaged file; the second of an error message with a damaged name, the third of a row that
 claims more than is accepted."""
 _MOST_TOPICS = 65_536
+"""Most topics of a bag; a bound against damaged files."""
 _PAGE_SIZES = {1 << power for power in range(9, 17)}
+"""Page sizes that SQLite allows (SQLite file format)."""
 LARGEST_MESSAGE = 512 << 20
-"""Bytes of one message that are accepted."""
+"""Most bytes of a message; a bound against damaged files."""
 _JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 _WAL_MAGICS = (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83")
 _ROWS = "SELECT rowid, topic_id, timestamp, {data} FROM messages WHERE rowid > ?"
@@ -89,8 +92,8 @@ class SqliteMessages:
                 yield StoredMessage(self._topics[topic], time, data, number)
         if not self._counted:
             self._counted = channel_ids is None
-            for what, times in sorted(faults.items()):
-                self._lines.found(what, times)
+            for reason, times in sorted(faults.items()):
+                self._lines.found(reason, times)
 
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
@@ -115,8 +118,8 @@ class SqliteMessages:
         finally:
             file.close()
         if not head.startswith(MAGIC):
-            what = "is no SQLite file (wrong first bytes)" if head else "is empty"
-            raise BadInput(f"{self.path}: {what}", hint=HINT)
+            wrong_start = "is no SQLite file (wrong first bytes)" if head else "is empty"
+            raise BadInput(f"{self.path}: {wrong_start}", hint=HINT)
         return head, file.size
 
     def _check_size(self, head: bytes, size: int) -> None:
@@ -130,7 +133,7 @@ class SqliteMessages:
         if missing > 0:
             self._lines.found(f"is cut: {missing} bytes less than it should have, what stood there is lost")
         if size % page:
-            copy = self._copied([])
+            copy = self._copy_files([])
             os.truncate(copy, size - size % page)
             self._database.close()
             self._database = self._connect(copy, "mode=ro&immutable=1")
@@ -148,7 +151,7 @@ class SqliteMessages:
 
     def _journals(self) -> list[Path]:
         """Return the journals beside the file that hold what a recorder, cut short, had not moved into it."""
-        found = []
+        journals = []
         path = self.path.resolve()
         for suffix, magics in (("-wal", _WAL_MAGICS), ("-journal", (_JOURNAL_MAGIC,))):
             journal = path.with_name(path.name + suffix)
@@ -156,14 +159,14 @@ class SqliteMessages:
                 if journal.is_file():
                     with journal.open("rb") as file:
                         if file.read(len(_JOURNAL_MAGIC)).startswith(magics):
-                            found.append(journal)
+                            journals.append(journal)
             except OSError:
                 continue
-        return found
+        return journals
 
     def _take_in(self, journals: list[Path]) -> None:
         """Open a copy, into which SQLite takes the journals in; the file itself is never written."""
-        copy = self._copied(journals)
+        copy = self._copy_files(journals)
         try:
             taken_in = self._connect(copy, "mode=rw")
             taken_in.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
@@ -174,7 +177,7 @@ class SqliteMessages:
         self._database = taken_in
         self.notes.append("the recording ended without closing the bag; its journal was taken in")
 
-    def _copied(self, journals: list[Path]) -> Path:
+    def _copy_files(self, journals: list[Path]) -> Path:
         """Copy the file and its journals into a temporary folder; return the copy."""
         path = self.path.resolve()
         try:
@@ -213,13 +216,13 @@ class SqliteMessages:
     def _check_structure(self) -> bool:
         """Have SQLite follow all pages once; return whether it finds nothing."""
         try:
-            found = [str(row[0]) for row in self._database.execute("PRAGMA quick_check(5)")]
+            complaints = [str(row[0]) for row in self._database.execute("PRAGMA quick_check(5)")]
         except _FAULTS as error:
-            found = [_reason(error)]
-        for line in found:
+            complaints = [_reason(error)]
+        for line in complaints:
             if line != "ok":
                 self._lines.found(f"structure is damaged: {_reason(line.removeprefix('*** in database main ***'))}")
-        return found == ["ok"]
+        return complaints == ["ok"]
 
     def _tables(self) -> set[str]:
         """Return the names of the true tables; views and virtual tables could compute anything."""
@@ -255,22 +258,22 @@ class SqliteMessages:
 
         Rows of other channels are stepped over here and not in SQL: pages that lead in a circle would keep it there.
         """
-        data, wanted = "data", tuple(channel_ids or ())
+        data, wanted_ids = "data", tuple(channel_ids or ())
         if channel_ids is not None:
-            data = f"CASE WHEN topic_id IN ({','.join('?' * len(wanted))}) THEN data END"
+            data = f"CASE WHEN topic_id IN ({','.join('?' * len(wanted_ids))}) THEN data END"
         query = _ROWS.format(data=data) + " ORDER BY rowid"
         last = -1
         while True:
             try:
-                for row in self._database.execute(query, (*wanted, last)):
+                for row in self._database.execute(query, (*wanted_ids, last)):
                     if row[0] <= last:
                         raise sqlite3.DatabaseError("its pages lead in a circle")
                     last = row[0]
-                    if channel_ids is None or row[1] in wanted:
+                    if channel_ids is None or row[1] in wanted_ids:
                         yield row
                 return
             except _FAULTS as error:
-                following = self._next_readable(query, wanted, last)
+                following = self._next_readable(query, wanted_ids, last)
                 if following is None:
                     self._lines.found(f"messages after number {last} cannot be read ({_reason(error)}): they are lost")
                     return
@@ -279,10 +282,10 @@ class SqliteMessages:
                     span = f"messages {last + 1} to {following[0] - 1}"
                     self._lines.found(f"{span} cannot be read ({_reason(error)}): up to {lost} are lost")
                 last = following[0]
-                if channel_ids is None or following[1] in wanted:
+                if channel_ids is None or following[1] in wanted_ids:
                     yield following
 
-    def _next_readable(self, query: str, wanted: tuple[int, ...], last: int) -> tuple[int, Any, Any, Any] | None:
+    def _next_readable(self, query: str, wanted_ids: tuple[int, ...], last: int) -> tuple[int, Any, Any, Any] | None:
         """Return the next row after `last` that can be read, found in steps that double, then halve; None: no more.
 
         sqlite3 reads one row ahead, so that the first may be the very next.
@@ -291,7 +294,7 @@ class SqliteMessages:
         def first(number: int) -> Any:
             """Return the first row from a number on, None at the end, False when it cannot be read."""
             try:
-                row = self._database.execute(query + " LIMIT 1", (*wanted, number - 1)).fetchone()
+                row = self._database.execute(query + " LIMIT 1", (*wanted_ids, number - 1)).fetchone()
             except _FAULTS:
                 return False
             return row if row is None or row[0] >= number else False

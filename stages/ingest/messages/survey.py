@@ -32,6 +32,7 @@ IMU_STEP = 50_000_000
 SIZE_ATTEMPTS = 20
 """Compressed images of a topic that are decoded to learn their size."""
 MOST_REASONS = 20
+"""Most reasons a topic that are counted apart; the rest are "other reasons"."""
 LATEST = 1 << 62
 """Log times [ns] beyond this, in the year 2116, are damage and count as this."""
 STATIC = "tf_static"
@@ -59,8 +60,8 @@ class Topic:
 
     def broken(self, reason: str) -> None:
         """Count a message that does not decode. Reasons may name numbers, so that there can be one for each message."""
-        known = reason in self.undecodable or len(self.undecodable) < MOST_REASONS
-        self.undecodable[reason if known else "other reasons"] += 1
+        is_listed = reason in self.undecodable or len(self.undecodable) < MOST_REASONS
+        self.undecodable[reason if is_listed else "other reasons"] += 1
 
     def described(self) -> str:
         """Type and encoding, for people."""
@@ -237,10 +238,10 @@ class _Reader:
 
     def _add_calibration(self, record: CalibrationRecord, topic: Topic) -> None:
         topic.role = "calibration"
-        known = self._content.calibrations.get(topic.name)
-        if known is None or (is_calibrated(record) and not is_calibrated(known)):
+        first_record = self._content.calibrations.get(topic.name)
+        if first_record is None or (is_calibrated(record) and not is_calibrated(first_record)):
             self._content.calibrations[topic.name] = record
-        elif is_calibrated(record) and _numbers(record) != _numbers(known):
+        elif is_calibrated(record) and _numbers(record) != _numbers(first_record):
             self._content.changed_calibrations.add(topic.name)
 
     def _add_pose(self, record: PoseRecord, topic: Topic, stamp: int) -> None:
@@ -312,8 +313,8 @@ def _finish(content: LogContent) -> None:
     for frame in content.tree.frames:
         parents = content.tree.parents(frame)
         if len(parents) > 1:
-            named = " and ".join(repr(parent) for parent in parents)
-            content.notes.append(f"WARNING: frame {frame!r} has {len(parents)} parents: {named}")
+            parent_names = " and ".join(repr(parent) for parent in parents)
+            content.notes.append(f"WARNING: frame {frame!r} has {len(parents)} parents: {parent_names}")
     for frame in content.tree.changes_though_static():
         content.notes.append(
             f"WARNING: the static transform of {frame!r} changes within the log: the first one is used"

@@ -84,12 +84,12 @@ def place(topic: str) -> tuple[str, ...]:
     match = _REALSENSE.fullmatch(topic)
     if match:
         return (match[1].lstrip("/"), *(part for part in [match[2].lower()] if part.startswith("infra")))
-    found = []
+    place_words = []
     for part in without_transport(topic).split("/"):
-        kept = [word for word in re.split(r"[^A-Za-z0-9]+", part) if word and word.lower() not in STREAM_WORDS]
-        if kept:
-            found.append("_".join(kept))
-    return tuple(found)
+        own_words = [word for word in re.split(r"[^A-Za-z0-9]+", part) if word and word.lower() not in STREAM_WORDS]
+        if own_words:
+            place_words.append("_".join(own_words))
+    return tuple(place_words)
 
 
 def is_within(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
@@ -107,15 +107,15 @@ def common_length(first: str, second: str) -> int:
 
 def is_rectified(topic: str) -> bool:
     """Whether a topic promises images without distortion, as image_proc names them."""
-    found = words(without_transport(topic))
-    return "rect" in found or "rectified" in found
+    topic_words = words(without_transport(topic))
+    return "rect" in topic_words or "rectified" in topic_words
 
 
 def is_registered(topic: str) -> bool:
     """Whether a depth topic promises that its pixels are those of the colour image."""
-    found = words(topic)
-    return bool(REGISTERED_WORDS & set(found)) or ("depth", "to", "rgb") in zip(
-        found, found[1:], found[2:], strict=False
+    topic_words = words(topic)
+    return bool(REGISTERED_WORDS & set(topic_words)) or ("depth", "to", "rgb") in zip(
+        topic_words, topic_words[1:], topic_words[2:], strict=False
     )
 
 
@@ -133,13 +133,13 @@ def calibration_names(topic: str) -> tuple[str, ...]:
 
 def other_side(topic: str, *, left: bool) -> list[str]:
     """Return what the topic of the left (or right) eye may be called, given that of the other one."""
-    found = []
+    names = []
     for pair in SIDES:
-        wanted, given = pair if left else pair[::-1]
-        pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(given)}(?![0-9A-Za-z])", re.IGNORECASE)
+        side_word, given_word = pair if left else pair[::-1]
+        pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(given_word)}(?![0-9A-Za-z])", re.IGNORECASE)
         if pattern.search(topic):
-            found.append(pattern.sub(wanted, topic))
-    return found
+            names.append(pattern.sub(side_word, topic))
+    return names
 
 
 def camera_names(places: Iterable[tuple[str, ...]], streams: Iterable[str]) -> list[str]:
@@ -147,15 +147,19 @@ def camera_names(places: Iterable[tuple[str, ...]], streams: Iterable[str]) -> l
 
     A single camera is called `camera`. `streams` say what to call one whose place tells nothing.
     """
-    known = list(places)
-    if len(known) == 1:
+    places_left = list(places)
+    if len(places_left) == 1:
         return ["camera"]
     shared = 0
-    while known and all(len(one) > shared for one in known) and len({one[shared] for one in known}) == 1:
+    while (
+        places_left
+        and all(len(place_words) > shared for place_words in places_left)
+        and len({place_words[shared] for place_words in places_left}) == 1
+    ):
         shared += 1
     names: list[str] = []
-    for one, stream in zip(known, streams, strict=True):
-        name = re.sub(r"[^A-Za-z0-9]+", "_", "_".join(one[shared:])).strip("_") or stream
+    for place_words, stream in zip(places_left, streams, strict=True):
+        name = re.sub(r"[^A-Za-z0-9]+", "_", "_".join(place_words[shared:])).strip("_") or stream
         unique, number = name, 2
         while unique in names:
             unique, number = f"{name}_{number}", number + 1

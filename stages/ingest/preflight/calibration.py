@@ -12,6 +12,7 @@ CENTER_TOLERANCE = 0.15
 FIELD_OF_VIEW = (25.0, 130.0)
 """Horizontal, degrees: from a long lens to a wide one without distortion."""
 ASPECT = (0.8, 1.25)
+"""Focal lengths fx / fy between which pixels are plausible; by eye."""
 RESIZES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 1.5, 2.0, 3.0, 4.0)
 """Ratios of image sizes in which cameras are used."""
 
@@ -37,14 +38,14 @@ def calibration_report(camera: Camera) -> CalibrationReport:
 
 def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -> list[Finding]:
     """Return what is odd about the intrinsics."""
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str) -> None:
-        found.append(Finding(severity=severity, check="calibration", message=message, fix=fix, camera=name))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="calibration", message=message, fix=fix, camera=name))  # type: ignore[arg-type]
 
     give = "give --fx --fy --cx --cy"
     if max(map(abs, report.center_offset)) > CENTER_TOLERANCE:
-        place = (
+        intrinsics = (
             f"the principal point ({camera.cx:g}, {camera.cy:g}) is far from the middle of a "
             f"{camera.width}x{camera.height} image"
         )
@@ -53,11 +54,11 @@ def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -
             size = f"{camera.width / resize:.0f}x{camera.height / resize:.0f}"
             values = f"--fx {camera.fx * resize:.6g} --fy {camera.fy * resize:.6g} "
             values += f"--cx {(camera.cx + 0.5) * resize - 0.5:.6g} --cy {(camera.cy + 0.5) * resize - 0.5:.6g}"
-            add("wasted", f"{place}: the calibration is for {size}", f"give {values}")
-        elif _centered(camera.cy, camera.width) and _centered(camera.cx, camera.height):
-            add("wasted", f"{place}: cx and cy are swapped", f"give --cx {camera.cy:g} --cy {camera.cx:g}")
+            add("wasted", f"{intrinsics}: the calibration is for {size}", f"give {values}")
+        elif _is_centered(camera.cy, camera.width) and _is_centered(camera.cx, camera.height):
+            add("wasted", f"{intrinsics}: cx and cy are swapped", f"give --cx {camera.cy:g} --cy {camera.cx:g}")
         else:
-            add("doubtful", place, f"{give}, unless the image was cropped")
+            add("doubtful", intrinsics, f"{give}, unless the image was cropped")
     low, high = FIELD_OF_VIEW
     if not low <= report.field_of_view[0] <= high:
         add(
@@ -68,17 +69,17 @@ def calibration_findings(report: CalibrationReport, camera: Camera, name: str) -
         )
     if not ASPECT[0] <= report.focal_aspect <= ASPECT[1]:
         add("doubtful", f"pixels would not be square: fx / fy = {report.focal_aspect:.3g}", give)
-    return found
+    return findings
 
 
 def other_size(camera: Camera) -> float | None:
     """Return the factor that makes the intrinsics fit the image, when they are those of a resized one."""
     for factor in RESIZES:
-        centered = _centered((camera.cx + 0.5) * factor - 0.5, camera.width, 0.06)
-        if centered and _centered((camera.cy + 0.5) * factor - 0.5, camera.height, 0.06):
+        centered = _is_centered((camera.cx + 0.5) * factor - 0.5, camera.width, 0.06)
+        if centered and _is_centered((camera.cy + 0.5) * factor - 0.5, camera.height, 0.06):
             return factor
     return None
 
 
-def _centered(center: float, size: int, tolerance: float = 0.1) -> bool:
+def _is_centered(center: float, size: int, tolerance: float = 0.1) -> bool:
     return abs((center + 0.5) / max(size, 1) - 0.5) <= tolerance

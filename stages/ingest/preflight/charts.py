@@ -8,8 +8,9 @@ import numpy as np
 from markupsafe import Markup, escape
 
 WIDTH, WIDE = 560, 1040
-"""Of a drawing, and of one across the page [pixels]."""
+"""Width of a drawing, and of one across the page [px]."""
 LEFT, RIGHT, BOTTOM, TOP = 46, 10, 24, 8
+"""Margins of a drawing around its axes [px]."""
 
 
 def _number(value: float) -> str:
@@ -91,10 +92,10 @@ def histogram(shares: Sequence[float], end: float, marks: Sequence[tuple[float, 
         left, right = plot.x(k * width), plot.x((k + 1) * width)
         title = f"{k * width:.2f} to {(k + 1) * width:.2f} m: {100 * share:.1f} %"
         plot.rectangle(left + 0.5, plot.y(share), right - left - 1, plot.y(0) - plot.y(share), "bar", title)
-    for place, words in marks:
-        if 0 <= place <= end:
-            plot.line(plot.x(place), TOP, plot.x(place), plot.y(0), "mark")
-            plot.text(plot.x(place) + 4, TOP + 9, words, "start", "label")
+    for value, words in marks:
+        if 0 <= value <= end:
+            plot.line(plot.x(value), TOP, plot.x(value), plot.y(0), "mark")
+            plot.text(plot.x(value) + 4, TOP + 9, words, "start", "label")
     return plot.svg("histogram of depth")
 
 
@@ -154,8 +155,8 @@ def path_from_above(positions: np.ndarray, axes: tuple[int, int]) -> Markup:
     height = 260
     scale = min((WIDTH - 120) / wide, (height - 60) / tall)
     size = (WIDTH - 120) / scale
-    place = (points - center) * scale
-    drawn = [(WIDTH / 2 + x, height / 2 - 12 - y) for x, y in place[:: max(1, len(place) // 800)]]
+    drawn_points = (points - center) * scale
+    drawn = [(WIDTH / 2 + x, height / 2 - 12 - y) for x, y in drawn_points[:: max(1, len(drawn_points) // 800)]]
     plot = _Plot(height, (0, 1), (0, 1))
     plot.path(drawn, "curve")
     plot.parts.append(f'<circle cx="{drawn[0][0]:.1f}" cy="{drawn[0][1]:.1f}" r="4" class="dot"/>')

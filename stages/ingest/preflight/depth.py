@@ -16,13 +16,15 @@ TYPICAL = (0.4, 6.0)
 FACTORS = (0.001, 0.1, 0.2, 1 / 6.5535, 5.0, 6.5535, 10.0, 1000.0)
 """What wrong units do to depth: metres, millimetres, 0.1 mm and the divisors 5000 and 6553.5, one for another."""
 LITTLE_VALID = 0.1
+"""Share of valid pixels below which depth is called scarce; by eye."""
 SATURATED = 0.2
 """Share of valid pixels at the largest value that suggests a cut-off."""
 COARSE_VALUES = 256
 """Depth with fewer values in every frame was 8-bit once."""
 COARSE_STEP = 0.02
-"""... and steps of at least this at that [m]."""
+"""Step [m] from which on such depth is called coarse."""
 HISTOGRAM_BINS = 48
+"""Bars of the depth histogram; by eye."""
 
 
 def depth_report(looks: Iterable[Look]) -> DepthReport | None:
@@ -97,10 +99,10 @@ def depth_findings(report: DepthReport, units: float, camera: str) -> list[Findi
 
     Whether it agrees with the poses is said with the poses.
     """
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str = "") -> None:
-        found.append(Finding(severity=severity, check="depth", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="depth", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
 
     if not report.plausible and report.factor_by != "poses":
         factors = plausible_factors(report.median)
@@ -128,4 +130,4 @@ def depth_findings(report: DepthReport, units: float, camera: str) -> list[Findi
             "8-bit once",
             "record 16-bit depth",
         )
-    return found
+    return findings

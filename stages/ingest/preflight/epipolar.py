@@ -15,14 +15,19 @@ from scenewright.stages.ingest.preflight.fits import Fit, as_fit, relative_pose
 from scenewright.stages.ingest.preflight.looking import Look
 
 FEATURES = 800
+"""Most SIFT features of a picture; by eye."""
 MOST_PAIRS, MOST_MATCHES = 12, 400
 """Matching is the dear part of the pre-flight: more of either changes no verdict."""
 ITERATIONS = 200
+"""Most iterations of the robust fit of the fundamental matrix; by eye."""
 MATCH_RATIO = 0.8
+"""Largest ratio of the best to the second best distance of descriptors (Lowe 2004)."""
 INLIER_DISTANCE = 1.5
 """Pixels from the epipolar line that a match may have to count as one."""
 LEAST_INLIERS = 30
+"""Fewest matches of a pair that is used; by eye."""
 TRUNCATION_PIXELS = 4.0
+"""Distance from the epipolar line at which the cost stops to grow [px]; by eye."""
 STILL_PIXELS = 1.5
 """Median shift of matches under which two pictures count as taken from the same place."""
 
@@ -57,10 +62,10 @@ class FeaturePairs:
         self._cameras: list[Camera] = []
         for i, j in pairs:
             if i in features and j in features:
-                found = _consistent(*matched(features[i], features[j]), looks[i].camera)
-                if found is not None and found.shift > STILL_PIXELS:
+                pair_matches = _consistent(*matched(features[i], features[j]), looks[i].camera)
+                if pair_matches is not None and pair_matches.shift > STILL_PIXELS:
                     self.pairs.append((i, j))
-                    self.matches.append(found)
+                    self.matches.append(pair_matches)
                     self._cameras.append(looks[i].camera)
 
     def __len__(self) -> int:
@@ -72,9 +77,11 @@ class FeaturePairs:
         `focal_factor` multiplies the focal lengths.
         """
         rows = []
-        for (i, j), found, known in zip(self.pairs, self.matches, self._cameras, strict=True):
-            camera = known.model_copy(update={"fx": focal_factor * known.fx, "fy": focal_factor * known.fy})
-            distances = epipolar_distances(found, relative_pose(poses[j], poses[i]), camera)
+        for (i, j), pair_matches, camera_of_pair in zip(self.pairs, self.matches, self._cameras, strict=True):
+            camera = camera_of_pair.model_copy(
+                update={"fx": focal_factor * camera_of_pair.fx, "fy": focal_factor * camera_of_pair.fy}
+            )
+            distances = epipolar_distances(pair_matches, relative_pose(poses[j], poses[i]), camera)
             cost = float(np.minimum(distances / TRUNCATION_PIXELS, 1.0).mean())
             rows.append((float(np.median(distances)), cost, 1.0))
         return as_fit(rows)
@@ -82,8 +89,8 @@ class FeaturePairs:
     def fit_motionless(self) -> Fit:
         """Compare the pairs as if the camera had not moved."""
         rows = []
-        for found in self.matches:
-            distances = np.linalg.norm(found.second - found.first, axis=1)
+        for pair_matches in self.matches:
+            distances = np.linalg.norm(pair_matches.second - pair_matches.first, axis=1)
             cost = float(np.minimum(distances / TRUNCATION_PIXELS, 1.0).mean())
             rows.append((float(np.median(distances)), cost, 1.0))
         return as_fit(rows)
@@ -108,13 +115,13 @@ def matched(
     back = {m.queryIdx: m.trainIdx for m in matcher.match(second[1], first[1])}
     good = [
         (best.queryIdx, best.trainIdx)
-        for best, other in forward
-        if best.distance < MATCH_RATIO * other.distance and back.get(best.trainIdx) == best.queryIdx
+        for best, second_best in forward
+        if best.distance < MATCH_RATIO * second_best.distance and back.get(best.trainIdx) == best.queryIdx
     ]
     if not good:
         return np.zeros((0, 2)), np.zeros((0, 2))
-    left, right = np.array(good).T
-    return first[0][left], second[0][right]
+    first_indices, right = np.array(good).T
+    return first[0][first_indices], second[0][right]
 
 
 def _consistent(first: np.ndarray, second: np.ndarray, camera: Camera) -> Matches | None:
@@ -138,10 +145,10 @@ def _consistent(first: np.ndarray, second: np.ndarray, camera: Camera) -> Matche
     )
     if essential is None or mask is None:
         return None
-    kept = mask.ravel().astype(bool)
-    if kept.sum() < max(LEAST_INLIERS, 0.3 * len(first)):
+    is_inlier = mask.ravel().astype(bool)
+    if is_inlier.sum() < max(LEAST_INLIERS, 0.3 * len(first)):
         return None
-    return Matches(first[kept], second[kept])
+    return Matches(first[is_inlier], second[is_inlier])
 
 
 def _normalised(points: np.ndarray, camera: Camera) -> np.ndarray:

@@ -50,7 +50,7 @@ from scenewright.stages.ingest.stage import check_cameras
 from scenewright.stages.kit.stage import Progress
 
 LEAST_FRAMES = 12
-"""Looked at per camera, however many cameras there are."""
+"""Fewest frames that are looked at of a camera, however many cameras there are."""
 HEAVY_LOSS, LOSS = 0.5, 0.1
 """Shares of the frames that are lost from which a log is wasted, and doubtful."""
 NO_POSES = PoseReport(verdict="none", method="none", detail="the frames have no poses")
@@ -117,13 +117,15 @@ def inspect_sequence(sequence: Sequence, count: int, progress: Progress, keep_pi
     """Inspect a sequence artifact, with what ingest noted when it wrote it."""
     source = sequence_source(sequence)
     try:
-        found = inspect_source(source, sequence.root, ingest_parameters(()), count, progress, keep_pictures)
+        inspection = inspect_source(source, sequence.root, ingest_parameters(()), count, progress, keep_pictures)
     finally:
         source.close()
     info = sequence.info
-    gravity = found.report.gravity.model_copy(update={"method": info.gravity.method, "detail": info.gravity.detail})
-    frames = found.report.frames.model_copy(update={"in_log": info.frames_in_log, "drops": dict(info.drops)})
-    return replace(found, report=found.report.model_copy(update={"gravity": gravity, "frames": frames}))
+    gravity = inspection.report.gravity.model_copy(
+        update={"method": info.gravity.method, "detail": info.gravity.detail}
+    )
+    frames = inspection.report.frames.model_copy(update={"in_log": info.frames_in_log, "drops": dict(info.drops)})
+    return replace(inspection, report=inspection.report.model_copy(update={"gravity": gravity, "frames": frames}))
 
 
 def inspect_source(
@@ -141,21 +143,26 @@ def inspect_source(
     except BadInput as error:
         message = error.message.removeprefix(f"{path}: ")
         findings.append(Finding(severity="wasted", check="calibration", message=message, fix=error.hint))
-    kept, drops = select(source.entries, parameters, source.has_poses)
-    kept = kept[: parameters.max_frames]
-    by_camera = {known.name: [e for e in kept if e.camera_name == known.name] for known in source.cameras}
+    selected, drops = select(source.entries, parameters, source.has_poses)
+    selected = selected[: parameters.max_frames]
+    by_camera = {
+        source_camera.name: [e for e in selected if e.camera_name == source_camera.name]
+        for source_camera in source.cameras
+    }
     each = max(LEAST_FRAMES, count // max(len(source.cameras), 1)) if len(source.cameras) > 1 else count
     unusable: Counter[str] = Counter()
     materials: list[CameraMaterial] = []
     reports: list[CameraReport] = []
-    for known in source.cameras:
-        material = _look(by_camera[known.name], known, each, progress, unusable, keep_pictures)
+    for source_camera in source.cameras:
+        material = _look(by_camera[source_camera.name], source_camera, each, progress, unusable, keep_pictures)
         with progress.step("compare the frames"):
-            judged, outcome, found = _judge_camera(known, by_camera[known.name], material, source, parameters)
+            judged, outcome, camera_findings = _judge_camera(
+                source_camera, by_camera[source_camera.name], material, source, parameters
+            )
         materials.append(replace(material, outcome=outcome))
         reports.append(judged)
-        findings += found
-    frames = _frames_report(source, kept, drops, materials, unusable)
+        findings += camera_findings
+    frames = _frames_report(source, selected, drops, materials, unusable)
     streams = stream_reports(source)
     gravity = _gravity(source, parameters, reports, materials)
     has_poses = any(report.poses.verdict != "none" for report in reports)
@@ -197,7 +204,7 @@ def inspect_source(
 
 def _look(
     entries: list[Entry],
-    known: SourceCamera,
+    source_camera: SourceCamera,
     count: int,
     progress: Progress,
     unusable: Counter[str],
@@ -209,25 +216,29 @@ def _look(
     poses = np.array([entry.world_from_camera for entry in entries]) if posed else None
     choice = choose(times, poses, count)
     looks: dict[int, Look] = {}
-    for index in progress.track(choice.frames, total=len(choice.frames), description=f"frames of {known.name}"):
+    for index in progress.track(choice.frames, total=len(choice.frames), description=f"frames of {source_camera.name}"):
         try:
-            looks[index] = look_at_entry(entries[index], index, known.camera, keep_pictures)
+            looks[index] = look_at_entry(entries[index], index, source_camera.camera, keep_pictures)
         except Unusable as problem:
             unusable[problem.reason] += 1
     return CameraMaterial(looks, choice, poses, PoseOutcome(NO_POSES), times)
 
 
 def _judge_camera(
-    known: SourceCamera, entries: list[Entry], material: CameraMaterial, source: LogSource, parameters: IngestParameters
+    source_camera: SourceCamera,
+    entries: list[Entry],
+    material: CameraMaterial,
+    source: LogSource,
+    parameters: IngestParameters,
 ) -> tuple[CameraReport, PoseOutcome, list[Finding]]:
     looks, choice, poses = material.looks, material.choice, material.poses
-    name, findings = known.name, []
+    name, findings = source_camera.name, []
     units = units_per_metre(source.notes, parameters.depth_scale)
     interval = float(np.median(np.diff(material.times))) if len(material.times) > 1 else 0.0
     depth = depth_report(looks.values())
-    stereo = stereo_report(looks, known.baseline)
-    outcome = _pose_outcome(known, material, depth is not None)
-    calibration = calibration_report(known.camera)
+    stereo = stereo_report(looks, source_camera.baseline)
+    outcome = _pose_outcome(source_camera, material, depth is not None)
+    calibration = calibration_report(source_camera.camera)
     best = outcome.report.best
     if best is not None and outcome.report.decisive:
         if best.focal_factor != 1:
@@ -235,17 +246,23 @@ def _judge_camera(
         only_scale = best.convention == "as-is" and best.translation_scale != 1
         if depth is not None and only_scale and depth_is_blamed(best.translation_scale, depth.median):
             depth = depth.model_copy(update={"factor": exact(1 / best.translation_scale), "factor_by": "poses"})
-    registration = check_registration(looks, choice.runs, known.registered)
+    registration = check_registration(looks, choice.runs, source_camera.registered)
     pictures = picture_report(looks, choice.runs)
     motion = motion_report(poses, material.times, looks, choice.runs) if poses is not None else None
-    findings += calibration_findings(calibration, known.camera, name)
+    findings += calibration_findings(calibration, source_camera.camera, name)
     if depth is not None:
         findings += depth_findings(depth, units, name)
     if stereo is not None:
         findings += stereo_findings(stereo, name)
     if poses is not None:
         findings += pose_findings(
-            outcome.report, depth, known.camera, interval, name, untouched=_untouched(parameters), units=units
+            outcome.report,
+            depth,
+            source_camera.camera,
+            interval,
+            name,
+            untouched=_are_poses_untouched(parameters),
+            units=units,
         )
     if motion is not None:
         findings += motion_findings(motion, outcome.report.verdict == "agree", name)
@@ -261,10 +278,10 @@ def _judge_camera(
     }
     report = CameraReport(
         name=name,
-        camera=known.camera,
-        registered=known.registered,
+        camera=source_camera.camera,
+        registered=source_camera.registered,
         frames=len(entries),
-        streams=tuple(stream for stream, there in have.items() if there),
+        streams=tuple(stream for stream, present in have.items() if present),
         calibration=calibration,
         depth=depth,
         poses=outcome.report,
@@ -276,13 +293,13 @@ def _judge_camera(
     return report, outcome, findings
 
 
-def _pose_outcome(known: SourceCamera, material: CameraMaterial, has_depth: bool) -> PoseOutcome:
+def _pose_outcome(source_camera: SourceCamera, material: CameraMaterial, has_depth: bool) -> PoseOutcome:
     """Check the poses by depth, else by depth from the stereo pair, else by colour."""
     if material.poses is None:
         return PoseOutcome(NO_POSES)
     looks, pairs = material.looks, material.choice.pairs
-    if not has_depth and known.baseline is not None and known.baseline > 0:
-        looks = {index: with_stereo_depth(look, known.baseline) for index, look in looks.items()}
+    if not has_depth and source_camera.baseline is not None and source_camera.baseline > 0:
+        looks = {index: with_stereo_depth(look, source_camera.baseline) for index, look in looks.items()}
     by_depth = DepthPairs(looks, pairs)
     if len(by_depth) < LEAST_PAIRS:
         return check_poses(FeaturePairs(looks, pairs), material.poses, material.times, BY_FEATURES)
@@ -290,14 +307,14 @@ def _pose_outcome(known: SourceCamera, material: CameraMaterial, has_depth: bool
     if outcome.report.verdict in ("agree", "not checked") or outcome.report.decisive:
         return outcome
     colour = check_poses(FeaturePairs(looks, pairs), material.poses, material.times, BY_FEATURES).report
-    told = {
+    changes = {
         "colour_verdict": colour.verdict,
         "colour_residual": colour.hypotheses[0].residual if colour.hypotheses else None,
     }
-    return replace(outcome, report=outcome.report.model_copy(update=told))
+    return replace(outcome, report=outcome.report.model_copy(update=changes))
 
 
-def _untouched(parameters: IngestParameters) -> bool:
+def _are_poses_untouched(parameters: IngestParameters) -> bool:
     """Whether poses are taken as the log has them."""
     return parameters.pose_convention == "as-is" and parameters.pose_scale == 1
 
@@ -322,12 +339,16 @@ def _gravity(
 
 
 def _frames_report(
-    source: LogSource, kept: list[Entry], drops: Counter[str], materials: list[CameraMaterial], unusable: Counter[str]
+    source: LogSource,
+    selected: list[Entry],
+    drops: Counter[str],
+    materials: list[CameraMaterial],
+    unusable: Counter[str],
 ) -> FramesReport:
-    times = [entry.time for entry in kept]
+    times = [entry.time for entry in selected]
     return FramesReport(
         in_log=len(source.entries),
-        selected=len(kept),
+        selected=len(selected),
         looked_at=sum(len(material.choice.frames) for material in materials),
         drops=dict(sorted(drops.items())),
         unusable=dict(sorted(unusable.items())),
@@ -337,10 +358,10 @@ def _frames_report(
 
 
 def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str = "") -> None:
-        found.append(Finding(severity=severity, check="frames", message=message, fix=fix))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="frames", message=message, fix=fix))  # type: ignore[arg-type]
 
     lost = {reason: count for reason, count in frames.drops.items() if reason != NOT_SELECTED}
     listed = ", ".join(f"{reason} {count}" for reason, count in sorted(lost.items(), key=lambda item: -item[1]))
@@ -373,27 +394,27 @@ def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
         elif frames.unusable:
             add("note", f"frames looked at that cannot be used: {bad}")
     if source.damage:
-        more = f" (and {len(source.damage) - 1} more)" if len(source.damage) > 1 else ""
-        add("doubtful", f"the log is damaged: {source.damage[0]}{more}", "what is whole is used")
-    return found
+        further = f" (and {len(source.damage) - 1} more)" if len(source.damage) > 1 else ""
+        add("doubtful", f"the log is damaged: {source.damage[0]}{further}", "what is whole is used")
+    return findings
 
 
 def _matrices(source: LogSource) -> np.ndarray:
-    found = [entry.world_from_camera for entry in source.entries if entry.world_from_camera is not None]
-    return np.array([matrix for matrix in found if matrix.shape == (4, 4)]).reshape(-1, 4, 4)
+    poses = [entry.world_from_camera for entry in source.entries if entry.world_from_camera is not None]
+    return np.array([matrix for matrix in poses if matrix.shape == (4, 4)]).reshape(-1, 4, 4)
 
 
 def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Finding]:
     """What whole streams are missing."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     looked = [report for report in reports if report.streams]
     if not looked:
-        return found
+        return findings
     streams = {stream for report in looked for stream in report.streams}
     stereo = "right" in streams and any(report.stereo and report.stereo.baseline for report in looked)
 
     def add(severity: Severity, check: str, message: str, fix: str = "") -> None:
-        found.append(Finding(severity=severity, check=check, message=message, fix=fix))
+        findings.append(Finding(severity=severity, check=check, message=message, fix=fix))
 
     if "depth" not in streams and not stereo:
         advice = "record depth; colour alone can only be looked at"
@@ -405,7 +426,7 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
     if "pose" not in streams:
         advice = "run reconstruct-without-poses, which estimates them, or give fuse a --trajectory"
         add("doubtful", "poses", "the frames have no poses: fuse needs them", advice)
-    return found
+    return findings
 
 
 def _having(reports: list[CameraReport], source: LogSource) -> set[str]:

@@ -12,13 +12,15 @@ from scenewright.stages.ingest.preflight.reprojection import projected
 from scenewright.stages.kit.geometry.cameras import back_project
 
 JUMP = 0.5
-"""Metres between neighbours ..."""
+"""Distance of neighbouring poses [m] over which a step may be a jump."""
 JUMP_FACTOR = 12.0
-"""... and times the median step, that make a jump."""
+"""A jump is also longer than this many median steps."""
 REPEATED = 0.2
 """Share of poses equal to the one before worth a warning."""
 LITTLE_OVERLAP = 0.5
+"""Shared view of neighbouring frames below which it is called little; by eye."""
 LISTED = 8
+"""Most jumps whose times are listed."""
 
 
 def motion_report(
@@ -71,10 +73,10 @@ def shared(first: Look, second: Look, second_from_first: np.ndarray) -> float:
 
 def motion_findings(report: MotionReport, poses_agree: bool, camera: str) -> list[Finding]:
     """Return what is odd about the motion."""
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str = "") -> None:
-        found.append(Finding(severity=severity, check="poses", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="poses", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
 
     if report.jumps:
         places = ", ".join(f"{time:.3f}" for time in report.jump_times[:4])
@@ -92,4 +94,4 @@ def motion_findings(report: MotionReport, poses_agree: bool, camera: str) -> lis
         )
     if poses_agree and report.overlap is not None and report.overlap < LITTLE_OVERLAP:
         add("doubtful", f"neighbouring frames share only {100 * report.overlap:.0f} % of what they see")
-    return found
+    return findings

@@ -29,7 +29,7 @@ from scenewright.stages.ingest.preflight.views import (
 
 FOLDER = Path(__file__).resolve().parent
 SAMPLES = 6
-"""Frames that are shown."""
+"""Most frames that are shown."""
 
 
 @dataclass(frozen=True)
@@ -151,13 +151,15 @@ def _pair_pictures(report: CameraReport, material: CameraMaterial) -> tuple[Pict
         readings.append((hypothesis_words(report.poses.best, report.poses.method).rpartition(":")[0], outcome.best))
     pictures = []
     for words, candidate in readings:
-        read = candidate.poses(poses)
+        candidate_poses = candidate.poses(poses)
         for title, k in (("a usual pair", order[len(order) // 2]), ("the worst pair", order[-1])):
             i, j = outcome.pairs.pairs[k]
             first, second = material.looks[i], material.looks[j]
             residual = f"{100 * candidate.fit.residuals[k]:.2g} %"
             caption = f"poses {words}, {title}: {first.name} in {second.name}, median residual {residual}"
-            pictures.append(embedded(residuals_over_color(first, second, read[i], read[j]), caption))
+            pictures.append(
+                embedded(residuals_over_color(first, second, candidate_poses[i], candidate_poses[j]), caption)
+            )
     return tuple(pictures)
 
 

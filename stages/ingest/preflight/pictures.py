@@ -10,11 +10,13 @@ from scenewright.stages.ingest.preflight.looking import Look
 from scenewright.stages.ingest.preflight.report import Finding, PictureReport, exact
 
 MEASURING_WIDTH = 320
+"""Width to which pictures are thinned before they are measured [px]."""
 RELATIVE_BLUR = 0.3
 """Sharpness under this share of the log's median is blur."""
 ABSOLUTE_BLUR = 12.0
 """Sharpness under this is blur, or a picture of nothing."""
 DARK, BRIGHT = 8, 247
+"""Grey values, of 255, beyond which a pixel is dark or bright; by eye."""
 LEAST_NEIGHBOURS = 8
 """Pairs of neighbours from which flicker and repetition are told."""
 SAME_PICTURE = 0.15
@@ -62,10 +64,10 @@ def picture_report(looks: Mapping[int, Look], runs: Sequence[Sequence[int]]) -> 
 
 def picture_findings(report: PictureReport, camera: str) -> list[Finding]:
     """Return what is odd about the pictures."""
-    found = []
+    findings = []
 
     def add(message: str, fix: str = "") -> None:
-        found.append(Finding(severity="doubtful", check="pictures", message=message, fix=fix, camera=camera))
+        findings.append(Finding(severity="doubtful", check="pictures", message=message, fix=fix, camera=camera))
 
     if report.blurred_share > 0.3:
         add(f"{100 * report.blurred_share:.0f} % of the pictures are blurred or show nothing", "use --every, or rescan")
@@ -77,4 +79,4 @@ def picture_findings(report: PictureReport, camera: str) -> list[Finding]:
         add(f"brightness flickers by {100 * report.flicker:.0f} % between neighbours")
     if report.repeated_share > 0.3:
         add(f"{100 * report.repeated_share:.0f} % of the pictures are the same as the one before")
-    return found
+    return findings

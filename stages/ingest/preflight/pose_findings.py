@@ -32,7 +32,7 @@ def depth_is_blamed(scale: float, median_depth: float) -> bool | None:
     `scale` is what translations must be multiplied by, or depth divided by, for the two to agree. A unit that only
     depth images have decides; otherwise the one whose present unit gives an untypical room.
     """
-    if any(abs(np.log(scale / known)) < 0.1 for known in DEPTH_DIVISORS):
+    if any(abs(np.log(scale / divisor)) < 0.1 for divisor in DEPTH_DIVISORS):
         return True
     typical = TYPICAL[0] <= median_depth <= TYPICAL[1]
     if typical:
@@ -55,12 +55,12 @@ def pose_findings(
     `interval` [s] is that of the frames; `untouched` says that no option changes the poses already; `units` per metre
     is how depth was read.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     measure = BY_FEATURES if report.method == "epipolar" else BY_DEPTH
     pictures = "colour" if report.method == "epipolar" else "depth"
 
     def add(severity: Severity, message: str, fix: str = "", check: str = "poses") -> None:
-        found.append(Finding(severity=severity, check=check, message=message, fix=fix, camera=name))
+        findings.append(Finding(severity=severity, check=check, message=message, fix=fix, camera=name))
 
     best = report.best
     residual = measure.words(report.hypotheses[0].residual) if report.hypotheses else ""
@@ -109,17 +109,17 @@ def pose_findings(
             "look for other poses, or for a wrong unit that varies",
         )
     elif best is not None:
-        other = f" or {_short(report.runner_up)}" if report.runner_up else ""
+        or_second = f" or {_short(report.runner_up)}" if report.runner_up else ""
         add(
             "wasted" if report.verdict == "contradict" else "doubtful",
-            f"poses contradict {pictures} (median residual {residual}); {_short(best)}{other} fits better "
+            f"poses contradict {pictures} (median residual {residual}); {_short(best)}{or_second} fits better "
             f"({measure.words(best.residual)}), but not clearly enough to say which",
             "check the convention, the units and the stamps of the poses",
         )
     else:
         severity = "wasted" if report.verdict == "contradict" else "doubtful"
         add(severity, f"poses contradict {pictures}: {report.detail}", _witness_fix(report))
-    return found
+    return findings
 
 
 def _add_scale(
@@ -156,14 +156,14 @@ def _add_scale(
 def _short(hypothesis: Hypothesis | None) -> str:
     if hypothesis is None:
         return ""
-    parts = [] if hypothesis.convention == "as-is" else [hypothesis.convention]
+    phrases = [] if hypothesis.convention == "as-is" else [hypothesis.convention]
     if hypothesis.translation_scale != 1:
-        parts.append(f"translations times {hypothesis.translation_scale:.3g}")
+        phrases.append(f"translations times {hypothesis.translation_scale:.3g}")
     if hypothesis.focal_factor != 1:
-        parts.append(f"focal length times {hypothesis.focal_factor:.3g}")
+        phrases.append(f"focal length times {hypothesis.focal_factor:.3g}")
     if hypothesis.lag:
-        parts.append(f"a lag of {hypothesis.lag} frames")
-    return " with ".join(parts) or "as they are"
+        phrases.append(f"a lag of {hypothesis.lag} frames")
+    return " with ".join(phrases) or "as they are"
 
 
 def _flip_fix(best: Hypothesis, untouched: bool) -> str:

@@ -20,18 +20,21 @@ from scenewright.stages.ingest.preflight.report import Hypothesis, PoseReport, P
 SCALES = tuple(float(f"{10 ** (k / 3):.6g}") for k in range(-9, 10))
 """Scales of the translations that are searched: a factor 2.15 apart, which a fit is broad enough to bridge."""
 FOCAL_FACTORS = (0.5, 0.6, 0.7, 0.8, 0.87, 0.93, 1.07, 1.15, 1.25, 1.4, 1.65, 2.0)
+"""Factors of the focal length that are searched, closer around 1; by eye."""
 LAGS = (-5, -4, -3, -2, -1, 1, 2, 3, 4, 5)
+"""Lags between poses and pictures that are searched [frames]."""
 CLEARLY_BETTER = 0.75
-"""Cost over another's cost from which one is better, ..."""
+"""Ratio of costs up to which one candidate is clearly better than another."""
 MOST_PAIRS = 0.7
-"""... if it wins in this share of the pairs."""
+"""Share of the pairs in which a better candidate must win."""
 MOTION_RATIO = 0.8
 """Poses that agree must cost less than this share of no motion at all, or the pairs say nothing about them."""
 COMBINED_COST = 1.1
 """Two mistakes at once must explain more than one."""
 LEAST_PAIRS = 2
+"""Fewest pairs of frames with which poses are checked."""
 LEAST_OVERLAP = 0.25
-"""Of a pair that is called bad: less, and what is hidden decides."""
+"""Smallest overlap of a pair that may be called bad; with less, what is hidden decides."""
 
 
 class Pairs(Protocol):
@@ -70,7 +73,9 @@ class Measure:
 
 
 BY_DEPTH = Measure("depth", 0.03, 0.06, "%", 100.0, sees_scale=True, still=0.02)
+"""Residuals of depth as shares of depth: 3 % is good, 6 % is bad; by eye."""
 BY_FEATURES = Measure("epipolar", 2.0, 4.0, "pixels", 1.0, sees_scale=False, still=1.0)
+"""Residuals of features [px]: 2 is good, 4 is bad; by eye."""
 
 
 @dataclass(frozen=True)
@@ -131,19 +136,19 @@ class PoseOutcome:
 def check_poses(pairs: Pairs, poses: np.ndarray, times: np.ndarray, measure: Measure) -> PoseOutcome:
     """Judge poses (N, 4, 4) of the selected frames at `times` (N,) [s] by prepared pairs of them."""
     if len(pairs.pairs) < LEAST_PAIRS:
-        what = "depth in common" if measure is BY_DEPTH else "matching features and some motion"
-        detail = f"cannot be checked: {len(pairs.pairs)} pairs of frames with {what}, {LEAST_PAIRS} are needed"
+        needed = "depth in common" if measure is BY_DEPTH else "matching features and some motion"
+        detail = f"cannot be checked: {len(pairs.pairs)} pairs of frames with {needed}, {LEAST_PAIRS} are needed"
         return PoseOutcome(PoseReport(verdict="not checked", method="none", detail=detail, pairs=len(pairs.pairs)))
     as_is = Candidate(pairs.fit(poses))
     still = pairs.fit_motionless()
     candidates = [as_is, *_single_changes(pairs, poses, measure)]
     best = min(candidates, key=lambda c: c.cost)
     if as_is.fit.residual > measure.good or _better(best, as_is):
-        best = _searched(pairs, poses, candidates, measure)
+        best = _search(pairs, poses, candidates, measure)
         candidates.append(best)
     fine_scale = _fine_scale(pairs, poses, best if _better(best, as_is) else as_is) if measure.sees_scale else None
     focal = min((c for c in candidates if c.focal != 1), key=lambda c: c.cost, default=None)
-    report = _judged(candidates, as_is, best, still, fine_scale, pairs, times, measure)
+    report = _judge(candidates, as_is, best, still, fine_scale, pairs, times, measure)
     return PoseOutcome(report, as_is, best, pairs, focal)
 
 
@@ -168,27 +173,29 @@ def _better(first: Candidate, second: Candidate) -> bool:
     return first.cost < CLEARLY_BETTER * second.cost and first.fit.wins(second.fit) >= MOST_PAIRS
 
 
-def _searched(pairs: Pairs, poses: np.ndarray, candidates: list[Candidate], measure: Measure) -> Candidate:
+def _search(pairs: Pairs, poses: np.ndarray, candidates: list[Candidate], measure: Measure) -> Candidate:
     """Return the best of all single changes and of conventions with scales, the scale refined.
 
     One change that explains everything is tried with other scales only; otherwise every convention is.
     """
-    found = list(candidates)
+    candidates_so_far = list(candidates)
     if measure.sees_scale:
-        best = min(found, key=lambda c: c.cost)
-        rivals = [c for c in found if c.differs(best)]
+        best = min(candidates_so_far, key=lambda c: c.cost)
+        rivals = [c for c in candidates_so_far if c.differs(best)]
         clear = best.fit.residual <= measure.good / 2 and all(_better(best, rival) for rival in rivals)
         names = POSE_CONVENTIONS[1:] if not clear else (best.convention,) if best.convention != "as-is" else ()
         for name in names:
-            found += [_scaled(pairs, poses, name, scale) for scale in SCALES if scale != 1]
-        ranked = sorted((c for c in found if not c.lag and c.focal == 1), key=lambda c: c.cost)
+            candidates_so_far += [_scaled(pairs, poses, name, scale) for scale in SCALES if scale != 1]
+        ranked = sorted((c for c in candidates_so_far if not c.lag and c.focal == 1), key=lambda c: c.cost)
         for start in ranked[: 2 if clear else 6]:
-            found += [_scaled(pairs, poses, start.convention, start.scale * f) for f in (0.7, 0.84, 1.19, 1.43)]
-    best = min(found, key=lambda c: c.cost)
+            candidates_so_far += [
+                _scaled(pairs, poses, start.convention, start.scale * f) for f in (0.7, 0.84, 1.19, 1.43)
+            ]
+    best = min(candidates_so_far, key=lambda c: c.cost)
     if measure.sees_scale and best.scale != 1:
         for step in (1.1, 1.05, 1.02):
-            near = [_scaled(pairs, poses, best.convention, best.scale * f) for f in (1 / step, step)]
-            best = min([best, *near], key=lambda c: c.cost)
+            neighbours = [_scaled(pairs, poses, best.convention, best.scale * f) for f in (1 / step, step)]
+            best = min([best, *neighbours], key=lambda c: c.cost)
         best = _round_scale(pairs, poses, best)
     return best
 
@@ -203,7 +210,7 @@ ROUND_SCALES = (0.001, 0.01, 0.1, 0.2, 1 / 6.5535, 1.0, 5.0, 6.5535, 10.0, 100.0
 
 def round_scale(scale: float) -> float:
     """Return the unit ratio that a measured scale is, or the scale itself when it is near none."""
-    nearest = min(ROUND_SCALES, key=lambda known: abs(np.log(scale / known)))
+    nearest = min(ROUND_SCALES, key=lambda round_number: abs(np.log(scale / round_number)))
     return nearest if abs(np.log(scale / nearest)) < np.log(1.12) else scale
 
 
@@ -230,7 +237,7 @@ def _fine_scale(pairs: Pairs, poses: np.ndarray, about: Candidate) -> float | No
     return float(about.scale * np.exp(center))
 
 
-def _judged(
+def _judge(
     candidates: Iterable[Candidate],
     as_is: Candidate,
     best: Candidate,
@@ -245,11 +252,11 @@ def _judged(
     runner_up = others[0] if others else None
     moved = as_is.fit.cost < MOTION_RATIO * still.cost
     words = measure.words
-    told: Candidate | None = None
+    named_best: Candidate | None = None
     decisive = turns_only = False
     verdict: PoseVerdict
     if best is not as_is and _better(best, as_is):
-        told = best
+        named_best = best
         fits = best.fit.residual <= measure.good
         stands = still.cost * CLEARLY_BETTER < best.fit.cost  # no motion at all explains the frames nearly as well
         decisive = fits and not stands and (runner_up is None or _better(best, runner_up))
@@ -283,13 +290,13 @@ def _judged(
         )
     bad = _bad_pairs(as_is.fit, measure) if verdict == "agree" else np.zeros(0, dtype=int)
     bad_times = sorted({float(times[pairs.pairs[k][0]]) for k in bad})
-    shown = [as_is, *_shown(ranked, as_is)]
+    reported = [as_is, *_candidates_to_report(ranked, as_is)]
     return PoseReport(
         verdict=verdict,
         method=measure.name,
         detail=detail,
         pairs=len(pairs.pairs),
-        hypotheses=tuple(candidate.report() for candidate in shown),
+        hypotheses=tuple(candidate.report() for candidate in reported),
         motionless=Hypothesis(
             convention="motionless",
             residual=exact(still.residual),
@@ -297,8 +304,8 @@ def _judged(
             overlap=exact(still.overlap),
         ),
         scale_fit=significant(fine_scale, 3),
-        best=told.report() if told else None,
-        runner_up=runner_up.report() if told and runner_up else None,
+        best=named_best.report() if named_best else None,
+        runner_up=runner_up.report() if named_best and runner_up else None,
         decisive=decisive,
         turns_only=turns_only,
         lag_frames=best.lag if decisive and best.lag else None,
@@ -320,9 +327,9 @@ def _bad_pairs(fit: Fit, measure: Measure) -> np.ndarray:
     return np.flatnonzero(overlapping & (fit.residuals > measure.bad) & (fit.residuals > 4 * fit.residual))
 
 
-def _shown(ranked: list[Candidate], as_is: Candidate) -> list[Candidate]:
+def _candidates_to_report(ranked: list[Candidate], as_is: Candidate) -> list[Candidate]:
     """The conventions, the powers of ten, the best scale, focal length and lag: what a person wants to see."""
-    shown, seen = [], set()
+    reported, kinds = [], set()
     for candidate in ranked:
         kind = (
             candidate.convention,
@@ -331,7 +338,7 @@ def _shown(ranked: list[Candidate], as_is: Candidate) -> list[Candidate]:
             candidate.scale if candidate.scale in ROUND_SCALES else "scale",
         )
         combined = candidate.convention != "as-is" and candidate.scale != 1
-        if candidate is not as_is and kind not in seen and (not combined or candidate is ranked[0]):
-            seen.add(kind)
-            shown.append(candidate)
-    return shown
+        if candidate is not as_is and kind not in kinds and (not combined or candidate is ranked[0]):
+            kinds.add(kind)
+            reported.append(candidate)
+    return reported

@@ -15,6 +15,7 @@ from scenewright.stages.ingest.preflight.looking import Look
 from scenewright.stages.ingest.preflight.report import Finding, RegistrationReport, exact, significant
 
 MEASURING_WIDTH = 320
+"""Width to which pictures are thinned before edges are compared [px]."""
 JUMP = 0.08
 """Relative depth difference of neighbouring pixels that is a jump."""
 GRADIENT_LIMIT = 6.0
@@ -22,8 +23,9 @@ GRADIENT_LIMIT = 6.0
 LEAST_EDGES = 80
 """Jump pixels a frame (at 320 pixels width) to say anything."""
 LARGEST_LAG = 5
+"""Largest lag between colour and depth that is searched [frames]."""
 LARGEST_OFFSET = 24
-"""Pixels at 320 pixels width."""
+"""Largest offset of colour that is searched [px at 320 px width]."""
 ALIGNED = 1.4
 """Score from which colour and depth surely have something to do with each other."""
 UNRELATED = 1.2
@@ -31,6 +33,7 @@ UNRELATED = 1.2
 LAG_RATIO = 1.1
 """Score of the best lag over that of none from which colour and depth are called shifted in time."""
 OFFSET_RATIO = 1.12
+"""Score of the best offset over that of none from which colour and depth are called shifted in the picture; by eye."""
 RELATED = 1.3
 """Score that another place must have to be claimed as the right one."""
 LEAST_OFFSET = 3
@@ -80,13 +83,13 @@ def check_registration(
     looks: Mapping[int, Look], runs: Sequence[Sequence[int]], registered: bool
 ) -> RegistrationReport:
     """Judge whether colour and depth of the frames show the same thing at the same time and place."""
-    edges = {index: found for index, look in sorted(looks.items()) if (found := edges_of(look)) is not None}
+    edges = {index: own_edges for index, look in sorted(looks.items()) if (own_edges := edges_of(look)) is not None}
     pairs = [(e.gradient, e.jumps) for e in edges.values() if e.gradient is not None and e.jumps is not None]
     if not edges:
         return RegistrationReport(checked=False, detail="cannot be checked: no frame has both colour and depth")
     if len(pairs) < 3:
-        what = "depth jumps" if all(e.jumps is None for e in edges.values()) else "colour edges"
-        return RegistrationReport(checked=False, detail=f"cannot be checked: too few {what}")
+        edge_kind = "depth jumps" if all(e.jumps is None for e in edges.values()) else "colour edges"
+        return RegistrationReport(checked=False, detail=f"cannot be checked: too few {edge_kind}")
     score = float(np.mean([_score(gradient, jumps) for gradient, jumps in pairs]))
     lags = lag_scores(edges, runs)
     lag, late = _best_lag(lags)
@@ -117,7 +120,7 @@ def lag_scores(edges: Mapping[int, Edges], runs: Sequence[Sequence[int]]) -> dic
 
     Empty unless every lag has pairs.
     """
-    found: dict[int, float] = {}
+    score_of: dict[int, float] = {}
     for lag in range(-LARGEST_LAG, LARGEST_LAG + 1):
         scores = []
         for run in runs:
@@ -127,8 +130,8 @@ def lag_scores(edges: Mapping[int, Edges], runs: Sequence[Sequence[int]]) -> dic
                     scores.append(_score(color.gradient, depth.jumps))
         if len(scores) < 3:
             return {}
-        found[lag] = float(np.mean(scores))
-    return found
+        score_of[lag] = float(np.mean(scores))
+    return score_of
 
 
 def _best_lag(scores: Mapping[int, float]) -> tuple[float | None, bool]:
@@ -166,24 +169,24 @@ def best_offset(pairs: Sequence[tuple[np.ndarray | None, np.ndarray | None]]) ->
 
 
 def _words(score: float, lag: float | None, decisive: bool, shifted: bool, registered: bool) -> str:
-    parts = [f"colour gradient under depth jumps {score:.2f} times the mean"]
+    phrases = [f"colour gradient under depth jumps {score:.2f} times the mean"]
     if decisive:
-        parts.append(f"best {abs(lag or 0):.1f} frames {'later' if (lag or 0) > 0 else 'earlier'}")
+        phrases.append(f"best {abs(lag or 0):.1f} frames {'later' if (lag or 0) > 0 else 'earlier'}")
     elif lag is None:
-        parts.append("too little motion to compare clocks")
+        phrases.append("too little motion to compare clocks")
     if shifted:
-        parts.append("better elsewhere in the picture")
+        phrases.append("better elsewhere in the picture")
     if not registered:
-        parts.append("the log does not register them")
-    return ", ".join(parts)
+        phrases.append("the log does not register them")
+    return ", ".join(phrases)
 
 
 def registration_findings(report: RegistrationReport, frame_interval: float, camera: str) -> list[Finding]:
     """Return what is odd about colour against depth; `frame_interval` [s] turns frames into time."""
-    found = []
+    findings = []
 
     def add(message: str, fix: str) -> None:
-        found.append(Finding(severity="doubtful", check="registration", message=message, fix=fix, camera=camera))
+        findings.append(Finding(severity="doubtful", check="registration", message=message, fix=fix, camera=camera))
 
     if report.lag_decisive and report.lag_frames is not None:
         seconds = abs(report.lag_frames) * frame_interval
@@ -203,4 +206,4 @@ def registration_findings(report: RegistrationReport, frame_interval: float, cam
             "(1 is chance)",
             "register depth to colour; check that the two belong to the same frames",
         )
-    return found
+    return findings

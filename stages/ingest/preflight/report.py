@@ -9,6 +9,7 @@ from scenewright.schemas.base import Model
 from scenewright.schemas.scene_parts import Camera
 
 SCHEMA_VERSION = 1
+"""Version of the inspection's JSON."""
 Severity = Literal["wasted", "doubtful", "note"]
 Verdict = Literal["ready", "doubtful", "wasted"]
 PoseVerdict = Literal["agree", "contradict", "doubtful", "not checked", "none"]

@@ -46,8 +46,8 @@ class DepthPairs:
         """
         rows = []
         for i, j in self.pairs:
-            there = relative_pose(poses[j], poses[i])
-            rows.append(self._fit_pair(i, j, there, relative_pose(poses[i], poses[j]), focal_factor))
+            j_from_i = relative_pose(poses[j], poses[i])
+            rows.append(self._fit_pair(i, j, j_from_i, relative_pose(poses[i], poses[j]), focal_factor))
         return as_fit(rows)
 
     def fit_motionless(self) -> Fit:
@@ -57,16 +57,16 @@ class DepthPairs:
     def _fit_pair(
         self, i: int, j: int, j_from_i: np.ndarray, i_from_j: np.ndarray, focal_factor: float
     ) -> tuple[float, float, float]:
-        there = self.residuals(i, j, j_from_i, focal_factor)
+        forward = self.residuals(i, j, j_from_i, focal_factor)
         back = self.residuals(j, i, i_from_j, focal_factor)
-        wanted = len(self._points[i]) + len(self._points[j])
-        both = np.abs(np.concatenate([there, back]))
-        overlap = len(both) / max(wanted, 1)
-        if not len(both):
+        sample_count = len(self._points[i]) + len(self._points[j])
+        residuals = np.abs(np.concatenate([forward, back]))
+        overlap = len(residuals) / max(sample_count, 1)
+        if not len(residuals):
             return 1.0, 1.0, 0.0
-        trust = min(1.0, len(both) / (2 * min(LEAST_SAMPLES, max(wanted // 2, 1))))
-        residual = min(float(np.median(both)), 1.0) if trust >= 0.5 else 1.0
-        cost = trust * float(np.minimum(both / TRUNCATION, 1.0).mean()) + (1 - trust)
+        trust = min(1.0, len(residuals) / (2 * min(LEAST_SAMPLES, max(sample_count // 2, 1))))
+        residual = min(float(np.median(residuals)), 1.0) if trust >= 0.5 else 1.0
+        cost = trust * float(np.minimum(residuals / TRUNCATION, 1.0).mean()) + (1 - trust)
         return residual, cost, overlap
 
     def residuals(self, source: int, target: int, target_from_source: np.ndarray, focal: float = 1.0) -> np.ndarray:
@@ -80,8 +80,8 @@ class DepthPairs:
         assert depth is not None
         measured = depth[v[inside], u[inside]] * 1e-3
         predicted = z[inside]
-        known = measured > 0
-        return (predicted[known] - measured[known]) / measured[known]
+        is_measured = measured > 0
+        return (predicted[is_measured] - measured[is_measured]) / measured[is_measured]
 
 
 def projected(

@@ -32,8 +32,8 @@ def sequence_source(sequence: Sequence) -> LogSource:
             format="sequence",
             rule="sequence artifact",
             cameras=tuple(
-                SourceCamera(known.name, known.camera, known.baseline, info.color_depth_registered)
-                for known in info.cameras
+                SourceCamera(entry.name, entry.camera, entry.baseline, info.color_depth_registered)
+                for entry in info.cameras
             ),
             entries=tuple(entries),
             notes=info.notes,

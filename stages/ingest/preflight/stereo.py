@@ -12,7 +12,9 @@ from scenewright.stages.ingest.preflight.looking import Look
 from scenewright.stages.ingest.preflight.report import Finding, StereoReport, significant
 
 FRAMES = 6
+"""Most frames whose two eyes are matched; by eye."""
 LEAST_MATCHES = 40
+"""Fewest matched features with which a stereo pair is checked; by eye."""
 ROW_ERROR = 1.5
 """Median distance of matched rows [pixels] over which a pair is not rectified."""
 
@@ -30,17 +32,17 @@ def stereo_report(looks: Mapping[int, Look], baseline: float | None) -> StereoRe
         rows.append((right[:, 1] - left[:, 1]) * look.factor)
         disparities.append((left[:, 0] - right[:, 0]) * look.factor)
     row, disparity = np.concatenate(rows), np.concatenate(disparities)
-    shown = significant(baseline)
+    rounded_baseline = significant(baseline)
     if len(row) < LEAST_MATCHES:
         detail = f"cannot be checked: {len(row)} features match between the eyes, {LEAST_MATCHES} are needed"
-        return StereoReport(checked=False, detail=detail, baseline=shown, matches=len(row))
+        return StereoReport(checked=False, detail=detail, baseline=rounded_baseline, matches=len(row))
     error = float(np.median(np.abs(row)))
     aligned = disparity[np.abs(row) < max(3 * error, 2.0)]
     positive = float((aligned > -0.5).mean())
     return StereoReport(
         checked=True,
         detail=f"{len(row)} matches in {len(chosen)} frames, rows {error:.2g} pixels apart",
-        baseline=shown,
+        baseline=rounded_baseline,
         matches=len(row),
         row_error=significant(error),
         positive_share=significant(positive),
@@ -50,10 +52,10 @@ def stereo_report(looks: Mapping[int, Look], baseline: float | None) -> StereoRe
 
 def stereo_findings(report: StereoReport, camera: str) -> list[Finding]:
     """Return what is odd about a stereo pair."""
-    found = []
+    findings = []
 
     def add(severity: str, message: str, fix: str) -> None:
-        found.append(Finding(severity=severity, check="stereo", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
+        findings.append(Finding(severity=severity, check="stereo", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
 
     if report.baseline is None or report.baseline <= 0:
         add("wasted", f"the stereo baseline is {report.baseline}", "a right calibration needs P[3] = -fx baseline")
@@ -67,7 +69,7 @@ def stereo_findings(report: StereoReport, camera: str) -> list[Finding]:
         )
     if report.checked and report.positive_share is not None and report.positive_share < 0.3:
         add("wasted", "left and right are swapped: matches shift to the right", "exchange the topics of the two eyes")
-    return found
+    return findings
 
 
 def with_stereo_depth(look: Look, baseline: float) -> Look:

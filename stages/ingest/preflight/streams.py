@@ -13,7 +13,7 @@ GAP_FACTOR = 3.0
 ODD_DELAY = 1.0
 """Median of log time minus header stamp [s] over which the two clocks are called different."""
 MANY_GAPS = 0.02
-"""Gaps per interval worth a warning."""
+"""Gaps per interval from which on a warning is given."""
 LONG_GAP = 2.0
 """Seconds without a frame worth a warning, when it is a gap at all."""
 

@@ -47,8 +47,8 @@ def _lines(report: InspectionReport) -> Iterator[str]:
         yield _row("stream", stream_line(stream))
     for line in report.clocks:
         yield _row("clocks", line)
-    for seen in report.cameras:
-        yield from _camera_lines(seen)
+    for camera_report in report.cameras:
+        yield from _camera_lines(camera_report)
     if report.other_cameras:
         yield _row("others", f"cameras that were not asked for: {', '.join(report.other_cameras)}")
     tilt = f", {report.gravity.tilt:g} deg from the log's z" if report.gravity.tilt is not None else ""
@@ -66,17 +66,17 @@ def _lines(report: InspectionReport) -> Iterator[str]:
 
 def stream_line(stream: StreamReport) -> str:
     """Return a stream on one line."""
-    parts = [f"{stream.name:28} {stream.role:12} {stream.count:6}"]
-    parts.append(f"{stream.rate:7.4g}/s" if stream.rate is not None else " " * 9)
+    columns = [f"{stream.name:28} {stream.role:12} {stream.count:6}"]
+    columns.append(f"{stream.rate:7.4g}/s" if stream.rate is not None else " " * 9)
     if stream.gaps.count:
-        parts.append(f"{stream.gaps.count} gaps, longest {stream.gaps.longest:.3g} s at {stream.gaps.longest_at:.3f}")
+        columns.append(f"{stream.gaps.count} gaps, longest {stream.gaps.longest:.3g} s at {stream.gaps.longest_at:.3f}")
     if stream.duplicates:
-        parts.append(f"{stream.duplicates} duplicates")
+        columns.append(f"{stream.duplicates} duplicates")
     if stream.reversals:
-        parts.append(f"{stream.reversals} reversals")
+        columns.append(f"{stream.reversals} reversals")
     if stream.detail:
-        parts.append(stream.detail)
-    return "  ".join(parts).rstrip()
+        columns.append(stream.detail)
+    return "  ".join(columns).rstrip()
 
 
 def _camera_lines(report: CameraReport) -> Iterator[str]:
@@ -134,12 +134,12 @@ def _camera_lines(report: CameraReport) -> Iterator[str]:
 
 def hypothesis_words(hypothesis: Hypothesis, method: str) -> str:
     """Return a hypothesis with its residual."""
-    parts = [hypothesis.convention]
+    phrases = [hypothesis.convention]
     if hypothesis.translation_scale != 1:
-        parts.append(f"translations x {hypothesis.translation_scale:.4g}")
+        phrases.append(f"translations x {hypothesis.translation_scale:.4g}")
     if hypothesis.focal_factor != 1:
-        parts.append(f"focal length x {hypothesis.focal_factor:.3g}")
+        phrases.append(f"focal length x {hypothesis.focal_factor:.3g}")
     if hypothesis.lag:
-        parts.append(f"lag {hypothesis.lag:+d}")
+        phrases.append(f"lag {hypothesis.lag:+d}")
     measure = BY_FEATURES if method == "epipolar" else BY_DEPTH
-    return f"{', '.join(parts)}: {measure.words(hypothesis.residual)}"
+    return f"{', '.join(phrases)}: {measure.words(hypothesis.residual)}"

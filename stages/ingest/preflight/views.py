@@ -14,7 +14,7 @@ from scenewright.stages.ingest.preflight.reprojection import projected
 from scenewright.stages.kit.geometry.cameras import back_project
 
 WIDTH = 400
-"""Of a picture on the page [pixels]."""
+"""Width of a picture on the page [px]."""
 RESIDUAL_END = 0.1
 """Relative residual that is drawn in full colour."""
 
@@ -80,19 +80,21 @@ def residuals_over_color(
     u, v, z = u[inside], v[inside], z[inside]
     order = np.argsort(-z, kind="stable")  # nearest last: it is what the target would see
     u, v, z = u[order], v[order], z[order]
-    seen = np.zeros(target.depth.shape, np.float64)
-    seen[v, u] = z
-    near = cv2.dilate(seen, np.ones((3, 3), np.uint8))  # a grid of points leaves seams where the view comes closer
-    seen = np.where(seen > 0, seen, near)
+    rendered = np.zeros(target.depth.shape, np.float64)
+    rendered[v, u] = z
+    dilated = cv2.dilate(
+        rendered, np.ones((3, 3), np.uint8)
+    )  # a grid of points leaves seams where the view comes closer
+    rendered = np.where(rendered > 0, rendered, dilated)
     measured = target.depth * 1e-3
-    both = (seen > 0) & (measured > 0)
-    residual = np.zeros(seen.shape)
-    residual[both] = np.clip((seen[both] - measured[both]) / measured[both] / RESIDUAL_END, -1, 1)
+    in_both = (rendered > 0) & (measured > 0)
+    residual = np.zeros(rendered.shape)
+    residual[in_both] = np.clip((rendered[in_both] - measured[in_both]) / measured[in_both] / RESIDUAL_END, -1, 1)
     gray = in_color(target, target.depth.shape).mean(axis=2, keepdims=True) * 0.55 + 60
-    tint = np.zeros((*seen.shape, 3))
+    tint = np.zeros((*rendered.shape, 3))
     size = np.abs(residual)
     tint[..., 1] = 200 * (1 - size)
     tint[..., 0] = np.where(residual > 0, 255 * size, 0)
     tint[..., 2] = np.where(residual < 0, 255 * size, 0)
-    mixed = np.where(both[..., None], 0.45 * gray + 0.65 * tint, 0.5 * gray)
+    mixed = np.where(in_both[..., None], 0.45 * gray + 0.65 * tint, 0.5 * gray)
     return np.clip(mixed, 0, 255).astype(np.uint8)

@@ -14,9 +14,11 @@ RELATION_COLORS = {
     "proximal": "#8c8c8c",
 }
 UNLABELLED = (0.46, 0.45, 0.44)
+"""Colour of what has no class (sRGB, 0 to 1)."""
 LAYOUT_COLORS = {"floor": (0.80, 0.755, 0.69), "wall": (0.715, 0.755, 0.785), "ceiling": (0.84, 0.84, 0.82)}
 """Calm colours for what is large and behind everything."""
 GOLDEN_RATIO = 0.6180339887498949
+"""Share of the colour circle between two instances: the golden ratio, which keeps neighbours apart."""
 
 
 def instance_color(instance: int) -> tuple[float, float, float]:

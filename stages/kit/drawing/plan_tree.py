@@ -12,7 +12,9 @@ CUT, UNMET, REACHED = "#b3261e", "#a86400", "#2e7d32"
 """Colours of an action without a motion, of a plan whose goal does not hold, of one that was carried through."""
 EDGE, BOX = "#90a0b0", "#eef2f6"
 MOST_BRANCHES, LONGEST_REASON = 28, 110
+"""Most plans that are drawn, and longest reason [characters]."""
 DOTS = 100
+"""Dots an inch of the figure."""
 
 
 @dataclass(frozen=True)
@@ -34,23 +36,23 @@ class _Node:
 
 def plan_tree(branches: Sequence[Branch], title: str, width: int = 1100) -> Figure:
     """Return the figure of a tree of plans, numbered from 1; of more than `MOST_BRANCHES` the last. `width` [px]."""
-    shown = branches[-MOST_BRANCHES:]
-    hidden = len(branches) - len(shown)
+    drawn_branches = branches[-MOST_BRANCHES:]
+    hidden = len(branches) - len(drawn_branches)
     root = _Node("start")
-    for number, branch in enumerate(shown, start=hidden + 1):
+    for number, branch in enumerate(drawn_branches, start=hidden + 1):
         node = root
         for key, label in branch.steps:
             node = node.children.setdefault(key, _Node(label))
         node.ends.append((f"{number}: {branch.end}", branch.color))
-    deepest = max((len(branch.steps) for branch in shown), default=0)
-    height = max(240, 60 + 34 * len(shown))
+    deepest = max((len(branch.steps) for branch in drawn_branches), default=0)
+    height = max(240, 60 + 34 * len(drawn_branches))
     figure = Figure(figsize=(1.6 * width / DOTS, 1.1 * height / DOTS), dpi=DOTS)
     axes = figure.add_axes((0.01, 0.01, 0.98, 0.93))
     _draw(axes, root, 0, 0.0)
     axes.set_xlim(-0.5, deepest + 4.5)
-    axes.set_ylim(max(len(shown), 1) - 0.3, -0.7)
+    axes.set_ylim(max(len(drawn_branches), 1) - 0.3, -0.7)
     axes.axis("off")
-    figure.suptitle(title + (f" (the last {len(shown)}, {hidden} before)" if hidden else ""), fontsize=10)
+    figure.suptitle(title + (f" (the last {len(drawn_branches)}, {hidden} before)" if hidden else ""), fontsize=10)
     return figure
 
 

@@ -36,6 +36,7 @@ STYLE: Any = {
     "savefig.facecolor": "white",
     "legend.frameon": False,
 }
+"""Settings of matplotlib for all plots."""
 
 
 def save(figure: Figure, path: Path, dpi: int = 130) -> None:
@@ -62,9 +63,9 @@ def plot_bars(
             places = rows + (k - (len(series) - 1) / 2) * thickness
             lengths = [value or 0.0 for value in values]
             axes.barh(places, lengths, height=0.9 * thickness, color=SERIES_COLORS[k % 5], label=name)
-            for place, value in zip(places, values, strict=True):
+            for y, value in zip(places, values, strict=True):
                 text = "n/a" if value is None else f"{value:.2f}"
-                axes.annotate(text, (value or 0.0, place), (3, 0), textcoords="offset points", va="center", size=8)
+                axes.annotate(text, (value or 0.0, y), (3, 0), textcoords="offset points", va="center", size=8)
         axes.set_yticks(rows, labels)
         axes.invert_yaxis()
         if maximum is not None:
@@ -187,12 +188,12 @@ def _draw_tree(
     colored: Mapping[Edge, str],
 ) -> None:
     # A column is as wide as its longest name; positions count letters.
-    left = {0: 0.0}
+    depth_left = {0: 0.0}
     for depth in range(int(max((x for x, _ in layout.values()), default=0.0)) + 1):
-        left[depth + 1] = (
-            left[depth] + max((len(name) for name, (x, _) in layout.items() if x == depth), default=0) + 4.0
+        depth_left[depth + 1] = (
+            depth_left[depth] + max((len(name) for name, (x, _) in layout.items() if x == depth), default=0) + 4.0
         )
-    places = {name: (left[int(x)], y) for name, (x, y) in layout.items()}
+    places = {name: (depth_left[int(x)], y) for name, (x, y) in layout.items()}
     # Marked edges are drawn last, over the trunk that they share with their siblings.
     for link in sorted(graph.links, key=lambda k: (k.source, k.target, k.relation) in colored):
         if link.relation == "proximal" or link.source not in places or link.target not in places:
@@ -224,6 +225,6 @@ def _draw_tree(
             weight="bold" if name in marked else "normal",
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"},
         )
-    axes.set_xlim(-1.0, max(left.values()) + 1.0)
+    axes.set_xlim(-1.0, max(depth_left.values()) + 1.0)
     axes.set_ylim(max((y for _, y in layout.values()), default=0.0) + 0.7, -0.7)
     axes.axis("off")

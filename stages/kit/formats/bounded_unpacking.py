@@ -29,8 +29,8 @@ def unpacked(packed: bytes, compression: str, size: int) -> bytes:
     else:
         raise ValueError(f"uses unknown compression {compression!r:.40}")
     if len(data) != size:
-        held = f"more than {size}" if len(data) > size else str(len(data))
-        raise ValueError(f"lies about its size: it holds {held} bytes and claims {size}")
+        unpacked_size = f"more than {size}" if len(data) > size else str(len(data))
+        raise ValueError(f"lies about its size: it holds {unpacked_size} bytes and claims {size}")
     return data
 
 
@@ -47,11 +47,11 @@ def _unpacked_zstd(packed: bytes, size: int) -> bytes:
 
 
 def _unpacked_stream(decompressor: Any, packed: bytes, size: int) -> bytes:
-    pieces, total, rest = [], 0, packed
+    pieces, total, unread = [], 0, packed
     try:
         while total <= size and not decompressor.eof:
-            piece = decompressor.decompress(rest, min(PIECE, size + 1 - total))
-            rest = b""
+            piece = decompressor.decompress(unread, min(PIECE, size + 1 - total))
+            unread = b""
             pieces.append(piece)
             total += len(piece)
             if not piece and decompressor.needs_input:

@@ -65,24 +65,24 @@ def part_transforms(model: CadModel, joints: dict[str, float]) -> dict[str, np.n
     unknown = set(joints) - {joint.name for joint in model.joints}
     if unknown:
         raise BadInput(f"model {model.id}: no joint {sorted(unknown)[0]!r}")
-    own, origins, parents = {}, {}, {}
+    part_poses, origins, parents = {}, {}, {}
     for joint in model.joints:
         value = joints.get(joint.name, 0.0)
         axis, origin = np.asarray(joint.axis), np.asarray(joint.origin)
         if joint.type == "revolute":
-            own[joint.part] = transform_from(Rotation.from_rotvec(value * axis).as_matrix(), origin)
+            part_poses[joint.part] = transform_from(Rotation.from_rotvec(value * axis).as_matrix(), origin)
         else:
-            own[joint.part] = transform_from(np.eye(3), origin + value * axis)
+            part_poses[joint.part] = transform_from(np.eye(3), origin + value * axis)
         origins[joint.part], parents[joint.part] = origin, joint.parent
 
     def placed(part: str) -> np.ndarray:
-        if part not in own:
+        if part not in part_poses:
             return np.eye(4)
         parent = parents[part]
-        if parent is None or parent not in own:
-            return own[part]
+        if parent is None or parent not in part_poses:
+            return part_poses[part]
         # part frames are parallel to the model frame at value 0, so that the parent's own pose then is its origin
-        return placed(parent) @ transform_from(np.eye(3), -origins[parent]) @ own[part]
+        return placed(parent) @ transform_from(np.eye(3), -origins[parent]) @ part_poses[part]
 
     return {part: placed(part) for part in model.parts}
 
@@ -114,17 +114,17 @@ def posed_mesh(folder: Path, model: CadModel, joints: dict[str, float], scale: f
     Prismatic values are those of scale 1: the scale multiplies the posed geometry.
     """
     transforms = part_transforms(model, joints)
-    parts = load_visual_parts(folder)
+    part_meshes = load_visual_parts(folder)
     placed = []
     for part in model.parts:
-        if part not in parts:
+        if part not in part_meshes:
             raise BadInput(f"{folder}: no visual/{part}.glb", hint=REBUILD)
-        mesh = parts[part]
+        mesh = part_meshes[part]
         mesh.apply_transform(transforms[part])
         placed.append(mesh)
-    whole = placed[0] if len(placed) == 1 else cast(trimesh.Trimesh, trimesh.util.concatenate(placed))
-    whole.apply_scale(scale)
-    return whole
+    combined = placed[0] if len(placed) == 1 else cast(trimesh.Trimesh, trimesh.util.concatenate(placed))
+    combined.apply_scale(scale)
+    return combined
 
 
 def posed_collision(
@@ -132,10 +132,10 @@ def posed_collision(
 ) -> list[trimesh.Trimesh]:
     """Return the convex collision pieces of all parts in the model frame at the joint values, times `scale`."""
     transforms = part_transforms(model, joints)
-    parts = load_collision_parts(folder)
+    part_pieces = load_collision_parts(folder)
     placed = []
     for part in model.parts:
-        for piece in parts.get(part, []):
+        for piece in part_pieces.get(part, []):
             piece.apply_transform(transforms[part])
             piece.apply_scale(scale)
             placed.append(piece)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 MOST_CHUNKS = 4
+"""Most chunks that are kept unpacked; by eye."""
 MOST_BYTES = 64 << 20
-"""Of all kept chunks together; the latest is kept whatever its size."""
+"""Most bytes of all kept chunks together; the latest is kept whatever its size."""
 
 
 class ChunkCache:
@@ -20,9 +21,9 @@ class ChunkCache:
         data = self._chunks.pop(index, None)
         if data is None:
             data = unpack(index)
-            kept = sum(map(len, self._chunks.values()))
-            while self._chunks and (len(self._chunks) >= MOST_CHUNKS or kept + len(data) > MOST_BYTES):
-                kept -= len(self._chunks.pop(next(iter(self._chunks))))
+            cached_bytes = sum(map(len, self._chunks.values()))
+            while self._chunks and (len(self._chunks) >= MOST_CHUNKS or cached_bytes + len(data) > MOST_BYTES):
+                cached_bytes -= len(self._chunks.pop(next(iter(self._chunks))))
         self._chunks[index] = data
         return data
 

@@ -111,8 +111,8 @@ class DisparityReader:
             schema = self._log.schemas.get(channel.schema_id)
             if match is None or schema is None or schema.name != RawImage.DESCRIPTOR.full_name:
                 raise BadInput(f"{self.path}: topic {channel.topic} is no disparity or confidence", hint=_AGAIN)
-            for stamp, place in self._log.indexed(channel.id):
-                places.setdefault(stamp, {})[match[2]] = place
+            for stamp, location in self._log.indexed(channel.id):
+                places.setdefault(stamp, {})[match[2]] = location
         return places
 
     def _pixels(self, stream: str, places: dict[str, Location]) -> np.ndarray:

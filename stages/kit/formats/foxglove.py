@@ -16,6 +16,7 @@ from scenewright.stages.kit.formats.image_headers import may_be_decoded
 from scenewright.stages.kit.geometry.transforms import quaternion_of, transform_from_quaternion
 
 JPEG_QUALITY = 95
+"""JPEG quality of colour images in a sequence."""
 JPEG_START = b"\xff\xd8\xff"
 PNG_START = b"\x89PNG\r\n\x1a\n"
 RAW_TYPES: dict[str, tuple[np.dtype[Any], int]] = {
@@ -30,6 +31,7 @@ RAW_TYPES: dict[str, tuple[np.dtype[Any], int]] = {
     "rgba8": (np.dtype("u1"), 4),
     "bgra8": (np.dtype("u1"), 4),
 }
+"""Raw image encodings: type and channels of a pixel (names of sensor_msgs/Image)."""
 
 
 def nanoseconds(seconds: float) -> int:

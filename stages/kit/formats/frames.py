@@ -287,15 +287,15 @@ class FrameReader:
 
     def frames(self, streams: Iterable[str] = ("color", "depth", "labels"), every: int = 1) -> Iterator[Frame]:
         """Yield every `every`-th frame in time order, decoding only the streams that are asked for."""
-        wanted = tuple(streams)
+        streams_to_read = tuple(streams)
         for index in range(0, len(self._index), every):
-            yield self.read(index, wanted)
+            yield self.read(index, streams_to_read)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return indices (K,) and world_from_camera (K, 4, 4) of the frames that have a pose."""
         poses = [(frame.index, frame.world_from_camera) for frame in self.frames(streams=())]
-        kept = [(index, pose) for index, pose in poses if pose is not None]
-        return np.array([i for i, _ in kept], dtype=int), np.array([p for _, p in kept]).reshape(-1, 4, 4)
+        posed = [(index, pose) for index, pose in poses if pose is not None]
+        return np.array([i for i, _ in posed], dtype=int), np.array([p for _, p in posed]).reshape(-1, 4, 4)
 
     def read(self, index: int, streams: Iterable[str] = ("color", "depth", "labels")) -> Frame:
         """Return one frame with the pixel streams asked for (color, depth, labels, right).

@@ -10,12 +10,14 @@ LARGEST_IMAGE = 100_000_000
 JPEG_SIZE_MARKERS = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
 """Start of frame; the three left out are tables and an extension."""
 JPEG_BARE_MARKERS = frozenset({0x01, *range(0xD0, 0xD9)})
-"""Markers without a length."""
+"""JPEG markers without a length."""
 PNG_START = b"\x89PNG\r\n\x1a\n"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+"""Samples a pixel by colour type (PNG specification, 11.2.2)."""
 DEFLATE_LIMIT = 1032
 """Deflate never packs more than this many bytes into one."""
 TIFF_WIDTH, TIFF_HEIGHT = 256, 257
+"""Tags of an image's size (TIFF 6.0)."""
 PNM = re.compile(rb"P[1-6]((?:\s|#[^\n]*\n)+(\d{1,9}))((?:\s|#[^\n]*\n)+(\d{1,9}))(?=[\s#])")
 
 
@@ -54,13 +56,13 @@ def may_be_decoded(data: bytes) -> bool:
 
 
 def _png_holds_its_pixels(data: bytes, width: int, height: int) -> bool:
-    packed, place = 0, 8
-    while place + 12 <= len(data):
-        length, kind = struct.unpack_from(">I4s", data, place)
-        if place + 12 + length > len(data):
+    packed, position = 0, 8
+    while position + 12 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, position)
+        if position + 12 + length > len(data):
             return False
         packed += length if kind in (b"IDAT", b"fdAT") else 0
-        place += 12 + length
+        position += 12 + length
         if kind == b"IEND":
             break
     bits, color = struct.unpack_from("BB", data, 24)
@@ -74,23 +76,23 @@ def _png(data: bytes) -> tuple[int, int] | None:
 
 
 def _jpeg(data: bytes) -> tuple[int, int] | None:
-    place = 2
+    position = 2
     while True:
-        start, marker = struct.unpack_from("BB", data, place)
+        start, marker = struct.unpack_from("BB", data, position)
         if start != 0xFF:
             return None
         if marker == 0xFF:  # fill bytes
-            place += 1
+            position += 1
         elif marker in JPEG_BARE_MARKERS:
-            place += 2
+            position += 2
         elif marker in JPEG_SIZE_MARKERS:
-            height, width = struct.unpack_from(">HH", data, place + 5)
+            height, width = struct.unpack_from(">HH", data, position + 5)
             return width, height
         else:
-            length = struct.unpack_from(">H", data, place + 2)[0]
+            length = struct.unpack_from(">H", data, position + 2)[0]
             if length < 2:
                 return None
-            place += 2 + length
+            position += 2 + length
 
 
 def _tiff(data: bytes) -> tuple[int, int] | None:
@@ -100,15 +102,15 @@ def _tiff(data: bytes) -> tuple[int, int] | None:
     else:
         first, count_format, entry_format, inline = struct.unpack_from(order + "I", data, 4)[0], "H", "HHI", 8
     count = struct.unpack_from(order + count_format, data, first)[0]
-    place = first + struct.calcsize("=" + count_format)
+    position = first + struct.calcsize("=" + count_format)
     length = inline + (8 if inline == 12 else 4)
     sizes: dict[int, int] = {}
     for _ in range(min(count, 4096)):
-        tag, kind, _ = struct.unpack_from(order + entry_format, data, place)
+        tag, kind, _ = struct.unpack_from(order + entry_format, data, position)
         value_format = {3: "H", 4: "I", 16: "Q"}.get(kind)
         if tag in (TIFF_WIDTH, TIFF_HEIGHT) and value_format:
-            sizes.setdefault(tag, struct.unpack_from(order + value_format, data, place + inline)[0])
-        place += length
+            sizes.setdefault(tag, struct.unpack_from(order + value_format, data, position + inline)[0])
+        position += length
     return (sizes[TIFF_WIDTH], sizes[TIFF_HEIGHT]) if len(sizes) == 2 else None
 
 
@@ -129,6 +131,6 @@ def _webp(data: bytes) -> tuple[int, int] | None:
         bits = struct.unpack_from("<I", data, 21)[0]
         return (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
     if kind == b"VP8X":
-        width, height = (int.from_bytes(data[place : place + 3], "little") + 1 for place in (24, 27))
+        width, height = (int.from_bytes(data[position : position + 3], "little") + 1 for position in (24, 27))
         return (width, height) if len(data) >= 30 else None
     return None

@@ -25,7 +25,7 @@ from scenewright.stages.kit.formats.chunk_cache import ChunkCache
 
 HINT = "make the artifact again; `scenewright verify` tells which file changed"
 LARGEST_CHUNK = 256 << 20
-"""Unpacked bytes of one chunk that are accepted; our writers close a chunk after 1 MiB and one message."""
+"""Most unpacked bytes of a chunk; our writers close a chunk after 1 MiB and one message."""
 _HEAD = struct.Struct("<BQ")
 """Opcode and length of a record."""
 _MESSAGE = struct.Struct("<HIQQ")
@@ -119,6 +119,6 @@ class IndexedMcap:
             raise self._bad(error) from None
         return data
 
-    def _bad(self, what: Exception | str) -> BadInput:
-        detail = str(what) or type(what).__name__
+    def _bad(self, fault: Exception | str) -> BadInput:
+        detail = str(fault) or type(fault).__name__
         return BadInput(f"{self.path}: is no whole MCAP file of ours: {detail:.200}", hint=HINT)

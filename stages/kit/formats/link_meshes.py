@@ -13,6 +13,7 @@ from scenewright.stages.kit.formats.urdf_file import Link, Shape
 from scenewright.stages.kit.geometry.transforms import apply
 
 GREY = (0.6, 0.6, 0.6, 1.0)
+"""Colour of links without one (RGBA, 0 to 1)."""
 
 
 @dataclass(frozen=True)

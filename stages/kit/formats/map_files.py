@@ -11,6 +11,7 @@ import numpy as np
 from scenewright.stages.kit.formats.ply_files import ColoredMesh
 
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
+"""Time of all entries of the archive, so that equal maps have equal bytes: the earliest that ZIP can hold."""
 
 
 class Painted(Protocol):

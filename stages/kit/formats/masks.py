@@ -16,9 +16,11 @@ from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_d
 from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ID = (1 << 24) - 1
+"""Largest id of a panoptic picture: 24 bits."""
 REMAKE = "run `scenewright segment` again"
 PNG_BEGINNING = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"
 LARGEST_FILE = 4 * LARGEST_IMAGE
+"""Largest panoptic picture in the archive [bytes]; a bound."""
 FRAME_NAME = re.compile(r"(\d{6,9})\.png", re.ASCII)
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Every zip entry bears the earliest date the format knows, so that the same images give the same bytes."""
@@ -76,12 +78,12 @@ def write_panoptic_zip(path: Path, images: Iterable[tuple[int, np.ndarray | byte
     An image may be a PNG already (encode_panoptic_png).
     The same images in the same order give the same bytes. Raises ValueError when a frame comes twice.
     """
-    seen: set[int] = set()
+    written: set[int] = set()
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for frame_index, image in images:
-            if frame_index in seen:
+            if frame_index in written:
                 raise ValueError(f"frame {frame_index} comes twice")
-            seen.add(frame_index)
+            written.add(frame_index)
             entry = zipfile.ZipInfo(panoptic_name(frame_index), date_time=FIXED_TIMESTAMP)
             entry.external_attr = 0o644 << 16
             entry.create_system = 3

@@ -25,13 +25,16 @@ from scenewright.schemas.outside import file_content
 from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, image_size, may_be_decoded
 
 LARGEST_FILE = 4 * 2**30
-"""Bytes."""
+"""Largest mesh file [bytes]."""
 LARGEST_HEADER = 64 * 2**10
+"""Bytes in which the end of a PLY or STL header is looked for; by eye."""
 MOST_TRIANGLES, MOST_VERTICES = 50_000_000, 150_000_000
-"""Of a mesh, where nothing else is asked for; those of a glTF count each time that a node shows them."""
+"""Most triangles and vertices of a mesh where nothing else is asked for; those of a glTF count each time that a node
+shows them."""
 MOST_GLTF_VALUES = 1_000_000
 """Numbers, texts, lists and objects of a glTF description."""
 MOST_NODES, DEEPEST_NODES = 5_000, 200
+"""Most nodes of a glTF, and their deepest nesting; bounds, by eye."""
 MOST_OVERLAP = 4
 """Bytes of the arrays of a GLB for one of the file."""
 LARGEST_TEXT_MESH = 128 * 2**20
@@ -39,7 +42,9 @@ LARGEST_TEXT_MESH = 128 * 2**20
 REMEMBERED_BYTES = 2**15
 """Files up to this size are parsed once."""
 _GLB_COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+"""Bytes a component by its type (glTF 2.0, 3.6.2.2)."""
 _GLB_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+"""Components an element by its type (glTF 2.0, 3.6.2.2)."""
 
 
 def read_mesh(path: Path, *, may_be_empty: bool = False, hint: str = "make the artifact again") -> trimesh.Trimesh:
@@ -133,18 +138,18 @@ def _check_mesh(mesh: trimesh.Trimesh, path: str, *, may_be_empty: bool, hint: s
 
 def _parse(data: bytes, kind: str) -> trimesh.Trimesh | None:
     if len(data) > REMEMBERED_BYTES:
-        return _parsed(data, kind)
-    found = _remembered(data, kind)
-    return found.copy() if found is not None else None
+        return _load_mesh(data, kind)
+    parsed = _parse_cached(data, kind)
+    return parsed.copy() if parsed is not None else None
 
 
 @lru_cache(maxsize=1024)
-def _remembered(data: bytes, kind: str) -> trimesh.Trimesh | None:
+def _parse_cached(data: bytes, kind: str) -> trimesh.Trimesh | None:
     """Pieces of models and rooms are read again and again: to be checked, moved, drawn, measured."""
-    return _parsed(data, kind)
+    return _load_mesh(data, kind)
 
 
-def _parsed(data: bytes, kind: str) -> trimesh.Trimesh | None:
+def _load_mesh(data: bytes, kind: str) -> trimesh.Trimesh | None:
     try:
         # From memory and without a resolver, so that names inside the file lead nowhere.
         loaded = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
@@ -215,7 +220,7 @@ def _glb_tree(data: bytes) -> dict[str, Any]:
 
 
 @contextmanager
-def _told_as_broken() -> Iterator[None]:
+def _refuse_as_broken() -> Iterator[None]:
     try:
         yield
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
@@ -232,7 +237,7 @@ def _check_glb(data: bytes) -> bool:
     version, total, length = struct.unpack_from("<III", data, 4)
     if version != 2 or total != len(data) or 20 + length > total or data[16:20] != b"JSON":
         raise BadInput(f"GLB version {version} declares {total} bytes and {length} of JSON, the file has {len(data)}")
-    with _told_as_broken():
+    with _refuse_as_broken():
         tree = _glb_tree(data)
         views = [
             (whole_number(view.get("byteOffset", 0)), whole_number(view["byteLength"]))
@@ -276,17 +281,17 @@ def _times_shown(tree: dict[str, Any]) -> list[int]:
             parents[child] = number
     depths: dict[int, int] = {}
     for number in range(len(nodes)):
-        way = []
+        path_of_nodes = []
         at: int | None = number
         while at is not None and at not in depths:
-            way.append(at)
-            if len(way) > DEEPEST_NODES:
+            path_of_nodes.append(at)
+            if len(path_of_nodes) > DEEPEST_NODES:
                 raise BadInput(f"nodes are nested deeper than {DEEPEST_NODES}, or in a circle")
             at = parents.get(at)
         depth = 0 if at is None else depths[at]
-        for place in reversed(way):
+        for passed_node in reversed(path_of_nodes):
             depth += 1
-            depths[place] = depth
+            depths[passed_node] = depth
         if depth > DEEPEST_NODES:
             raise BadInput(f"nodes are nested deeper than {DEEPEST_NODES}, or in a circle")
     return times if nodes else [1] * len(times)
@@ -294,16 +299,16 @@ def _times_shown(tree: dict[str, Any]) -> list[int]:
 
 def _glb_counts(data: bytes) -> tuple[int, int]:
     """Return the triangles and the vertices of a checked GLB, each mesh as often as it is shown, and once more."""
-    with _told_as_broken():
+    with _refuse_as_broken():
         tree = _glb_tree(data)
         counts = [whole_number(accessor["count"]) for accessor in tree.get("accessors", ())]
         triangles = vertices = 0
         for mesh, times in zip(tree.get("meshes", ()), _times_shown(tree), strict=True):
             for primitive in mesh["primitives"]:
                 corners = counts[whole_number(primitive["attributes"]["POSITION"])]
-                named = counts[whole_number(primitive["indices"])] if "indices" in primitive else corners
+                index_count = counts[whole_number(primitive["indices"])] if "indices" in primitive else corners
                 strip = primitive.get("mode", 4) != 4
-                triangles += max(times, 1) * (named if strip else named // 3)
+                triangles += max(times, 1) * (index_count if strip else index_count // 3)
                 vertices += max(times, 1) * corners
     return triangles, vertices
 
@@ -315,7 +320,7 @@ def gltf_pixels(data: bytes, where: str, *, hint: str = "make the artifact again
     """
     try:
         _check_glb(data)
-        with _told_as_broken():
+        with _refuse_as_broken():
             return _pixels(data)
     except BadInput as error:
         raise BadInput(f"{where}: {error.message}", hint=hint) from None
@@ -333,13 +338,13 @@ def _pixels(data: bytes) -> int:
         size = image_size(picture) if may_be_decoded(picture) else None
         sizes.append(LARGEST_IMAGE if size is None else size[0] * size[1])
     times = _times_shown(tree)
-    shown = [0] * len(tree.get("materials", ()))
+    triangles_of_material = [0] * len(tree.get("materials", ()))
     for mesh, count in zip(tree.get("meshes", ()), times, strict=True):
         for primitive in mesh["primitives"]:
             if primitive.get("material") is not None:
-                shown[whole_number(primitive["material"])] += max(count, 1)
+                triangles_of_material[whole_number(primitive["material"])] += max(count, 1)
     pixels = sum(sizes)
-    for material, count in zip(tree.get("materials", ()), shown, strict=True):
+    for material, count in zip(tree.get("materials", ()), triangles_of_material, strict=True):
         for owner in (material, material.get("pbrMetallicRoughness", {})):
             for key, texture in owner.items():
                 if key.endswith("Texture"):

@@ -16,10 +16,11 @@ from scenewright.stages.kit.geometry.solids import MassProperties, Solid
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 HINGE_DAMPING, SLIDE_DAMPING = 0.3, 4.0
-"""[N m s/rad], [N s/m]: a door or drawer that is let go comes to rest within a second or two."""
+"""Damping [N m s/rad], [N s/m]: a door or drawer that is let go comes to rest within a second or two."""
 HINGE_FRICTION, SLIDE_FRICTION = 0.1, 1.0
-"""[N m], [N]."""
+"""Friction of joints [N m], [N]; by eye."""
 HINGE_EFFORT, SLIDE_EFFORT = 30.0, 60.0
+"""Largest effort of joints [N m], [N]; by eye."""
 
 
 class Faceted(Protocol):
@@ -57,13 +58,13 @@ def write_model_folder(folder: Path, model: CadModel, parts: Sequence[PartGeomet
         (folder / name).mkdir(parents=True, exist_ok=True)
     links = []
     for part in parts:
-        shown: Sequence[Faceted] = part.visual or part.solids
+        shapes: Sequence[Faceted] = part.visual or part.solids
         colors = part.visual_colors if part.visual else part.colors
-        (folder / "visual" / f"{part.name}.glb").write_bytes(glb_bytes(colored_mesh(shown, colors)))
+        (folder / "visual" / f"{part.name}.glb").write_bytes(glb_bytes(colored_mesh(shapes, colors)))
         visuals, collisions = [], []
         palette = list(dict.fromkeys(colors))
         for k, color in enumerate(palette):
-            mesh = colored_mesh([s for s, c in zip(shown, colors, strict=True) if c == color], None)
+            mesh = colored_mesh([s for s, c in zip(shapes, colors, strict=True) if c == color], None)
             name = f"visual/{part.name}_{k}.obj"
             write_obj(folder / name, mesh.vertices, mesh.faces)
             visuals.append(Shape(mesh=name, color=(color[0] / 255, color[1] / 255, color[2] / 255, 1.0)))

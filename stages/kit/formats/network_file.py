@@ -11,7 +11,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.formats.safetensors_file import write_safetensors
 
 COUNTER = "num_batches_tracked"
-"""Of batch normalisation; not needed to use a network, and not written."""
+"""Name of a counter of batch normalisation; not needed to use a network, and not written."""
 
 
 def write_network(path: Path, network: torch.nn.Module, metadata: Mapping[str, str]) -> None:
@@ -32,10 +32,10 @@ def put_tensors(network: torch.nn.Module, tensors: Mapping[str, np.ndarray], whe
     state = network.state_dict()
     needed = {name for name in state if not name.endswith(COUNTER)}
     for name in sorted(needed | {name for name in tensors if not name.endswith(COUNTER)}):
-        there = tuple(tensors[name].shape) if name in tensors else None
-        wanted = tuple(state[name].shape) if name in needed else None
-        if there != wanted:
-            raise BadInput(f"{where}: tensor {name!r} has shape {there}, the network needs {wanted}", hint=hint)
+        shape = tuple(tensors[name].shape) if name in tensors else None
+        expected = tuple(state[name].shape) if name in needed else None
+        if shape != expected:
+            raise BadInput(f"{where}: tensor {name!r} has shape {shape}, the network needs {expected}", hint=hint)
         if not np.isfinite(tensors[name]).all():
             raise BadInput(f"{where}: tensor {name!r} holds numbers that are not finite", hint=hint)
     numbers = {name: torch.from_numpy(tensors[name].astype(np.float32)) for name in needed}
@@ -51,6 +51,6 @@ def choose_vector_kernels() -> None:
     It chooses at the first call; when that comes from two threads at once, one may still compute with another kernel,
     and the first result of a process had other last digits in one run of three.
     """
-    few = torch.linspace(-1.0, 1.0, 64)
+    few_numbers = torch.linspace(-1.0, 1.0, 64)
     for function in (torch.tanh, torch.exp, torch.sigmoid):
-        function(few)
+        function(few_numbers)

@@ -14,9 +14,11 @@ from scenewright.schemas.outside import opened
 from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ARRAY = 8 * 2**30
-"""Bytes. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""
+"""Largest array [bytes]. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""
 LARGEST_HEADER = 10_000
+"""Largest header of a .npy file [bytes]: numpy's own default."""
 PIECE = 1 << 24
+"""Bytes of an array that are read at a time; by eye."""
 PLAIN_KINDS = "biufUS"
 
 
@@ -71,8 +73,8 @@ def _check_shapes(names: tuple[str, ...], arrays: tuple[np.ndarray, ...], shapes
             )
         )
         if not fits:
-            wanted = ", ".join(f"{axis} = {sizes[axis]}" if axis in sizes else axis for axis in axes)
-            raise BadInput(f"{name}: shape {array.shape} of {array.dtype}, expected ({wanted}) numbers")
+            expected = ", ".join(f"{axis} = {sizes[axis]}" if axis in sizes else axis for axis in axes)
+            raise BadInput(f"{name}: shape {array.shape} of {array.dtype}, expected ({expected}) numbers")
 
 
 def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:

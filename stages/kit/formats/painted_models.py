@@ -24,25 +24,25 @@ def painted_mesh(
     """
     if not colors:
         return posed_mesh(folder, model, candidate.joints, candidate.scale)
-    parts, poses = load_visual_parts(folder), part_transforms(model, candidate.joints)
+    part_meshes, poses = load_visual_parts(folder), part_transforms(model, candidate.joints)
     placed = []
     for name in model.parts:
-        if name in parts:
-            mesh = parts[name]
+        if name in part_meshes:
+            mesh = part_meshes[name]
             if name in colors:
                 _paint(mesh, colors[name])
             mesh.apply_transform(poses[name])
             placed.append(mesh)
-    whole = placed[0] if len(placed) == 1 else cast(trimesh.Trimesh, trimesh.util.concatenate(placed))
-    whole.apply_scale(candidate.scale)
-    return whole
+    combined = placed[0] if len(placed) == 1 else cast(trimesh.Trimesh, trimesh.util.concatenate(placed))
+    combined.apply_scale(candidate.scale)
+    return combined
 
 
 def _paint(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> None:
-    own = vertex_colors(mesh)
-    if own is None:
+    colors = vertex_colors(mesh)
+    if colors is None:
         return
     share = np.zeros(len(mesh.vertices))  # each corner of a triangle stands for a third of it
     np.add.at(share, np.asarray(mesh.faces), np.repeat(mesh.area_faces[:, None] / 3.0, 3, axis=1))
-    painted = recolored(own / 255.0, share, np.array(color) / 255.0)
+    painted = recolored(colors / 255.0, share, np.array(color) / 255.0)
     mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.round(255.0 * painted).astype(np.uint8))

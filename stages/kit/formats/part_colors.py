@@ -37,11 +37,11 @@ def recolored_shapes(root: Path, body: str, shapes: Sequence[Shape], color: tupl
     meshes = [None if shape.mesh is None else read_mesh(root / shape.mesh) for shape in shapes]
     painted, areas, counts = [], [], []
     for shape, mesh in zip(shapes, meshes, strict=True):
-        own = None if mesh is None else vertex_colors(mesh)
-        if own is not None and mesh is not None:
+        mesh_colors = None if mesh is None else vertex_colors(mesh)
+        if mesh_colors is not None and mesh is not None:
             share = np.zeros(len(mesh.vertices))  # each corner of a triangle stands for a third of it
             np.add.at(share, np.asarray(mesh.faces), np.repeat(mesh.area_faces[:, None] / 3.0, 3, axis=1))
-            painted.append(own / 255.0)
+            painted.append(mesh_colors / 255.0)
             areas.append(share * shape.scale**2)
         else:
             painted.append(np.array([(shape.color or (0.6, 0.6, 0.6, 1.0))[:3]]))
@@ -51,14 +51,16 @@ def recolored_shapes(root: Path, body: str, shapes: Sequence[Shape], color: tupl
         return tuple(shapes)
     values = recolored(np.concatenate(painted), np.concatenate(areas), np.array(color) / 255.0)
     result = []
-    for shape, mesh, own, area in zip(shapes, meshes, np.split(values, np.cumsum(counts)[:-1]), areas, strict=True):
-        red, green, blue = (float(v) for v in np.average(own, axis=0, weights=area if area.sum() > 0 else None))
+    for shape, mesh, mesh_colors, area in zip(
+        shapes, meshes, np.split(values, np.cumsum(counts)[:-1]), areas, strict=True
+    ):
+        red, green, blue = (float(v) for v in np.average(mesh_colors, axis=0, weights=area if area.sum() > 0 else None))
         alpha = 1.0 if shape.color is None else shape.color[3]
         name = shape.mesh
-        if mesh is not None and name is not None and len(own) == len(mesh.vertices) > 1:
+        if mesh is not None and name is not None and len(mesh_colors) == len(mesh.vertices) > 1:
             name = f"meshes/{body}/{Path(name).parent.name}_{Path(name).name}"
             (root / name).parent.mkdir(parents=True, exist_ok=True)
-            write_obj(root / name, mesh.vertices, mesh.faces, np.round(255.0 * own))
+            write_obj(root / name, mesh.vertices, mesh.faces, np.round(255.0 * mesh_colors))
         result.append(replace(shape, mesh=name, color=(red, green, blue, alpha)))
     return tuple(result)
 

@@ -12,6 +12,7 @@ from scenewright.schemas.outside import file_content
 
 _VERTEX = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
 _FACE = np.dtype([("count", "u1"), ("indices", "<i4", (3,))])
+"""A triangle in a binary PLY: the count 3 and three indices."""
 _HEADER = (
     "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\n"
     "property float x\nproperty float y\nproperty float z\n"
@@ -21,7 +22,7 @@ _HEADER = (
 
 
 LARGEST_FILE = 4 * 2**30
-"""Bytes: a map of over a hundred million triangles."""
+"""Largest PLY file [bytes]: a map of over a hundred million triangles."""
 
 
 @dataclass(frozen=True)

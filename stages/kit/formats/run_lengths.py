@@ -38,8 +38,8 @@ def decode_rle(encoding: Any, shape: tuple[int, int]) -> np.ndarray:
     if len(runs) and int(runs.min()) < 0:
         raise BadInput(f"its RLE has a run of {int(runs.min())} pixels", hint="it is damaged; write it again")
     if len(runs) and (int(runs.max()) > pixels or int(runs.sum()) != pixels) or not len(runs):
-        told = "more than the picture" if len(runs) and int(runs.max()) > pixels else f"{int(runs.sum())} pixels"
-        raise BadInput(f"its RLE adds up to {told}, the picture has {pixels}", hint="it is damaged; write it again")
+        total = "more than the picture" if len(runs) and int(runs.max()) > pixels else f"{int(runs.sum())} pixels"
+        raise BadInput(f"its RLE adds up to {total}, the picture has {pixels}", hint="it is damaged; write it again")
     values = np.arange(len(runs)) % 2 == 1
     return np.repeat(values, runs).reshape(shape, order="F")
 
@@ -69,8 +69,8 @@ def _runs_of_text(text: str) -> np.ndarray:
     starts = np.concatenate([[0], ends[:-1] + 1])
     if int((ends - starts).max()) >= LONGEST_PIECES:
         raise BadInput("the text of its RLE has a run of more than 2^31 pixels", hint="it is damaged; write it again")
-    place = np.arange(len(letters)) - np.repeat(starts, ends - starts + 1)
-    runs = np.add.reduceat((letters & 31) << (5 * place), starts)
+    letter_position = np.arange(len(letters)) - np.repeat(starts, ends - starts + 1)
+    runs = np.add.reduceat((letters & 31) << (5 * letter_position), starts)
     negative = (letters[ends] & 16) != 0
     runs = runs - (negative.astype(np.int64) << (5 * (ends - starts + 1)))
     runs[1::2] = np.cumsum(runs[1::2])

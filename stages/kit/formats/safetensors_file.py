@@ -32,9 +32,9 @@ TYPES: dict[str, str] = {
 }
 """Types that are read; bfloat16 has no numpy type."""
 LARGEST_FILE = 64 * 2**30
-"""Bytes: more than any network that is read here."""
+"""Largest file [bytes]: more than any network that is read here."""
 LARGEST_HEADER = 100_000_000
-"""Bytes; the format's own limit."""
+"""Largest header [bytes]: the format's own limit."""
 METADATA = "__metadata__"
 _BROKEN = "the file is damaged or not a safetensors file; fetch or train it again"
 
@@ -46,7 +46,7 @@ def write_safetensors(path: Path, tensors: Mapping[str, np.ndarray], metadata: M
     """
     header: dict[str, Any] = {METADATA: dict(sorted(metadata.items()))} if metadata else {}
     names = {np.dtype(text): name for name, text in TYPES.items()}
-    offset, parts = 0, []
+    offset, chunks = 0, []
     for name in sorted(tensors):
         array = np.asarray(tensors[name], order="C")
         kind = array.dtype.newbyteorder("<")
@@ -55,12 +55,12 @@ def write_safetensors(path: Path, tensors: Mapping[str, np.ndarray], metadata: M
         data = array.astype(kind, copy=False).tobytes()
         header[name] = {"dtype": names[kind], "shape": list(array.shape), "data_offsets": [offset, offset + len(data)]}
         offset += len(data)
-        parts.append(data)
+        chunks.append(data)
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
     with Path(path).open("wb") as file:
         file.write(len(text).to_bytes(8, "little") + text)
-        file.writelines(parts)
+        file.writelines(chunks)
 
 
 def read_safetensors(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
@@ -96,8 +96,8 @@ def _span(path: Path, name: str, entry: Any, size: int) -> tuple[int, int, str, 
     """Return (start, end, numpy type, shape) of a header entry, checked against the size of the body."""
     try:
         kind, shape, (start, end) = TYPES[entry["dtype"]], tuple(entry["shape"]), entry["data_offsets"]
-        whole = all(type(number) is int and number >= 0 for number in (*shape, start, end))
-        fits = whole and start <= end <= size and end - start == math.prod(shape) * np.dtype(kind).itemsize
+        are_counts = all(type(number) is int and number >= 0 for number in (*shape, start, end))
+        fits = are_counts and start <= end <= size and end - start == math.prod(shape) * np.dtype(kind).itemsize
     except (KeyError, TypeError, ValueError):
         fits = False
     if not fits:

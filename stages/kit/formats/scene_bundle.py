@@ -86,7 +86,7 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
     Raises BadInput for names that are not unique ASCII, missing or cyclic parents, poses that are not rigid, scales
     that are not positive, and for models whose files are broken.
     """
-    ordered = _parents_first(_checked(bodies))
+    ordered = _parents_first(_check_bodies(bodies))
     (root / "bodies").mkdir(parents=True, exist_ok=True)
     (root / "meshes").mkdir(exist_ok=True)
     center = _room_center(bodies)
@@ -101,13 +101,15 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
     checked = [root / "scene.urdf", root / "static.urdf"]
     for body in ordered:
         if body.movable:
-            own = links[body.name]
+            body_links = links[body.name]
             file = root / "bodies" / f"{body.name}.urdf"
-            write_urdf(file, Urdf(body.name, tuple(_from_subfolder(link) for link in own.links), own.joints))
+            write_urdf(
+                file, Urdf(body.name, tuple(_from_subfolder(link) for link in body_links.links), body_links.joints)
+            )
             checked.append(file)
     for file in checked:
         require_sound(file, root)
-    values = {name: value for own in links.values() for name, value in (own.joint_values or {}).items()}
+    values = {name: value for body_links in links.values() for name, value in (body_links.joint_values or {}).items()}
     write_mjcf(root / "scene.mjcf.xml", combined, values)
     scene = InteractiveSceneFile(bodies=tuple(_record(body, links[body.name]) for body in ordered))
     scene.write(root / "scene.json")
@@ -115,14 +117,14 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
     return scene
 
 
-def _checked(bodies: list[BundleBody]) -> list[BundleBody]:
-    seen: set[str] = set()
+def _check_bodies(bodies: list[BundleBody]) -> list[BundleBody]:
+    names: set[str] = set()
     for body in bodies:
         if not NAME.fullmatch(body.name) or body.name == WORLD or body.name.startswith((".", "-")):
             raise BadInput(f"body name {body.name!r} is not usable in URDF", hint="use ASCII letters, digits and _")
-        if body.name in seen:
+        if body.name in names:
             raise BadInput(f"two bodies are called {body.name!r}")
-        seen.add(body.name)
+        names.add(body.name)
         if not is_rigid(body.world_from_body):
             raise BadInput(f"body {body.name}: pose is not a rigid transform")
         if not (np.isfinite(body.scale) and body.scale > 0):
@@ -234,7 +236,7 @@ def _tree(
             parent = WORLD
         else:
             world_from_parent = by_name[parent].world_from_body
-        own = links[body.name]
+        body_links = links[body.name]
         joints.append(
             UrdfJoint(
                 name=f"{body.name}__support",
@@ -244,8 +246,8 @@ def _tree(
                 parent_from_child=inverse(world_from_parent) @ body.world_from_body,
             )
         )
-        all_links.extend(own.links)
-        joints.extend(own.joints)
+        all_links.extend(body_links.links)
+        joints.extend(body_links.joints)
     return Urdf(name, tuple(all_links), tuple(joints))
 
 
@@ -262,7 +264,7 @@ def _from_subfolder(link: Link) -> Link:
     )
 
 
-def _record(body: BundleBody, own: BodyLinks) -> SceneBody:
+def _record(body: BundleBody, links: BodyLinks) -> SceneBody:
     model = body.model
     width = None if model is None or model.grasp_width is None else model.grasp_width * body.scale
     return SceneBody(
@@ -274,10 +276,10 @@ def _record(body: BundleBody, own: BodyLinks) -> SceneBody:
         parent=None if body.parent == SCENE_NODE else body.parent,
         relation=body.relation,
         world_from_body=as_transform(body.world_from_body),
-        joints=own.joint_records,
-        joint_values=own.joint_values or {},
+        joints=links.joint_records,
+        joint_values=links.joint_values or {},
         box=body.box,
-        mass=own.mass,
+        mass=links.mass,
         contains=model.contains if model is not None else False,
         grasp_width=width,
         world_from_reconstructed=None if body.reconstructed is None else as_transform(body.reconstructed),

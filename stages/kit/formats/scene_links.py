@@ -36,7 +36,9 @@ from scenewright.stages.kit.geometry.transforms import (
 from scipy.spatial.transform import Rotation
 
 LAYOUT_DENSITY = 1000.0
+"""Density of floor, walls and ceiling [kg/m^3]; by eye."""
 GREY = (0.6, 0.6, 0.6, 1.0)
+"""Colour of links without one (RGBA, 0 to 1)."""
 URDF_MESHES = (".obj", ".stl")
 """What every loader of URDF reads; pybullet refuses a whole file that names a GLB."""
 
@@ -60,9 +62,11 @@ class BodyLinks:
         ratio = mass / self.mass
         links = []
         for link in self.links:
-            old = link.inertial
-            new = None if old is None else MassProperties(old.mass * ratio, old.center, old.inertia * ratio)
-            links.append(replace(link, inertial=new))
+            before = link.inertial
+            after = (
+                None if before is None else MassProperties(before.mass * ratio, before.center, before.inertia * ratio)
+            )
+            links.append(replace(link, inertial=after))
         return replace(self, links=tuple(links))
 
     def with_friction(self, friction: float) -> BodyLinks:
@@ -96,11 +100,11 @@ def model_links(
     links = []
     for part in model.parts:
         link = urdf.link(part)
-        visuals = tuple(_copied(root, model.id, part, folder, shape, scale, visual=True) for shape in link.visuals)
+        visuals = tuple(_copy_shape(root, model.id, part, folder, shape, scale, visual=True) for shape in link.visuals)
         if part_colors and part in part_colors:
             visuals = recolored_shapes(root, name, visuals, part_colors[part])
         collisions = tuple(
-            _copied(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions
+            _copy_shape(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions
         )
         inertial = None if link.inertial is None else link.inertial.scaled(scale)
         links.append(Link(names[part], inertial, visuals, collisions, link.friction))
@@ -166,7 +170,9 @@ def scaled_joint(joint: Joint, body: str, scale: float) -> Joint:
     )
 
 
-def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, scale: float, *, visual: bool) -> Shape:
+def _copy_shape(
+    root: Path, model_id: str, part: str, folder: Path, shape: Shape, scale: float, *, visual: bool
+) -> Shape:
     frame = shape.link_from_shape.copy()
     frame[:3, 3] *= scale
     if shape.box_size is not None:
@@ -225,7 +231,7 @@ def furniture_links(
     carries (`world_from_body`: where it was reconstructed), and a pad lies under each of these.
     """
     points = np.asarray(mesh.vertices, dtype=float)
-    whole = _hull(points, density)[1]
+    properties = _hull(points, density)[1]
     pieces = furniture_pieces(points, np.asarray(mesh.faces), rests_at)
     pieces = cut_below(pieces, world_from_body, carried)
     solids = [_hull(piece, density)[0] for piece in pieces]
@@ -234,7 +240,7 @@ def furniture_links(
         write_obj(root / "meshes" / name / f"collision_{number}.obj", solid.vertices, solid.faces)
         collisions.append(Shape(f"meshes/{name}/collision_{number}.obj"))
     links = BodyLinks((Link(name, mass_properties(solids, [density] * len(solids)), (visual,), tuple(collisions)),))
-    return links.with_mass(whole.mass)
+    return links.with_mass(properties.mass)
 
 
 def still_mesh_links(
@@ -274,8 +280,8 @@ def cut_links(root: Path, links: BodyLinks, cut: Mapping[int, Sequence[np.ndarra
             write_obj(root / file, solids[-1].vertices, solids[-1].faces)
             collisions.append(Shape(file))
         collisions += [] if number in cut else [shape]
-    whole = len(cut) == len(link.collisions)
-    inertial = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if whole else link.inertial
+    is_whole = len(cut) == len(link.collisions)
+    inertial = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if is_whole else link.inertial
     return replace(links, links=(replace(link, inertial=inertial, collisions=tuple(collisions)),)).with_mass(mass)
 
 

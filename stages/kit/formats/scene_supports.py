@@ -25,6 +25,7 @@ FEWEST_CORNERS = 4
 FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
 """What of furniture counts as its feet above the floor, and how thick they are made [m]."""
 PAD_THICKNESS = 0.02
+"""Thickness of the pad under a carried body [m]; by eye."""
 MARGIN = 0.01
 """Room around a carried thing that is levelled too [m]."""
 
@@ -86,13 +87,13 @@ def levelled(
     lies on the plane and is not higher than the thing is left out: it is a piece of the thing that the map gave to what
     carries it. `world_from_body` turns about z alone.
     """
-    kept = []
+    hollow_boxes = []
     turn = yaw + np.arctan2(world_from_body[1, 0], world_from_body[0, 0])
     axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     cosine, sine = np.cos(yaw), np.sin(yaw)
     areas = [
-        (thing.polygon(MARGIN), thing.height - world_from_body[2, 3], max(LARGEST_STEP, thing.box.size[2] + MARGIN))
-        for thing in carried
+        (body.polygon(MARGIN), body.height - world_from_body[2, 3], max(LARGEST_STEP, body.box.size[2] + MARGIN))
+        for body in carried
     ]
     for center, size in boxes:
         low, high = center[2] - 0.5 * size[2], center[2] + 0.5 * size[2]
@@ -105,8 +106,10 @@ def levelled(
             if height < high <= height + step and area.intersects(footprint):
                 high = height
         if high - low > 1e-3:
-            kept.append((np.array([center[0], center[1], 0.5 * (low + high)]), np.array([*size[:2], high - low])))
-    return kept
+            hollow_boxes.append(
+                (np.array([center[0], center[1], 0.5 * (low + high)]), np.array([*size[:2], high - low]))
+            )
+    return hollow_boxes
 
 
 def cut_below(
@@ -118,17 +121,17 @@ def cut_below(
     piece of its own, unless that would reach over the thing. Where nothing would be left nothing is cut.
     `world_from_body` turns about z alone.
     """
-    kept = list(pieces)
-    for thing in carried:
-        area, height = thing.polygon(MARGIN), thing.height - world_from_body[2, 3]
+    kept_pieces = list(pieces)
+    for body in carried:
+        area, height = body.polygon(MARGIN), body.height - world_from_body[2, 3]
 
         def meets(points: np.ndarray, area: Polygon = area) -> bool:
             in_world = points[:, :2] @ world_from_body[:2, :2].T + world_from_body[:2, 3]
             return bool(area.intersects(MultiPoint(in_world).convex_hull))
 
         cut = []
-        for piece in kept:
-            if piece[:, 2].max() <= height or piece[:, 2].min() >= height + thing.box.size[2] or not meets(piece):
+        for piece in kept_pieces:
+            if piece[:, 2].max() <= height or piece[:, 2].min() >= height + body.box.size[2] or not meets(piece):
                 cut.append(piece)
                 continue
             low = piece.copy()
@@ -137,8 +140,8 @@ def cut_below(
             high = piece[piece[:, 2] > height + LARGEST_STEP]
             high = high[~_within(high, world_from_body, area)]
             cut += [high] if len(high) >= FEWEST_CORNERS and not meets(high) else []
-        kept = cut
-    return kept or list(pieces)
+        kept_pieces = cut
+    return kept_pieces or list(pieces)
 
 
 def _within(points: np.ndarray, world_from_body: np.ndarray, area: Polygon) -> np.ndarray:
@@ -150,10 +153,10 @@ def pads(carried: Sequence[Carried]) -> list[tuple[np.ndarray, np.ndarray, float
     """Return a flat box (centre in the world frame, size, yaw) below each carried thing, its top in the plane: the
     camera did not see what a thing stands on."""
     pads = []
-    for thing in carried:
-        x, y = thing.box.center[:2]
-        size = np.array([thing.box.size[0], thing.box.size[1], PAD_THICKNESS])
-        pads.append((np.array([x, y, thing.height - 0.5 * PAD_THICKNESS]), size, box_yaw(thing.box)))
+    for body in carried:
+        x, y = body.box.center[:2]
+        size = np.array([body.box.size[0], body.box.size[1], PAD_THICKNESS])
+        pads.append((np.array([x, y, body.height - 0.5 * PAD_THICKNESS]), size, box_yaw(body.box)))
     return pads
 
 

@@ -17,8 +17,9 @@ from scenewright.schemas.outside import file_content
 from scenewright.stages.kit.formats.xml_files import parse_xml
 
 LARGEST_FILE = 64 * 2**20
-"""Bytes. A scene has a few hundred labels."""
+"""Largest annotation [bytes]. A scene has a few hundred labels."""
 LARGEST_ID = 2**31 - 1
+"""Largest id of an annotation: a signed 32-bit number."""
 HINT = "give the <scene>.xml that SceneNN has beside the mesh"
 
 

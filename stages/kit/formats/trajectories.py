@@ -180,8 +180,8 @@ def poses_at(times: np.ndarray, pose_times: np.ndarray, poses: np.ndarray, toler
     """
     result: list[np.ndarray | None] = []
     for time in times:
-        place = int(np.searchsorted(pose_times, time))
-        around = [k for k in (place - 1, place) if 0 <= k < len(pose_times)]
+        index = int(np.searchsorted(pose_times, time))
+        around = [k for k in (index - 1, index) if 0 <= k < len(pose_times)]
         nearest = min(around, key=lambda k: abs(pose_times[k] - time), default=None)
         near_enough = nearest is not None and abs(pose_times[nearest] - time) <= tolerance + 1e-9
         result.append(poses[nearest] if near_enough and nearest is not None else None)

@@ -11,7 +11,7 @@ from scenewright.schemas.errors import BadInput, MissingDependency
 from scenewright.schemas.outside import file_json
 
 LARGEST_CONFIG = 16 * 2**20
-"""Bytes."""
+"""Largest configuration of a model [bytes]."""
 
 
 def transformers_library() -> Any:
@@ -87,10 +87,10 @@ def load_model(class_name: str, folder: Path, device: str) -> Any:
     parameters = {key for key, _ in model.named_parameters()}
     missing = sorted(set(info["missing_keys"]) & parameters)
     if missing or info["mismatched_keys"]:
-        shown = missing[0] if missing else str(sorted(info["mismatched_keys"])[0][0])
+        example = missing[0] if missing else str(sorted(info["mismatched_keys"])[0][0])
         raise BadInput(
             f"{name}: {len(missing) or len(info['mismatched_keys'])} parameters are missing or of another shape, "
-            f"for example {shown:.100}; they would be random",
+            f"for example {example:.100}; they would be random",
             hint="fetch it again, or take the checkpoint of the whole network",
         )
     return model.to(device).eval()
@@ -121,10 +121,10 @@ def load_tokenizer(folder: Path) -> Any:
 
 def short_name(folder: Path) -> str:
     """Return how to call a model folder: `organisation/model@revision` in the hub's cache, else the folder's name."""
-    parts = Path(folder).resolve().parts
-    if len(parts) >= 3 and parts[-2] == "snapshots" and parts[-3].startswith("models--"):
-        return f"{parts[-3].removeprefix('models--').replace('--', '/')}@{parts[-1][:8]}"
-    return parts[-1]
+    path_parts = Path(folder).resolve().parts
+    if len(path_parts) >= 3 and path_parts[-2] == "snapshots" and path_parts[-3].startswith("models--"):
+        return f"{path_parts[-3].removeprefix('models--').replace('--', '/')}@{path_parts[-1][:8]}"
+    return path_parts[-1]
 
 
 def _first_line(error: Exception) -> str:

@@ -18,7 +18,7 @@ READ_MESHES = (".obj", ".stl", ".ply", ".glb")
 LARGEST_REACH = 1e5
 """Metres, of a mesh's vertices from its origin: engines compute in float32."""
 SMALLEST_EXTENT = 1e-9
-"""Metres."""
+"""Smallest extent of a shape [m]."""
 
 
 @dataclass(frozen=True)
@@ -79,20 +79,23 @@ def require_sound(path: Path, root: Path | None = None) -> None:
     """Raise BadInput with the first problem of a URDF, and how many there are."""
     problems = check_urdf(path, root)
     if problems:
-        more = f", and {len(problems) - 1} more" if len(problems) > 1 else ""
-        raise BadInput(f"{path}: {problems[0]}{more}", hint="the model or scene behind it is broken")
+        and_more = f", and {len(problems) - 1} more" if len(problems) > 1 else ""
+        raise BadInput(f"{path}: {problems[0]}{and_more}", hint="the model or scene behind it is broken")
 
 
 def _check_names(urdf: Urdf) -> list[Problem]:
     problems = []
-    for what, names in (("link", [link.name for link in urdf.links]), ("joint", [joint.name for joint in urdf.joints])):
+    for element, names in (
+        ("link", [link.name for link in urdf.links]),
+        ("joint", [joint.name for joint in urdf.joints]),
+    ):
         problems += [
-            Problem("name", f"{what} {n!r}", "name is empty or not ASCII letters, digits, _ . -")
+            Problem("name", f"{element} {n!r}", "name is empty or not ASCII letters, digits, _ . -")
             for n in names
             if not NAME.fullmatch(n)
         ]
         problems += [
-            Problem("duplicate", f"{what} {n!r}", f"stands {count} times")
+            Problem("duplicate", f"{element} {n!r}", f"stands {count} times")
             for n, count in Counter(names).items()
             if count > 1
         ]

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 JOINT_TYPES = ("fixed", "floating", "revolute", "continuous", "prismatic")
 MAXIMUM_BYTES = 64 * 2**20
+"""Largest URDF [bytes]; a bound, by eye."""
 
 
 @dataclass(frozen=True)

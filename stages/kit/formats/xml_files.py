@@ -12,6 +12,7 @@ DEEPEST = 200
 MOST_ELEMENTS = 1_000_000
 """Elements and attributes: a few bytes of each take some hundred in memory."""
 PIECE = 1 << 20
+"""Bytes of XML that are parsed at a time; by eye."""
 LONGEST_TAG = 4 << 20
 """Bytes of a tag, with all its attributes."""
 

@@ -17,6 +17,7 @@ from scenewright.schemas.errors import BadInput
 DEFLATE_LIMIT = 1032
 """Deflate never packs more than this many bytes into one."""
 MOST_ENTRIES = 1_000_000
+"""Most entries of a ZIP archive; a bound, by eye."""
 _BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, ValueError, OverflowError, IndexError)
 _UNSUPPORTED = (NotImplementedError, RuntimeError)
 """A compression or zip version that Python lacks; an encrypted entry."""

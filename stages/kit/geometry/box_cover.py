@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 
 MINIMUM_THICKNESS = 0.01
+"""Smallest edge of a box [m]; by eye."""
 LEAST_MAXIMUM, BOXES_PER_AREA = 200, 100.0
 """Most boxes of a mesh: at least so many, and so many for each square metre."""
 MINIMUM_AREA_SHARE = 0.1
@@ -49,18 +50,18 @@ def _cover(vertices: np.ndarray, faces: np.ndarray, voxel_size: float) -> list[t
     cells = np.floor((corners.mean(axis=1) - dense.min(axis=0)) / voxel_size + 0.5).astype(int)
     boxes: list[tuple[np.ndarray, np.ndarray]] = []
     for axis in range(3):
-        own = np.flatnonzero(across == axis)
-        if len(own) == 0:
+        facing = np.flatnonzero(across == axis)
+        if len(facing) == 0:
             continue
-        number = np.zeros(cells[own].max(axis=0) + 1, dtype=int)
-        for k, (first, last) in enumerate(merge_cells(cells[own])):
+        number = np.zeros(cells[facing].max(axis=0) + 1, dtype=int)
+        for k, (first, last) in enumerate(merge_cells(cells[facing])):
             number[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))] = k
-        block = number[tuple(cells[own].T)]
+        block = number[tuple(cells[facing].T)]
         order = np.argsort(block, kind="stable")
         starts = np.flatnonzero(np.r_[True, np.diff(block[order]) > 0])
-        low = np.minimum.reduceat(corners[own[order]].min(axis=1), starts)
-        high = np.maximum.reduceat(corners[own[order]].max(axis=1), starts)
-        enough = np.add.reduceat(area[own[order]], starts) >= MINIMUM_AREA_SHARE * voxel_size**2
+        low = np.minimum.reduceat(corners[facing[order]].min(axis=1), starts)
+        high = np.maximum.reduceat(corners[facing[order]].max(axis=1), starts)
+        enough = np.add.reduceat(area[facing[order]], starts) >= MINIMUM_AREA_SHARE * voxel_size**2
         size = np.maximum(high - low, MINIMUM_THICKNESS)
         boxes += [(0.5 * (a + b), c) for a, b, c in zip(low[enough], high[enough], size[enough], strict=True)]
     return boxes

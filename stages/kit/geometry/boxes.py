@@ -220,15 +220,15 @@ def clip_polygon(subject: np.ndarray, clip: np.ndarray) -> np.ndarray:
             break
         edge = end - start
         side = [edge[0] * (p[1] - start[1]) - edge[1] * (p[0] - start[0]) for p in result]
-        kept: list[np.ndarray] = []
+        clipped: list[np.ndarray] = []
         for k, point in enumerate(result):
             before = k - 1
             if (side[k] >= 0) != (side[before] >= 0):
                 share = side[before] / (side[before] - side[k])
-                kept.append(result[before] + share * (point - result[before]))
+                clipped.append(result[before] + share * (point - result[before]))
             if side[k] >= 0:
-                kept.append(point)
-        result = kept
+                clipped.append(point)
+        result = clipped
     return np.array(result).reshape(-1, 2)
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 LARGEST_KEY = 2**62
+"""Largest product of the numbers of cells that fits one 64-bit key."""
 
 
 def row_keys(rows: np.ndarray) -> np.ndarray:

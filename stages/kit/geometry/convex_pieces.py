@@ -9,12 +9,15 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 MOST_PIECES = 8
+"""Most convex pieces of a mesh unless more are asked for; by eye."""
 GAIN = 0.12
 """A cut must save this share of the volume of the hull that it cuts."""
 PLACES = (0.15, 0.25, 0.35, 0.5, 0.65, 0.75, 0.85)
-"""Where cuts are tried, as shares of the extent along an axis."""
+"""Shares of the extent along an axis at which cuts are tried; by eye."""
 LEAST_TRIANGLES = 8
+"""Fewest triangles on either side of a cut; by eye."""
 MOST_TRIANGLES = 20_000
+"""Most triangles that cuts are judged by; larger meshes are thinned."""
 
 
 def convex_pieces(vertices: np.ndarray, faces: np.ndarray, most: int = MOST_PIECES) -> list[np.ndarray]:
@@ -26,13 +29,13 @@ def convex_pieces(vertices: np.ndarray, faces: np.ndarray, most: int = MOST_PIEC
     pieces = [corners]
     cuts = [_best_cut(corners)]
     while len(pieces) < most:
-        place = int(np.argmax([0.0 if cut is None else cut[0] for cut in cuts]))
-        cut = cuts[place]
+        best = int(np.argmax([0.0 if cut is None else cut[0] for cut in cuts]))
+        cut = cuts[best]
         if cut is None:
             break
-        halves = [pieces[place][cut[1]], pieces[place][~cut[1]]]
-        pieces[place : place + 1] = halves
-        cuts[place : place + 1] = [_best_cut(half) for half in halves]
+        halves = [pieces[best][cut[1]], pieces[best][~cut[1]]]
+        pieces[best : best + 1] = halves
+        cuts[best : best + 1] = [_best_cut(half) for half in halves]
     return [np.unique(piece.reshape(-1, 3), axis=0) for piece in pieces]
 
 
@@ -41,19 +44,19 @@ def _best_cut(corners: np.ndarray) -> tuple[float, np.ndarray] | None:
     that is worth it."""
     if len(corners) < 2 * LEAST_TRIANGLES:
         return None
-    few = corners[:: max(1, len(corners) // MOST_TRIANGLES)]
-    whole = _hull_volume(few)
+    sample = corners[:: max(1, len(corners) // MOST_TRIANGLES)]
+    volume = _hull_volume(sample)
     best: tuple[float, np.ndarray] | None = None
-    for axis in _axes(few):
-        along, along_few = corners.mean(axis=1) @ axis, few.mean(axis=1) @ axis
+    for axis in _axes(sample):
+        along, along_few = corners.mean(axis=1) @ axis, sample.mean(axis=1) @ axis
         low, high = along_few.min(), along_few.max()
-        for place in PLACES:
-            limit = low + place * (high - low)
+        for share in PLACES:
+            limit = low + share * (high - low)
             side = along_few < limit
             if min(side.sum(), (~side).sum()) < LEAST_TRIANGLES:
                 continue
-            saved = whole - _hull_volume(few[side]) - _hull_volume(few[~side])
-            if saved > GAIN * whole and (best is None or saved > best[0]):
+            saved = volume - _hull_volume(sample[side]) - _hull_volume(sample[~side])
+            if saved > GAIN * volume and (best is None or saved > best[0]):
                 best = (saved, along < limit)
     return best
 

@@ -8,6 +8,7 @@ import fcl
 import numpy as np
 
 CONTACTS = 20
+"""Most contacts of two pieces that FCL returns."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,9 @@ class Solid:
     def shifted(self, offset: np.ndarray) -> Solid:
         """Return the solid moved by `offset` (3,) [m]; the shapes are shared."""
         places = [fcl.Transform(each.getTranslation() + offset) for each in self.objects]
-        moved = tuple(fcl.CollisionObject(shape, place) for shape, place in zip(self.shapes, places, strict=True))
+        moved = tuple(
+            fcl.CollisionObject(shape, transform) for shape, transform in zip(self.shapes, places, strict=True)
+        )
         return Solid(self.low + offset, self.high + offset, self.shapes, moved)
 
 
@@ -38,6 +41,7 @@ class Penetration:
 
 
 APART = Penetration(0.0, np.array([0.0, 0.0, 1.0]))
+"""Result for solids that do not meet."""
 
 
 def convex_solid(pieces: list[tuple[np.ndarray, np.ndarray]]) -> Solid:

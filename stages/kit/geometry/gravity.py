@@ -21,10 +21,11 @@ PARALLEL_ANGLE = math.radians(6.0)
 DISTANCE_THRESHOLD = 0.03
 """Thickness of a plane [m]: noise of structured light at 3 m and a little drift of the poses."""
 MAXIMUM_PLANES = 8
+"""Most planes that are looked at for the floor; by eye."""
 MINIMUM_SHARE = 0.015
 """A plane with fewer of the (5 cm grid) points is not well supported."""
 BELOW_SHARE = 0.05
-"""More of the points further than 10 cm below a plane, and it is a table, not the floor."""
+"""Share of points farther than 10 cm below a plane over which it is a table, not the floor."""
 AXES = {
     "x": (1.0, 0.0, 0.0),
     "-x": (-1.0, 0.0, 0.0),
@@ -33,6 +34,7 @@ AXES = {
     "z": (0.0, 0.0, 1.0),
     "-z": (0.0, 0.0, -1.0),
 }
+"""Up directions by the names that the option gives them."""
 
 
 @dataclass(frozen=True)

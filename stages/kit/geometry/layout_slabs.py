@@ -18,11 +18,14 @@ from scenewright.stages.kit.geometry.boxes import box_corners, box_rotation
 from scenewright.stages.kit.geometry.transforms import transform_from, transform_from_quaternion
 
 FLOOR_THICKNESS = 0.2
+"""Thickness of the slab of a floor or ceiling [m]; by eye."""
 FLOOR_MARGIN = 0.5
 """How far the floor goes on beyond what was seen of it [m]."""
 WALL_THICKNESS = 0.1
+"""Thickness of the slab of a wall [m]; by eye."""
 THIN_LAYOUT = ("door", "window", "curtain")
 THIN_THICKNESS = 0.05
+"""Thickness of the slab of a door, window or curtain [m]; by eye."""
 MINIMUM_AREA = 0.2
 """Smaller upright surfaces get no slab [m^2]."""
 
@@ -78,7 +81,7 @@ def box_under(name: str, box: Box, graph: ContactGraphFile) -> Box:
     if not boxes:
         return box
     turn = box_rotation(box)
-    corners = (np.concatenate([box_corners(other) for other in boxes]) - np.array(box.center)) @ turn
+    corners = (np.concatenate([box_corners(box_of_other) for box_of_other in boxes]) - np.array(box.center)) @ turn
     half = 0.5 * np.array(box.size)
     low, high = np.minimum(corners.min(axis=0), -half), np.maximum(corners.max(axis=0), half)
     low[2], high[2] = -half[2], half[2]
@@ -168,28 +171,28 @@ def upright_rectangles(mesh: trimesh.Trimesh, *, maximum: int = 12) -> list[np.n
     (2 cm); the rectangle holds 98 % of them. Repeats on what is left.
     """
     normals, centers, areas = mesh.face_normals, mesh.triangles_center, mesh.area_faces
-    left = np.abs(normals[:, 2]) < 0.3
+    is_upright = np.abs(normals[:, 2]) < 0.3
     rectangles = []
     for _ in range(maximum):
-        if areas[left].sum() < MINIMUM_AREA:
+        if areas[is_upright].sum() < MINIMUM_AREA:
             break
-        angle = np.arctan2(normals[left, 1], normals[left, 0])
+        angle = np.arctan2(normals[is_upright, 1], normals[is_upright, 0])
         bins = np.floor((angle + np.pi) / np.radians(5)).astype(int) % 72
-        histogram = np.bincount(bins, weights=areas[left], minlength=72)
+        histogram = np.bincount(bins, weights=areas[is_upright], minlength=72)
         peak = int(np.argmax(histogram + np.roll(histogram, 1) + np.roll(histogram, -1)))
-        near = np.abs((bins - peak + 36) % 72 - 36) <= 1
-        mean = (normals[left][near, :2] * areas[left][near, None]).sum(axis=0)
+        in_peak = np.abs((bins - peak + 36) % 72 - 36) <= 1
+        mean = (normals[is_upright][in_peak, :2] * areas[is_upright][in_peak, None]).sum(axis=0)
         direction = np.array([*(mean / np.linalg.norm(mean)), 0.0])
-        aligned = left & (normals @ direction > np.cos(np.radians(15)))
+        aligned = is_upright & (normals @ direction > np.cos(np.radians(15)))
         offsets = centers[aligned] @ direction
         steps = np.floor((offsets - offsets.min()) / 0.02).astype(int)
         best = int(np.argmax(np.convolve(np.bincount(steps, weights=areas[aligned]), np.ones(3), mode="same")))
         at = offsets.min() + (best + 0.5) * 0.02
         inliers = aligned & (np.abs(centers @ direction - at) < 0.05)
         if areas[inliers].sum() < MINIMUM_AREA:
-            left &= ~aligned
+            is_upright &= ~aligned
             continue
-        left &= ~inliers
+        is_upright &= ~inliers
         tangent = np.array([-direction[1], direction[0], 0.0])
         (u0, u1), (z0, z1) = (
             np.percentile(values, [1, 99]) for values in (centers[inliers] @ tangent, centers[inliers, 2])

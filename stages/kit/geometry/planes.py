@@ -16,8 +16,11 @@ UPWARD = 0.9
 SCREENING_POINTS = 2000
 """Hypotheses are scored on this many points first; only the best few are scored on all (LIBRARIES 3d)."""
 FINALISTS = 5
+"""Best hypotheses of the screening that are scored on all points; by eye."""
 REFITS = 2
+"""Refits of the best plane to its inliers; by eye."""
 BATCH = 64
+"""Planes that are scored at a time, which bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -150,10 +153,10 @@ def ransac_plane(
         refined = np.array([*normal, offset])
         if direction is not None and maximum_angle is not None and abs(normal @ unit) < math.cos(maximum_angle):
             break
-        again = np.flatnonzero(_inlier_mask(refined, points, normals, weight, distance_threshold))
-        if len(again) < len(inliers):
+        new_inliers = np.flatnonzero(_inlier_mask(refined, points, normals, weight, distance_threshold))
+        if len(new_inliers) < len(inliers):
             break
-        best, inliers = refined, again
+        best, inliers = refined, new_inliers
     if len(inliers) == 0:
         return None
     return _oriented(best, inliers, normals, direction)
@@ -267,11 +270,11 @@ def _count_inliers(
     planes: np.ndarray, points: np.ndarray, normals: np.ndarray | None, weight: float, threshold: float
 ) -> np.ndarray:
     """Return the number of inliers (K,) of each plane (K, 4); in batches to bound memory."""
-    parts = [
+    counts = [
         np.count_nonzero(_residuals(planes[k : k + BATCH], points, normals, weight) <= threshold, axis=1)
         for k in range(0, len(planes), BATCH)
     ]
-    return np.concatenate(parts)
+    return np.concatenate(counts)
 
 
 def _oriented(

@@ -40,13 +40,13 @@ def sample_large_triangles(
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1)
     with np.errstate(over="ignore"):
-        wanted = np.where(area > spacing**2, np.ceil(2.0 * area / spacing**2), 0)
-    if not wanted.sum() <= MOST_SAMPLES:
+        needed = np.where(area > spacing**2, np.ceil(2.0 * area / spacing**2), 0)
+    if not needed.sum() <= MOST_SAMPLES:
         raise BadInput(
             f"a surface of {area.sum():.3g} m^2 is too large for points {spacing:g} m apart",
             hint="its mesh may be damaged",
         )
-    counts = wanted.astype(int)
+    counts = needed.astype(int)
     owner = np.repeat(np.arange(len(faces)), counts)
     u, v = random.random((2, len(owner), 1))
     flip = u + v > 1.0
@@ -90,8 +90,8 @@ def clusters(points: np.ndarray, distance: float) -> np.ndarray:
         return np.zeros(0, dtype=int)
     edge = distance / 2
     all_cells = np.floor(points / edge).astype(np.int64)
-    _, one, cell_of = np.unique(row_keys(all_cells), return_index=True, return_inverse=True)
-    cells = all_cells[one]
+    _, first_index, cell_of = np.unique(row_keys(all_cells), return_index=True, return_inverse=True)
+    cells = all_cells[first_index]
     pairs = cKDTree(cells).query_pairs(2.0, output_type="ndarray")
     links = coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
     label = connected_components(links, directed=False)[1][cell_of]

@@ -116,10 +116,10 @@ def prism(
     vertices = np.concatenate(
         [np.column_stack([outline, np.full(count, z[0])]), np.column_stack([top, np.full(count, z[1])])]
     )
-    here = np.arange(count)
-    ahead = (here + 1) % count
+    corner = np.arange(count)
+    ahead = (corner + 1) % count
     sides = np.concatenate(
-        [np.column_stack([here, ahead, ahead + count]), np.column_stack([here, ahead + count, here + count])]
+        [np.column_stack([corner, ahead, ahead + count]), np.column_stack([corner, ahead + count, corner + count])]
     )
     fan = np.column_stack([np.zeros(count - 2, dtype=int), np.arange(1, count - 1), np.arange(2, count)])
     faces = np.concatenate([fan[:, ::-1], fan + count, sides])
@@ -155,9 +155,9 @@ def bar(start: np.ndarray, end: np.ndarray, radius: float, count: int = 12) -> S
     helper = np.eye(3)[int(np.argmin(np.abs(direction)))]
     side = np.cross(direction, helper)
     side /= np.linalg.norm(side)
-    other = np.cross(direction, side)
+    up = np.cross(direction, side)
     upright = cylinder(radius, (0.0, length), count=count)
-    frame = np.stack([side, other, direction])
+    frame = np.stack([side, up, direction])
     return replace(upright, vertices=start + upright.vertices @ frame)
 
 
@@ -184,9 +184,9 @@ def cushion(x: tuple[float, float], y: tuple[float, float], z: tuple[float, floa
     bounds = np.array([x, y, z], dtype=float)
     for axis in range(3):
         slab = bounds.copy()
-        for other in range(3):
-            if other != axis:
-                slab[other] += (bevel, -bevel)
+        for other_axis in range(3):
+            if other_axis != axis:
+                slab[other_axis] += (bevel, -bevel)
         points.extend([(a, b, c) for a in slab[0] for b in slab[1] for c in slab[2]])
     solid = hull(np.array(points))
     corners = solid.vertices[solid.faces]

@@ -10,6 +10,7 @@ from scenewright.stages.kit.geometry.transforms import apply
 STRIDE_ANGLE = 0.014
 """Angle between neighbouring samples [rad]: 8 pixels of a Kinect at 640x480."""
 SMALLEST_DEPTH, LARGEST_DEPTH = 0.3, 5.0
+"""Depths between which samples are taken [m]; by eye."""
 
 
 def surface_samples(depth: np.ndarray, camera: Camera, world_from_camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,6 +22,7 @@ from scenewright.stages.kit.geometry.gravity import (
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 GRID = 0.05
+"""Edge of the cells of which one point each is looked at [m]."""
 CLOUD = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 

@@ -19,6 +19,7 @@ from scenewright.schemas.plan import Failure
 LONGEST_NAME = 200
 """Characters of a name that are said: as many as a scene's names may have; a model's own may be of any length."""
 MOST_CALLS = 200
+"""Most actions of a plan in a reply; a bound, by eye."""
 
 
 class ActionCall(Model):
@@ -98,7 +99,9 @@ def check_call(call: ActionCall, language: ActionLanguage) -> Failure | None:
     for name, kind in zip(call.objects, action.objects, strict=True):
         known_names = language.names.get(kind, frozenset())
         if name not in known_names:
-            return _failure("unknown_object", call, f"there is no {kind} {quoted(name)}{_meant(name, known_names)}")
+            return _failure(
+                "unknown_object", call, f"there is no {kind} {quoted(name)}{_suggestion(name, known_names)}"
+            )
     return _check_numbers(call, action)
 
 
@@ -112,9 +115,9 @@ def _check_numbers(call: ActionCall, action: ActionType) -> Failure | None:
     missing = [name for name in action.numbers if name not in call.parameters]
     strange = [name for name in call.parameters if name not in action.numbers]
     if missing or strange:
-        wanted = ", ".join(action.numbers) or "no numbers"
+        expected = ", ".join(action.numbers) or "no numbers"
         which = f"{missing[0]} is missing" if missing else f"{quoted(strange[0])} is none of them"
-        return _failure("wrong_numbers", call, f"{action.name} takes {wanted}; {which}")
+        return _failure("wrong_numbers", call, f"{action.name} takes {expected}; {which}")
     for name, allowed in action.numbers.items():
         value = call.parameters[name]
         if not allowed.low <= value <= allowed.high:
@@ -124,7 +127,7 @@ def _check_numbers(call: ActionCall, action: ActionType) -> Failure | None:
     return None
 
 
-def _meant(name: str, names: frozenset[str]) -> str:
+def _suggestion(name: str, names: frozenset[str]) -> str:
     close = get_close_matches(name[:LONGEST_NAME], sorted(names), n=1)
     return f"; did you mean {quoted(close[0])}?" if close else f"; there are {len(names)} others" if names else ""
 

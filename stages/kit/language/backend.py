@@ -14,7 +14,7 @@ from scenewright.stages.kit.language.reply_schema import ReplySchema
 CHARACTERS_PER_TOKEN = 4
 """Rule of thumb for English and JSON, where a server does not count."""
 TOKENS_PER_IMAGE = 1000
-"""Likewise."""
+"""Rule of thumb for an image, where a server does not count."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ def request_digest(messages: list[dict[str, Any]], schema: dict[str, Any], model
 
     Raises ValueError for what no JSON can hold.
     """
-    parts = {"messages": messages, "schema": schema, "model": model, "temperature": float(temperature)}
-    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+    content = {"messages": messages, "schema": schema, "model": model, "temperature": float(temperature)}
+    return hashlib.sha256(canonical_json(content).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class Chat:
             self._keep_to_budget()
             self.calls += attempt == 0
             self.re_prompts += attempt > 0
-            raw = self._asked(conversation, schema)
+            raw = self._ask(conversation, schema)
             try:
                 return read_reply(raw, schema)
             except (Unreadable, DoesNotFollow) as error:
@@ -68,9 +68,9 @@ class Chat:
             conversation = (
                 *messages,
                 say("assistant", raw.text[:LONGEST_QUOTE] or "(nothing)"),
-                _asked_again(reason, schema),
+                _re_prompt(reason, schema),
             )
-        raise self._failed(
+        raise self._failure(
             "unreadable_reply",
             f"{self.backend.label}: no reply followed the schema {schema.name} in {attempt + 1} tries; last: {reason}",
             {"tries": float(attempt + 1)},
@@ -98,17 +98,17 @@ class Chat:
         )
 
     def _keep_to_budget(self) -> None:
-        settings, asked = self.settings, self.calls + self.re_prompts
-        if asked >= settings.call_budget:
-            numbers = {"asked": float(asked), "budget": float(settings.call_budget)}
-            message = f"{self.backend.label}: asked {asked} times, as often as --call-budget allows"
-            raise self._failed("call_budget", message, numbers, "raise --call-budget")
+        settings, asked_count = self.settings, self.calls + self.re_prompts
+        if asked_count >= settings.call_budget:
+            numbers = {"asked": float(asked_count), "budget": float(settings.call_budget)}
+            message = f"{self.backend.label}: asked {asked_count} times, as often as --call-budget allows"
+            raise self._failure("call_budget", message, numbers, "raise --call-budget")
         if self.tokens >= settings.token_budget:
             numbers = {"tokens": float(self.tokens), "budget": float(settings.token_budget)}
             message = f"{self.backend.label}: {self.tokens} tokens used of --token-budget {settings.token_budget}"
-            raise self._failed("token_budget", message, numbers, "raise --token-budget")
+            raise self._failure("token_budget", message, numbers, "raise --token-budget")
 
-    def _asked(self, messages: tuple[Message, ...], schema: ReplySchema[Any]) -> RawReply:
+    def _ask(self, messages: tuple[Message, ...], schema: ReplySchema[Any]) -> RawReply:
         settings = self.settings
         try:
             raw = self.backend.ask(
@@ -123,10 +123,10 @@ class Chat:
         self.estimated |= raw.usage.estimated
         if raw.finish == "declined":
             message = f"{self.backend.label}: the model would not answer: {' '.join(raw.text.split())[:200]!r}"
-            raise self._failed("declined", message, {}, "put the question in other words, or ask another model")
+            raise self._failure("declined", message, {}, "put the question in other words, or ask another model")
         return raw
 
-    def _failed(self, kind: str, message: str, numbers: dict[str, float], hint: str) -> LanguageFailed:
+    def _failure(self, kind: str, message: str, numbers: dict[str, float], hint: str) -> LanguageFailed:
         error = LanguageFailed(kind, message, numbers=numbers, hint=hint)
         self.failures.append(error.failure)
         return error
@@ -141,20 +141,20 @@ def read_reply(raw: RawReply, schema: ReplySchema[T]) -> T:
     if raw.finish == "length":
         raise Unreadable(f"the reply was cut after {raw.usage.completion_tokens} tokens; be briefer")
     objects = objects_in(raw.text)
-    read: list[T] = []
+    values: list[T] = []
     for value in objects:
         try:
-            read.append(schema.read(value))
+            values.append(schema.read(value))
         except DoesNotFollow as error:
             reason = error
-    if len(read) > 1:
-        raise Unreadable(f"the reply holds {len(read)} objects that follow the schema; one is wanted")
-    if not read:
+    if len(values) > 1:
+        raise Unreadable(f"the reply holds {len(values)} objects that follow the schema; one is wanted")
+    if not values:
         raise reason
-    return read[0]
+    return values[0]
 
 
-def _asked_again(reason: str, schema: ReplySchema[Any]) -> Message:
+def _re_prompt(reason: str, schema: ReplySchema[Any]) -> Message:
     return say(
         "user",
         f"Your last reply could not be used: {reason}. Reply again with one JSON object that follows the schema "

@@ -11,7 +11,7 @@ from scenewright.stages.kit.formats.image_headers import PNG_START, may_be_decod
 
 Role = Literal["system", "user", "assistant"]
 LARGEST_IMAGE_BYTES = 20 * 2**20
-"""Bytes of one image, as encoded."""
+"""Largest image, as encoded [bytes]."""
 JPEG_START = b"\xff\xd8"
 
 
@@ -73,10 +73,10 @@ def say(role: Role, *parts: str | Image) -> Message:
 
 def described(messages: tuple[Message, ...]) -> list[dict[str, Any]]:
     """Return the messages as JSON in which an image is its media type and sha256: what is digested and recorded."""
-    return [{"role": message.role, "parts": [_described(part) for part in message.parts]} for message in messages]
+    return [{"role": message.role, "parts": [_describe(part) for part in message.parts]} for message in messages]
 
 
-def _described(part: Text | Image) -> dict[str, str]:
+def _describe(part: Text | Image) -> dict[str, str]:
     if isinstance(part, Text):
         return {"text": part.text}
     return {"media_type": part.media_type, "sha256": part.sha256}

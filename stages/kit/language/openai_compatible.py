@@ -19,15 +19,16 @@ from scenewright.stages.kit.services.connection import Answer, Connection, Given
 
 PATH = "/chat/completions"
 LARGEST_BODY = 8 * 2**20
-"""Bytes of an answer."""
+"""Largest answer [bytes]."""
 LONGEST_WAIT = 120.0
-"""Seconds that a server may ask to be left alone."""
+"""Longest time that a server may ask to be left alone [s]."""
 MOST_TOKENS = 10**9
-"""Of one exchange: a larger count is no count."""
+"""Most tokens of one exchange: a larger count is no count."""
 NOT_UNDERSTOOD = frozenset({400, 422})
+"""HTTP statuses of a request that a service does not understand."""
 STUMBLED = 500
-"""llama.cpp answers so when a reply that it holds to a schema is cut at the largest number of tokens. The same question
-is then asked in a lower form, that once, so that the cut reply comes back and the model is told."""
+"""HTTP status of llama.cpp when a reply that it holds to a schema is cut at the largest number of tokens. The same
+question is then asked in a lower form, that once, so that the cut reply comes back and the model is told."""
 REFUSED_HINT = "see docs/LANGUAGE.md: does --base-url end with /v1, is --model one that it serves, is the key set?"
 
 Form = Literal["json_schema", "json_object", "text"]
@@ -113,7 +114,7 @@ class OpenAICompatibleBackend:
 def encode_request(request: Request, form: Form, limit_name: str, *, temperature: bool = True) -> dict[str, Any]:
     """Return the body of a request; `form` says how the reply is asked for, `temperature` whether one is."""
     schema = request.schema
-    messages = [_encoded(message) for message in request.messages]
+    messages = [_encode(message) for message in request.messages]
     body: dict[str, Any] = {"model": request.model, limit_name: request.maximum_tokens, "stream": False}
     if temperature:
         body["temperature"] = request.temperature
@@ -126,19 +127,19 @@ def encode_request(request: Request, form: Form, limit_name: str, *, temperature
         # Without constrained decoding the model has to be told.
         document = json.dumps(schema.document, sort_keys=True)
         instruction = f"Reply with one JSON object that follows this JSON schema, and nothing else:\n{document}"
-        messages.append(_encoded(say("user", instruction)))
+        messages.append(_encode(say("user", instruction)))
         if form == "json_object":
             body["response_format"] = {"type": "json_object"}
     return {**body, "messages": messages}
 
 
-def _encoded(message: Message) -> dict[str, Any]:
+def _encode(message: Message) -> dict[str, Any]:
     if len(message.parts) == 1 and isinstance(message.parts[0], Text):
         return {"role": message.role, "content": message.parts[0].text}  # what every server understands
-    return {"role": message.role, "content": [_encoded_part(part) for part in message.parts]}
+    return {"role": message.role, "content": [_encode_part(part) for part in message.parts]}
 
 
-def _encoded_part(part: Text | Image) -> dict[str, Any]:
+def _encode_part(part: Text | Image) -> dict[str, Any]:
     if isinstance(part, Text):
         return {"type": "text", "text": part.text}
     data = base64.b64encode(part.data).decode()
@@ -166,8 +167,8 @@ def _text(content: Any) -> str:
     """Return the text of a message: a string, or a list of parts of which the text ones count."""
     if isinstance(content, str):
         return content
-    parts = content if isinstance(content, list) else []
-    texts = [part.get("text") for part in parts if isinstance(part, dict)]
+    pieces = content if isinstance(content, list) else []
+    texts = [part.get("text") for part in pieces if isinstance(part, dict)]
     return "".join(text for text in texts if isinstance(text, str))
 
 

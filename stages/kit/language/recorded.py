@@ -18,7 +18,7 @@ class RecordedBackend:
 
     def __init__(self, transcript: Transcript, model: str) -> None:
         self._transcript, self._model = transcript, model
-        self._asked: Counter[str] = Counter()
+        self._occurrences: Counter[str] = Counter()
 
     @property
     def label(self) -> str:
@@ -27,11 +27,11 @@ class RecordedBackend:
 
     def ask(self, request: Request) -> RawReply:
         """Return the recorded reply. Raises LanguageFailed (`not_recorded`) saying which prompt and how to record."""
-        digest, occurrence = request.digest, self._asked[request.digest]
+        digest, occurrence = request.digest, self._occurrences[request.digest]
         exchange = self._transcript.find(digest, occurrence)
         if exchange is None:
             raise _missing(self._transcript, request, occurrence)
-        self._asked[digest] += 1
+        self._occurrences[digest] += 1
         return exchange.raw
 
 
@@ -41,7 +41,7 @@ class RecordingBackend:
 
     def __init__(self, asked: Backend, file: TranscriptFile, earlier: Transcript | None = None) -> None:
         self._backend, self._file, self._earlier = asked, file, earlier
-        self._asked: Counter[str] = Counter()
+        self._occurrences: Counter[str] = Counter()
 
     @property
     def label(self) -> str:
@@ -51,18 +51,18 @@ class RecordingBackend:
     def ask(self, request: Request) -> RawReply:
         """Return the reply, out of the file or of the backend. Raises what that raises."""
         digest = request.digest
-        occurrence = self._asked[digest]
-        raw = self._answered(request, digest, occurrence)
-        self._asked[digest] += 1
+        occurrence = self._occurrences[digest]
+        raw = self._answer(request, digest, occurrence)
+        self._occurrences[digest] += 1
         return raw
 
-    def _answered(self, request: Request, digest: str, occurrence: int) -> RawReply:
-        kept = self._file.transcript.find(digest, occurrence)
-        if kept is not None:
-            return kept.raw
-        kept = self._earlier.find(digest, occurrence) if self._earlier is not None else None
-        raw = kept.raw if kept is not None else self._backend.ask(request)
-        self._file.append(kept if kept is not None else exchange_of(request, raw, self._backend.label))
+    def _answer(self, request: Request, digest: str, occurrence: int) -> RawReply:
+        exchange = self._file.transcript.find(digest, occurrence)
+        if exchange is not None:
+            return exchange.raw
+        exchange = self._earlier.find(digest, occurrence) if self._earlier is not None else None
+        raw = exchange.raw if exchange is not None else self._backend.ask(request)
+        self._file.append(exchange if exchange is not None else exchange_of(request, raw, self._backend.label))
         return raw
 
 
@@ -73,8 +73,8 @@ def _missing(transcript: Transcript, request: Request, occurrence: int) -> Langu
         message = f"{message}, asked for the {occurrence + 1}. time"
     same = [e for e in transcript if list(e.messages) == described(request.messages)]
     if same and not occurrence:
-        other = same[0]
-        message = f"{message}; it was recorded with {_differences(request, other.model, other.temperature)}"
+        recorded = same[0]
+        message = f"{message}; it was recorded with {_differences(request, recorded.model, recorded.temperature)}"
     return LanguageFailed(
         "not_recorded",
         message,

@@ -18,6 +18,7 @@ M = TypeVar("M", bound=BaseModel)
 LONGEST_REASON = 400
 """Characters of what a reply got wrong, as it is said to the model and to people."""
 MOST_REASONS = 5
+"""Most reasons that the model is told at once."""
 
 
 class DoesNotFollow(Exception):
@@ -48,7 +49,7 @@ def schema_of(model: type[M]) -> ReplySchema[M]:
             return model.model_validate_json(json.dumps(value), strict=True)
         except ValidationError as error:
             reasons = [f"{_place(e['loc'])}: {e['msg']}" for e in error.errors(include_url=False)]
-            raise DoesNotFollow(_joined(reasons)) from None
+            raise DoesNotFollow(_join_reasons(reasons)) from None
 
     return ReplySchema(model.__name__, _all_required(model.model_json_schema()), read, strict=True)
 
@@ -67,7 +68,7 @@ def schema_from(name: str, document: dict[str, Any]) -> ReplySchema[Any]:
     def read(value: Any) -> Any:
         errors = sorted(validator.iter_errors(value), key=lambda e: list(map(str, e.absolute_path)))
         if errors:
-            raise DoesNotFollow(_joined([f"{_place(tuple(e.absolute_path))}: {e.message}" for e in errors]))
+            raise DoesNotFollow(_join_reasons([f"{_place(tuple(e.absolute_path))}: {e.message}" for e in errors]))
         return value
 
     return ReplySchema(name, document, read, strict=False)
@@ -79,20 +80,20 @@ def _all_required(document: Any) -> Any:
         return [_all_required(item) for item in document]
     if not isinstance(document, dict):
         return document
-    made = {key: _all_required(value) for key, value in document.items() if key != "default"}
-    if isinstance(made.get("properties"), dict):
+    completed = {key: _all_required(value) for key, value in document.items() if key != "default"}
+    if isinstance(completed.get("properties"), dict):
         # A property may itself be called `default`, so that this level is copied from the original names.
-        made["properties"] = {name: _all_required(value) for name, value in document["properties"].items()}
-        made["required"] = list(made["properties"])
-        made.setdefault("additionalProperties", False)
-    return made
+        completed["properties"] = {name: _all_required(value) for name, value in document["properties"].items()}
+        completed["required"] = list(completed["properties"])
+        completed.setdefault("additionalProperties", False)
+    return completed
 
 
 def _place(path: tuple[Any, ...]) -> str:
     return ".".join(str(part) for part in path) or "the object"
 
 
-def _joined(reasons: list[str]) -> str:
-    more = f" (and {len(reasons) - MOST_REASONS} more)" if len(reasons) > MOST_REASONS else ""
+def _join_reasons(reasons: list[str]) -> str:
+    and_more = f" (and {len(reasons) - MOST_REASONS} more)" if len(reasons) > MOST_REASONS else ""
     text = " ".join("; ".join(reasons[:MOST_REASONS]).split())
-    return (text if len(text) <= LONGEST_REASON else text[: LONGEST_REASON - 3] + "...") + more
+    return (text if len(text) <= LONGEST_REASON else text[: LONGEST_REASON - 3] + "...") + and_more

@@ -11,11 +11,11 @@ import re
 from typing import Any
 
 LONGEST_REPLY = 200_000
-"""Characters."""
+"""Longest reply that is read [characters]."""
 MOST_OBJECTS = 16
-"""Different objects in one reply."""
+"""Most different objects in one reply."""
 LONGEST_INTEGER = 300
-"""Digits: more are no double."""
+"""Longest integer [digits]: more are no double."""
 THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
 START = re.compile(r'\{\s*["}]')
 """How an object begins; braces in prose begin otherwise."""
@@ -51,16 +51,16 @@ def objects_in(text: str) -> list[dict[str, Any]]:
     return objects
 
 
-def _object_at(text: str, place: int) -> tuple[dict[str, Any], int]:
+def _object_at(text: str, start: int) -> tuple[dict[str, Any], int]:
     try:
-        value, end = _DECODER.raw_decode(text, place)
+        value, end = _DECODER.raw_decode(text, start)
         json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         raise Unreadable("the JSON object is malformed: half a surrogate pair") from None
     except json.JSONDecodeError as error:
         if error.pos >= len(text) or error.msg.startswith("Unterminated string"):
             raise Unreadable("the JSON object is cut short") from None
-        raise Unreadable(f"the JSON object is malformed: {error.msg} at character {error.pos - place}") from None
+        raise Unreadable(f"the JSON object is malformed: {error.msg} at character {error.pos - start}") from None
     except RecursionError:
         raise Unreadable("the JSON object is nested too deeply") from None
     except ValueError as error:  # of the functions below
@@ -86,10 +86,10 @@ def _refuse(text: str) -> float:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) < len(pairs):
+    members = dict(pairs)
+    if len(members) < len(pairs):
         raise ValueError("an object says a name twice")
-    return made
+    return members
 
 
 _DECODER = json.JSONDecoder(parse_float=_finite, parse_int=_short, parse_constant=_refuse, object_pairs_hook=_once)

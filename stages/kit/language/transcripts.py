@@ -20,7 +20,7 @@ from scenewright.stages.kit.language.backend import RawReply, Request, Usage, re
 from scenewright.stages.kit.language.messages import described
 
 LARGEST_TRANSCRIPT = 512 * 2**20
-"""Bytes."""
+"""Largest transcript [bytes]."""
 FIRST_KEY = b'{"backend": '
 """How a line of ours begins."""
 
@@ -152,10 +152,10 @@ class TranscriptFile:
         try:
             with self.path.open("rb+") as file:
                 data = file.read(LARGEST_TRANSCRIPT + 1)
-                whole = data.rfind(b"\n") + 1
-                last = data[whole:]
+                end_of_lines = data.rfind(b"\n") + 1
+                last = data[end_of_lines:]
                 if last.startswith(FIRST_KEY) and not last.endswith(b"}"):
-                    file.truncate(whole)
+                    file.truncate(end_of_lines)
                 elif last:  # edited by hand: whole, but for the end of its line
                     file.seek(0, 2)
                     file.write(b"\n")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 RECALL_POINTS = np.linspace(0.0, 1.0, 11)
+"""Levels of recall at which precision is averaged (PASCAL VOC 2007)."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,10 @@ def precision_recall(
     matched = match_greedily(np.asarray(iou, dtype=float).reshape(len(confidence), true_count), confidence, match_iou)
     hits = np.array([truth is not None for _, truth in matched], dtype=float)
     hits_so_far = np.cumsum(hits)
-    seen = np.arange(1, len(hits) + 1)
+    predicted_count = np.arange(1, len(hits) + 1)
     recall = hits_so_far / true_count if true_count else np.zeros(len(hits))
     pairs = tuple((row, truth) for row, truth in matched if truth is not None)
-    return PrecisionRecall(hits_so_far / seen if len(hits) else hits_so_far, recall, true_count, pairs)
+    return PrecisionRecall(hits_so_far / predicted_count if len(hits) else hits_so_far, recall, true_count, pairs)
 
 
 def average_precision(curve: PrecisionRecall) -> float | None:

@@ -76,15 +76,15 @@ def paired_interval(
     """
     if len(first) != len(second):
         raise ValueError(f"{len(first)} and {len(second)} samples are no pairs")
-    value, other = figure(first), figure(second)
-    if value is None or other is None:
+    value, other_value = figure(first), figure(second)
+    if value is None or other_value is None:
         return None
     drawn = []
     for rows in _draws(len(first), random, resamples):
         a, b = figure([first[k] for k in rows]), figure([second[k] for k in rows])
         if a is not None and b is not None:
             drawn.append(a - b)
-    return _around(value - other, drawn)
+    return _around(value - other_value, drawn)
 
 
 def pooled_interval(
@@ -105,10 +105,10 @@ def pooled_interval(
     return _around(value, drawn[np.isfinite(drawn)].tolist())
 
 
-def _ratios(parts: np.ndarray, rows: np.ndarray) -> tuple[float, np.ndarray]:
+def _ratios(sums_of_units: np.ndarray, rows: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the ratio of all samples and of each draw, NaN with nothing below the line."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        sums, all_of_them = parts[rows].sum(axis=1), parts.sum(axis=0)
+        sums, all_of_them = sums_of_units[rows].sum(axis=1), sums_of_units.sum(axis=0)
         drawn = np.where(sums[:, 1] > 0, sums[:, 0] / sums[:, 1], np.nan)
         return float(all_of_them[0] / all_of_them[1]) if all_of_them[1] > 0 else np.nan, drawn
 

@@ -12,16 +12,16 @@ def candidates_of(replacement: Replacement) -> list[tuple[str, CadCandidate]]:
     listed: list[tuple[str, CadCandidate]] = []
     best = replacement.best_single
     if replacement.chosen is not None and replacement.decision == "cad":
-        both = best is not None and same_placement(best, replacement.chosen)
-        listed.append(("chosen, best by itself" if both else "chosen", replacement.chosen))
+        is_same = best is not None and same_placement(best, replacement.chosen)
+        listed.append(("chosen, best by itself" if is_same else "chosen", replacement.chosen))
     if best is not None:
         listed.append(("best by itself", best))
     listed += [("", candidate) for candidate in replacement.alternatives]
-    kept: list[tuple[str, CadCandidate]] = []
+    distinct: list[tuple[str, CadCandidate]] = []
     for role, candidate in listed:
-        if not any(same_placement(candidate, other) for _, other in kept):
-            kept.append((role, candidate))
-    return kept
+        if not any(same_placement(candidate, listed_candidate) for _, listed_candidate in distinct):
+            distinct.append((role, candidate))
+    return distinct
 
 
 def before_check(replacement: Replacement) -> CadCandidate | None:

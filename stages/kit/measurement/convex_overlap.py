@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 CELLS = 40
 """Cells along each axis of the grid on which shared space is counted."""
 SAME_DIRECTION = 1e-6
+"""Length of a cross product below which unit directions are called parallel; rounding."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +138,6 @@ def shared_volume(a: Sequence[ConvexPiece], b: Sequence[ConvexPiece], cells: int
 def _inside_any(pieces: Sequence[ConvexPiece], points: np.ndarray) -> np.ndarray:
     inside = np.zeros(len(points), dtype=bool)
     for piece in pieces:
-        near = np.nonzero(~inside & np.all((points >= piece.low) & (points <= piece.high), axis=1))[0]
-        inside[near] = np.all(points[near] @ piece.normals.T <= piece.offsets, axis=1)
+        in_box = np.nonzero(~inside & np.all((points >= piece.low) & (points <= piece.high), axis=1))[0]
+        inside[in_box] = np.all(points[in_box] @ piece.normals.T <= piece.offsets, axis=1)
     return inside

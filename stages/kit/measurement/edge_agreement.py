@@ -35,8 +35,8 @@ class EdgeAgreement:
     @property
     def f1(self) -> float | None:
         """Harmonic mean; None when there is neither a true nor a predicted edge."""
-        both = self.true_count + self.predicted_count
-        return 2.0 * self.agreed / both if both else None
+        total = self.true_count + self.predicted_count
+        return 2.0 * self.agreed / total if total else None
 
 
 def edge_agreement(
@@ -85,10 +85,10 @@ def edge_errors(
     """
     names = _with_roots(true, predicted, partner)
     skipped = {names[name] for name in ignored if name in names}
-    wanted = {(k.source, k.target, k.relation) for k in true.links if not {k.source, k.target} & ignored}
+    true_edges = {(k.source, k.target, k.relation) for k in true.links if not {k.source, k.target} & ignored}
     got = {(k.source, k.target, k.relation) for k in predicted.links if not {k.source, k.target} & skipped}
-    matched = {(s, t, r): (names.get(s, ""), names.get(t, ""), r) for s, t, r in wanted}
-    missing = {edge for edge, other in matched.items() if other not in got}
+    matched = {(s, t, r): (names.get(s, ""), names.get(t, ""), r) for s, t, r in true_edges}
+    missing = {edge for edge, matched_edge in matched.items() if matched_edge not in got}
     wrong = got - set(matched.values())
     return (
         frozenset(edge for edge in missing if edge[2] != "proximal"),
@@ -109,8 +109,8 @@ def _below_root(graph: ContactGraphFile) -> ContactGraphFile:
     """The graph without the edges of floor, walls and ceiling to the scene."""
     roots = {node.id for node in graph.nodes if node.node_type == "scene"}
     layout = {node.id for node in graph.nodes if node.node_type == "layout"}
-    kept = tuple(link for link in graph.links if not (link.source in roots and link.target in layout))
-    return graph.model_copy(update={"links": kept})
+    links = tuple(link for link in graph.links if not (link.source in roots and link.target in layout))
+    return graph.model_copy(update={"links": links})
 
 
 def _agreement(
@@ -124,7 +124,7 @@ def _agreement(
     def key(source: str, target: str) -> tuple[str, str]:
         return (source, target) if relations != ("proximal",) else (min(source, target), max(source, target))
 
-    wanted = [
+    true_pairs = [
         (link.source, link.target)
         for link in true.links
         if link.relation in relations and not {link.source, link.target} & ignored
@@ -134,5 +134,5 @@ def _agreement(
         for link in predicted.links
         if link.relation in relations and not {link.source, link.target} & skipped
     }
-    agreed = {key(names[s], names[t]) for s, t in wanted if s in names and t in names} & got
-    return EdgeAgreement(len(set(wanted)), len(got), len(agreed))
+    agreed = {key(names[s], names[t]) for s, t in true_pairs if s in names and t in names} & got
+    return EdgeAgreement(len(set(true_pairs)), len(got), len(agreed))

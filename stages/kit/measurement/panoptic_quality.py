@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 VOID = 0
+"""Label of points that no truth is known for."""
 MATCH_IOU = 0.5
+"""Smallest overlap of a match (Kirillov 2019): at more than one half, matches are unique."""
 
 
 @dataclass(frozen=True)
@@ -195,5 +197,5 @@ def _mean(qualities: list[ClassQuality]) -> QualityAverage:
 def drop_small(labels: np.ndarray, minimum_points: float) -> np.ndarray:
     """Return (N,) labels with every label of fewer than `minimum_points` points set to void (the thesis's code)."""
     values, inverse, counts = np.unique(labels, return_inverse=True, return_counts=True)
-    kept = np.where(counts >= minimum_points, values, VOID)
-    return kept[inverse].astype(labels.dtype) if len(values) else labels.copy()
+    kept_values = np.where(counts >= minimum_points, values, VOID)
+    return kept_values[inverse].astype(labels.dtype) if len(values) else labels.copy()

@@ -88,10 +88,10 @@ def associate(true_times: np.ndarray, times: np.ndarray, tolerance: float = 0.02
     if not len(true_times) or not len(times):
         return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
     right = np.clip(np.searchsorted(true_times, times), 0, len(true_times) - 1)
-    left = np.maximum(right - 1, 0)
-    nearest = np.where(np.abs(true_times[left] - times) <= np.abs(true_times[right] - times), left, right)
-    kept = np.nonzero(np.abs(true_times[nearest] - times) <= tolerance)[0]
-    return nearest[kept], kept
+    before = np.maximum(right - 1, 0)
+    nearest = np.where(np.abs(true_times[before] - times) <= np.abs(true_times[right] - times), before, right)
+    matched = np.nonzero(np.abs(true_times[nearest] - times) <= tolerance)[0]
+    return nearest[matched], matched
 
 
 def trajectory_error(

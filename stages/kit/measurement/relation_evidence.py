@@ -7,15 +7,15 @@ from scenewright.schemas.scene_parts import Relation
 
 def evidence(link: Relation) -> str:
     """Return confidence and evidence of a relation in words: plane, gap, overlap, share inside, where they meet."""
-    parts = [f"confidence {link.confidence:.2f}"]
+    phrases = [f"confidence {link.confidence:.2f}"]
     if link.plane is not None:
-        parts.append(f"plane {link.plane} of {link.source}")
+        phrases.append(f"plane {link.plane} of {link.source}")
     if link.gap is not None:
-        parts.append(f"gap {1000 * link.gap:.0f} mm")
+        phrases.append(f"gap {1000 * link.gap:.0f} mm")
     if link.overlap is not None:
-        parts.append(f"overlap {100 * link.overlap:.0f} %")
+        phrases.append(f"overlap {100 * link.overlap:.0f} %")
     if link.inside is not None:
-        parts.append(f"inside {100 * link.inside:.0f} %")
+        phrases.append(f"inside {100 * link.inside:.0f} %")
     if link.contact is not None:
-        parts.append("meet at " + ", ".join(f"{value:.2f}" for value in link.contact))
-    return ", ".join(parts)
+        phrases.append("meet at " + ", ".join(f"{value:.2f}" for value in link.contact))
+    return ", ".join(phrases)

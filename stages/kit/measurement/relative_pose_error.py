@@ -30,8 +30,8 @@ def relative_error(
     ends = np.searchsorted(places, places + distance - 1e-9)
     starts = np.flatnonzero(ends < len(places))
     ends = ends[starts]
-    near = places[ends] - places[starts] <= distance + slack
-    starts, ends = starts[near], ends[near]
+    is_close = places[ends] - places[starts] <= distance + slack
+    starts, ends = starts[is_close], ends[is_close]
     if not len(starts):
         return None
     errors = _inverse(_motions(true_poses, starts, ends)) @ _motions(poses, starts, ends)
@@ -60,10 +60,10 @@ def trajectory_drift(
     truth, estimate = true_poses[true_rows], poses[rows]
     if len(rows) < 2:
         return Drift(None, None)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1))])
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1))])
     return Drift(
         per_second=relative_error(truth, estimate, np.asarray(times)[rows], 1.0, 0.5),
-        per_metre=relative_error(truth, estimate, way, 1.0, 0.5),
+        per_metre=relative_error(truth, estimate, travelled, 1.0, 0.5),
     )
 
 

@@ -56,9 +56,9 @@ def shape_symmetry(points: np.ndarray, tolerance: float = TOLERANCE) -> Symmetry
             return False  # another box cannot hold the same shape: saves the search
         return float(np.mean(tree.query(centered @ rotation.T)[0])) - spacing < allowed
 
-    kept = [rotation for rotation in cube_rotations() if leaves_it(rotation)]
+    symmetries = [rotation for rotation in cube_rotations() if leaves_it(rotation)]
     identity = np.eye(3)
-    others = [rotation for rotation in kept if not np.array_equal(rotation, identity)]
+    others = [rotation for rotation in symmetries if not np.array_equal(rotation, identity)]
     is_round = leaves_it(_turn(np.pi / 4)) and leaves_it(_turn(2 * np.pi / 5))
     return Symmetry((identity, *others), is_round)
 

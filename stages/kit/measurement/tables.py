@@ -50,11 +50,11 @@ def as_markdown(table: Table) -> str:
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
     numeric = [any(isinstance(row[k], int | float) for row in table.rows) for k in range(len(table.columns))]
-    parts = [f"### {table.title}", "", line(table.columns), line(["--:" if n else ":--" for n in numeric])]
-    parts += [line([format_cell(value) for value in row]) for row in table.rows]
+    lines = [f"### {table.title}", "", line(table.columns), line(["--:" if n else ":--" for n in numeric])]
+    lines += [line([format_cell(value) for value in row]) for row in table.rows]
     if table.note:
-        parts += ["", table.note]
-    return "\n".join(parts) + "\n"
+        lines += ["", table.note]
+    return "\n".join(lines) + "\n"
 
 
 def write_table(folder: Path, table: Table) -> None:

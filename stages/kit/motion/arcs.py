@@ -20,9 +20,13 @@ from scenewright.stages.kit.simulation.robot import Configuration, Robot, base_p
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 STANDOFF = 0.07
+"""Distance from the handle at which the approach begins [m]; by eye."""
 ARC_STEP = 0.05
+"""Step of a joint between two poses on its way [rad, m]; by eye."""
 SLOW = 0.3
+"""Share of the full speed at which the hand moves at and with the handle; by eye."""
 TILTS = (0.0, 0.5, -0.5, 0.9, -0.9, 1.2, -1.2)
+"""Tilts of the hand against the handle that are tried [rad], the straight one first; by eye."""
 
 
 class JointedModel(ArmModel, Protocol):
@@ -101,9 +105,9 @@ def along_arc(
     try:
         with model.world.joints_at(body, {joint.name: float(values[0])}):
             checker.allow(touch=(joint.part,))
-            near = poses[0].copy()
-            near[:3, 3] -= STANDOFF * near[:3, 2]
-            approach = planner.line(base, arms[0], near, tally)
+            standoff_pose = poses[0].copy()
+            standoff_pose[:3, 3] -= STANDOFF * standoff_pose[:3, 2]
+            approach = planner.line(base, arms[0], standoff_pose, tally)
             if approach is None:
                 return None
             checker.allow()
@@ -129,10 +133,10 @@ def along_arc(
     if pulling:
         segments.append(Segment(whole_body(base, approach[:1]), grip, SLOW))
     half = len(arms) // 2
-    held = grip if pulling else 0.0
+    gripped = grip if pulling else 0.0
     verb = "pull" if pulling else "push"
-    segments.append(Segment(whole_body(base, arms[: half + 1]), held, SLOW, label=verb))
-    segments.append(Segment(whole_body(base, arms[half:]), held, SLOW, label=verb))
+    segments.append(Segment(whole_body(base, arms[: half + 1]), gripped, SLOW, label=verb))
+    segments.append(Segment(whole_body(base, arms[half:]), gripped, SLOW, label=verb))
     segments.append(Segment(whole_body(base, away), opening, SLOW))
     segments.append(Segment(whole_body(base, home), opening))
     return Manipulation(base, tuple(segments), joint_values={joint.name: max(0.0, float(values[-1]))})

@@ -127,8 +127,8 @@ class ArmPlanner:
 
     def line(self, base: np.ndarray, start: np.ndarray, world_from_goal: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (K, J) from `start` (J,) included along a straight line of the tool; None if not free."""
-        here = base_pose(base, self.model.description) @ forward(self.model.chain, start)
-        return self.along(base, start, straight_poses(here, world_from_goal), tally)
+        hand_pose = base_pose(base, self.model.description) @ forward(self.model.chain, start)
+        return self.along(base, start, straight_poses(hand_pose, world_from_goal), tally)
 
     def along(
         self, base: np.ndarray, start: np.ndarray, world_from_tools: list[np.ndarray], tally: Tally

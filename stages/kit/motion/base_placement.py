@@ -16,6 +16,7 @@ from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 BASE_RESOLUTION = np.array([0.03, 0.03, 0.06])
+"""Steps at which a motion of the base is checked [m, m, rad]; by eye."""
 
 
 def sample_bases(
@@ -101,8 +102,10 @@ def plan_drive(
     try:
         return find_path(query, checker, random, samples=samples)
     except MotionFailed as failed:
-        what = failed.failure
-        raise MotionFailed(what.kind, f"driving: {what.message}", what.objects, dict(what.numbers)) from None
+        failure = failed.failure
+        raise MotionFailed(
+            failure.kind, f"driving: {failure.message}", failure.objects, dict(failure.numbers)
+        ) from None
 
 
 def base_query(start: np.ndarray, goal: np.ndarray, arm: np.ndarray, room: tuple[np.ndarray, np.ndarray]) -> Query:

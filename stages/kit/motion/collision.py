@@ -20,6 +20,7 @@ from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK
 from scenewright.stages.kit.simulation.world import Contact, PhysicsWorld
 
 _SCENE, _ROBOT, _CARRIED = 1, 2, 4
+"""Bits of Bullet's collision groups."""
 RESTING_DEPTH = 0.008
 """A carried item may sink this far into what it stands on: reconstructed surfaces are that uncertain."""
 
@@ -114,8 +115,8 @@ class CollisionChecker:
         depths: dict[str, float] = {}
         for contact in self.world.contacts(body.body_id):
             if contact.other_body not in (body.body_id, self.robot.body_id) and contact.depth > -self.clearance:
-                other = self.world.link_name(contact.other_body, contact.other_link)
-                depths[other] = max(contact.depth, depths.get(other, -np.inf))
+                other_link = self.world.link_name(contact.other_body, contact.other_link)
+                depths[other_link] = max(contact.depth, depths.get(other_link, -np.inf))
         for index in body.links.values():
             self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
         return depths
@@ -172,29 +173,29 @@ class CollisionChecker:
         return worst
 
     def _of_robot(self, contact: Contact) -> Collision | None:
-        own = self.robot.link_names.get(contact.own_link, "anchor")
+        own_link = self.robot.link_names.get(contact.own_link, "anchor")
         if contact.other_body == self.robot.body_id:
             if contact.depth <= 0:
                 return None
-            return Collision(own, self.robot.link_names.get(contact.other_link, "anchor"), contact.depth)
+            return Collision(own_link, self.robot.link_names.get(contact.other_link, "anchor"), contact.depth)
         if contact.depth <= -self.clearance:
             return None
-        other = self.world.link_name(contact.other_body, contact.other_link)
+        other_link = self.world.link_name(contact.other_body, contact.other_link)
         if contact.own_link in self._touching:
             carried = self.carried is not None and contact.other_body == self.world.bodies[self.carried].body_id
-            if carried or other in self._touchable:
+            if carried or other_link in self._touchable:
                 return None
-        return Collision(own, other, contact.depth)
+        return Collision(own_link, other_link, contact.depth)
 
     def _of_carried(self, contact: Contact) -> Collision | None:
         if contact.other_body == self.robot.body_id:
             return None  # seen from the robot's side
         if contact.depth <= -self.clearance:
             return None
-        other = self.world.link_name(contact.other_body, contact.other_link)
-        if contact.depth < self._rest_on.get(other, -np.inf):
+        other_link = self.world.link_name(contact.other_body, contact.other_link)
+        if contact.depth < self._rest_on.get(other_link, -np.inf):
             return None
-        return Collision(self.carried or "", other, contact.depth)
+        return Collision(self.carried or "", other_link, contact.depth)
 
 
 def tool_from_body(world_from_tool: np.ndarray, world_from_body: np.ndarray) -> np.ndarray:

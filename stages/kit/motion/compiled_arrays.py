@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 CHECK, SKIP, RESTING = 0, 1, 2
-"""Of a pair of a robot part and a scene link: looked at, may touch, may sink in a little (the mesh checker decides)."""
+"""Kinds of a pair of a robot part and a scene link: looked at, may touch, may sink in a little (the mesh checker
+decides)."""
 
 
 RADIUS = 3

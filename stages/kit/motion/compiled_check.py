@@ -23,6 +23,7 @@ from scenewright.stages.kit.motion.compiled_arrays import (
 from scenewright.stages.kit.motion.convex_distance import Hull, convex_distance
 
 FREE, UNCERTAIN, HIT = 0, 1, 2
+"""Answers of a check: no collision, not certain, a collision."""
 UNSURE = 0.004
 """Refusals nearer than this [m] to being free are not certain."""
 
@@ -82,18 +83,20 @@ def _hull(robot: RobotArrays, frames: np.ndarray, piece: int) -> Hull:
 
 @njit(cache=True, error_model="numpy")
 def _piece_meets(
-    robot: RobotArrays, scene: SceneArrays, frames: np.ndarray, piece: int, other: int, centers: np.ndarray
+    robot: RobotArrays, scene: SceneArrays, frames: np.ndarray, piece: int, obstacle: int, centers: np.ndarray
 ) -> int:
     """Return FREE, UNCERTAIN or HIT for a piece of the robot and one of the scene."""
-    near = False
+    balls_near = False
     for ball in range(robot.sphere_begin[piece], robot.sphere_begin[piece + 1]):
         reach = robot.spheres[ball, RADIUS] + scene.distance
-        if _square_to_box(centers[ball], scene.box[other], scene.half[other]) < reach * reach:
-            near = True
+        if _square_to_box(centers[ball], scene.box[obstacle], scene.half[obstacle]) < reach * reach:
+            balls_near = True
             break
-    if not near:
+    if not balls_near:
         return FREE
-    standing = Hull(scene.vertices, scene.vertex_begin[other], scene.vertex_begin[other + 1], scene.pose[other])
+    standing = Hull(
+        scene.vertices, scene.vertex_begin[obstacle], scene.vertex_begin[obstacle + 1], scene.pose[obstacle]
+    )
     lower, upper = convex_distance(_hull(robot, frames, piece), standing, scene.distance, scene.distance - UNSURE)
     if lower > scene.distance:
         return FREE
@@ -105,17 +108,17 @@ def _pieces_meet(robot: RobotArrays, frames: np.ndarray, pair: int, centers: np.
     """Return FREE, UNCERTAIN or HIT for two pieces of the robot."""
     first, second = robot.pairs[pair, 0], robot.pairs[pair, 1]
     apart = robot.pair_distance[pair]
-    near = False
+    balls_near = False
     for i in range(robot.sphere_begin[first], robot.sphere_begin[first + 1]):
         for j in range(robot.sphere_begin[second], robot.sphere_begin[second + 1]):
             reach = robot.spheres[i, RADIUS] + robot.spheres[j, RADIUS] + apart
             x = centers[i, 0] - centers[j, 0]
             y = centers[i, 1] - centers[j, 1]
             z = centers[i, 2] - centers[j, 2]
-            near = near or x * x + y * y + z * z < reach * reach
-        if near:
+            balls_near = balls_near or x * x + y * y + z * z < reach * reach
+        if balls_near:
             break
-    if not near:
+    if not balls_near:
         return FREE
     lower, upper = convex_distance(_hull(robot, frames, first), _hull(robot, frames, second), apart, apart - UNSURE)
     if lower > apart:
@@ -170,10 +173,10 @@ def find_collision(robot: RobotArrays, scene: SceneArrays, body: np.ndarray, fir
                     break
             if apart:
                 continue
-            for other in range(scene.piece_begin[group], scene.piece_begin[group + 1]):
-                if _square_to_box(middle, scene.box[other], scene.half[other]) > reach * reach:
+            for obstacle in range(scene.piece_begin[group], scene.piece_begin[group + 1]):
+                if _square_to_box(middle, scene.box[obstacle], scene.half[obstacle]) > reach * reach:
                     continue
-                state = _piece_meets(robot, scene, frames, piece, other, centers)
+                state = _piece_meets(robot, scene, frames, piece, obstacle, centers)
                 if state == HIT and allowed != RESTING:
                     return HIT, part, group
                 if state != FREE:

@@ -15,10 +15,11 @@ from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK, m
 from scenewright.stages.kit.simulation.world import LoadedBody, PhysicsWorld
 
 HULL_MARGIN = 0.001
-"""By which Bullet widens every convex hull [m]."""
+"""Distance by which Bullet widens every convex hull [m]."""
 SAFETY = 0.0005
-"""By which we keep farther away than the mesh checker asks, for its numerical error [m]."""
+"""Distance that is kept beyond what the mesh checker asks, for its numerical error [m]."""
 APART = 2 * HULL_MARGIN + SAFETY
+"""Distance beyond the clearance within which hulls are looked at: both margins and the safety [m]."""
 CARRIED = "carried"
 
 
@@ -32,7 +33,7 @@ class CompiledModel:
         self._pieces = link_pieces(mobile_robot_urdf(description))
         joints = len(self._chain.fixed)
         # Pedestal and arm base stand on frame 0, hand and fingers on the last.
-        frame_of = {name: max(0, place - 1) for place, name in enumerate(robot.chain)}
+        frame_of = {name: max(0, index - 1) for index, name in enumerate(robot.chain)}
         links = [name for name in robot.links if self._pieces.get(name)]
         self._frame_of = {name: frame_of.get(name, joints) for name in links}
         self.parts = [*links, CARRIED]
@@ -41,7 +42,7 @@ class CompiledModel:
         self._group_body: list[str] = []
         self._group_range: dict[str, range] = {}
         self._bodies: list[LoadedBody] | None = None
-        self._seen: tuple[int, str | None] = (-1, None)
+        self._revision_and_carried: tuple[int, str | None] = (-1, None)
         self._seen_body: dict[str, int] = {}
         self._rules: tuple[object, ...] | None = None
         self._robot_state: tuple[object, ...] | None = None
@@ -70,14 +71,14 @@ class CompiledModel:
             self._bodies = bodies
             self._build_scene()
             rebuilt = True
-        elif (self.world.revision, carried) != self._seen:
+        elif (self.world.revision, carried) != self._revision_and_carried:
             for name, body_range in self._group_range.items():
                 changed = max(self.world.revisions.get(name, 0), self.world.stepped)
                 # What is carried is looked at again once it is put down.
                 if changed > self._seen_body[name] and name != carried:
                     self._place(name, body_range)
                     self._seen_body[name] = changed
-        self._seen = (self.world.revision, carried)
+        self._revision_and_carried = (self.world.revision, carried)
         rules = (carried, touchable, tuple(rest_on))
         if rebuilt or rules != self._rules:
             self._allow(carried, touchable, rest_on)
@@ -201,13 +202,13 @@ class CompiledModel:
             pair_distance=apart,
         )
 
-    def _pairs(self, parts: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    def _pairs(self, part_indices: list[int]) -> tuple[np.ndarray, np.ndarray]:
         """Return the pairs of pieces that must not meet (K, 2), and their distances: the mesh checker's rules."""
         hand = {self.robot.hand, *self.robot.fingers}
         pairs, apart = [], []
-        for i in range(len(parts)):
-            for j in range(i + 1, len(parts)):
-                first, second = self.parts[parts[i]], self.parts[parts[j]]
+        for i in range(len(part_indices)):
+            for j in range(i + 1, len(part_indices)):
+                first, second = self.parts[part_indices[i]], self.parts[part_indices[j]]
                 if first == second:
                     continue
                 if second == CARRIED:

@@ -16,9 +16,9 @@ from scenewright.stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_c
 UNCERTAIN_COUNT = 0
 """Place in the counts of refusals that the mesh checker might not share; the others follow."""
 LEAST_GAIN, LEAST_PARTIAL_GAIN = 0.5, 4.0
-"""Of a shortcut, straight and partial, in resolutions: those that save less are not looked at."""
+"""Smallest gains of a shortcut, straight and partial, in resolutions: those that save less are not looked at."""
 WHOLE_WAY = 1_000_000
-"""As `most` of `last_free`: more steps than any way has."""
+"""Most steps of any way, and so the `most` of `last_free` that stops nowhere."""
 
 
 class Moving(NamedTuple):
@@ -66,9 +66,9 @@ def last_free(motion: Moving, begin: np.ndarray, end: np.ndarray, most: int) -> 
         share = number / steps
         for k in range(begin.shape[0]):
             body[moving[k]] = begin[k] + (end[k] - begin[k]) * share
-        state, _, other = find_collision(robot, scene, body, first_frame)
+        state, _, obstacle = find_collision(robot, scene, body, first_frame)
         if state != FREE:
-            count_refusal(counts, state, other, scene.allowed.shape[0])
+            count_refusal(counts, state, obstacle, scene.allowed.shape[0])
             return number - 1, steps
     return min(steps, most), steps
 
@@ -87,16 +87,16 @@ def way_is_free(motion: Moving, begin: np.ndarray, end: np.ndarray) -> bool:
             share = number / steps
             for k in range(begin.shape[0]):
                 body[moving[k]] = begin[k] + (end[k] - begin[k]) * share
-            state, _, other = find_collision(robot, scene, body, first_frame)
+            state, _, obstacle = find_collision(robot, scene, body, first_frame)
             if state != FREE:
-                count_refusal(counts, state, other, scene.allowed.shape[0])
+                count_refusal(counts, state, obstacle, scene.allowed.shape[0])
                 return False
         stride //= 2
     for k in range(begin.shape[0]):
         body[moving[k]] = end[k]
-    state, _, other = find_collision(robot, scene, body, first_frame)
+    state, _, obstacle = find_collision(robot, scene, body, first_frame)
     if state != FREE:
-        count_refusal(counts, state, other, scene.allowed.shape[0])
+        count_refusal(counts, state, obstacle, scene.allowed.shape[0])
     return bool(state == FREE)
 
 
@@ -159,19 +159,19 @@ def search(
     for used in range(1, samples + 1):
         for k in range(dimension):
             sample[k] = lower[k] + (upper[k] - lower[k]) * random.random()
-        near = _nearest(points_a, count_a, sample, resolution)
-        free, steps = last_free(motion, points_a[near], sample, step)
+        nearest = _nearest(points_a, count_a, sample, resolution)
+        free, steps = last_free(motion, points_a[nearest], sample, step)
         if free > 0:
             if count_a + 1 >= points_a.shape[0]:
                 points_a, parents_a = _grown(points_a, parents_a)
-            points_a[count_a] = points_a[near] + (sample - points_a[near]) * (free / steps)
-            parents_a[count_a] = near
+            points_a[count_a] = points_a[nearest] + (sample - points_a[nearest]) * (free / steps)
+            parents_a[count_a] = nearest
             count_a += 1
             target = points_a[count_a - 1].copy()
-            near = _nearest(points_b, count_b, target, resolution)
-            origin = points_b[near].copy()
+            nearest = _nearest(points_b, count_b, target, resolution)
+            origin = points_b[nearest].copy()
             free, steps = last_free(motion, origin, target, WHOLE_WAY)
-            parent = near
+            parent = nearest
             done = 0
             while done < free:
                 done = min(done + step, free)
@@ -184,8 +184,8 @@ def search(
             if free == steps:
                 points_b[parent] = target
                 if forward:
-                    return _joined(points_a, parents_a, count_a - 1, points_b, parents_b, parent), used
-                return _joined(points_b, parents_b, parent, points_a, parents_a, count_a - 1), used
+                    return _join_trees(points_a, parents_a, count_a - 1, points_b, parents_b, parent), used
+                return _join_trees(points_b, parents_b, parent, points_a, parents_a, count_a - 1), used
         if count_a < count_b:
             continue
         points_a, points_b = points_b, points_a
@@ -196,7 +196,7 @@ def search(
 
 
 @njit(cache=True, error_model="numpy")
-def _joined(
+def _join_trees(
     points_a: np.ndarray, parents_a: np.ndarray, node_a: int, points_b: np.ndarray, parents_b: np.ndarray, node_b: int
 ) -> np.ndarray:
     """Return the path from the root of tree a to node_a, which is node_b, and on to a root of tree b."""
@@ -278,20 +278,20 @@ def shorten(
         j = min(np.searchsorted(ends[:count], high, side="right") - 1, count - 2)
         if i == j:
             continue
-        old = np.empty((j - i + 2, dimension))
+        span = np.empty((j - i + 2, dimension))
         along = (low - ends[i]) / max(ends[i + 1] - ends[i], 1e-12)
-        old[0] = rows[i] + (rows[i + 1] - rows[i]) * along
-        old[1:-1] = rows[i + 1 : j + 1]
+        span[0] = rows[i] + (rows[i + 1] - rows[i]) * along
+        span[1:-1] = rows[i + 1 : j + 1]
         along = (high - ends[j]) / max(ends[j + 1] - ends[j], 1e-12)
-        old[-1] = rows[j] + (rows[j + 1] - rows[j]) * along
+        span[-1] = rows[j] + (rows[j + 1] - rows[j]) * along
         if attempt % 2 == 0:
             piece = np.empty((2, dimension))
-            piece[0], piece[1] = old[0], old[-1]
+            piece[0], piece[1] = span[0], span[-1]
         else:
-            piece = old.copy()
+            piece = span.copy()
             k = int(dimension * random.random())
-            for row in range(1, old.shape[0] - 1):
-                piece[row, k] = old[0, k] + (old[-1, k] - old[0, k]) * (ends[i + row] - low) / (high - low)
+            for row in range(1, span.shape[0] - 1):
+                piece[row, k] = span[0, k] + (span[-1, k] - span[0, k]) * (ends[i + row] - low) / (high - low)
         if _length(piece, resolution) > high - low - (LEAST_GAIN if attempt % 2 == 0 else LEAST_PARTIAL_GAIN):
             continue  # hardly shorter
         if not _path_is_free(motion, piece):
@@ -301,10 +301,10 @@ def shorten(
         fresh[: i + 1] = rows[: i + 1]
         fresh[i + 1 : i + 1 + inner] = piece
         fresh[i + 1 + inner :] = rows[j + 1 : count]
-        seen = np.empty(fresh.shape[0] - 1, dtype=np.bool_)
-        seen[: i + 1] = looked_at[: i + 1]
-        seen[i + 1 : i + inner] = True
-        seen[i + inner :] = looked_at[j:]
-        rows, looked_at = fresh, seen
+        is_checked = np.empty(fresh.shape[0] - 1, dtype=np.bool_)
+        is_checked[: i + 1] = looked_at[: i + 1]
+        is_checked[i + 1 : i + inner] = True
+        is_checked[i + inner :] = looked_at[j:]
+        rows, looked_at = fresh, is_checked
         count = rows.shape[0]
     return rows, looked_at

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 ITERATIONS = 48
+"""Most iterations of a distance; by eye."""
 PRECISION = 1e-5
 """The two bounds of a distance are this near to each other [m] when nothing ends the search earlier."""
 
@@ -188,14 +189,14 @@ def convex_distance(first: Hull, second: Hull, enough: float, too_near: float) -
         elif _nearest_on_tetrahedron(simplex, weights):
             return 0.0, 0.0
         nearest[:] = 0.0
-        kept = 0
+        kept_count = 0
         for corner in range(count):
             if weights[corner] > 0.0:
                 for k in range(3):
                     nearest[k] += weights[corner] * simplex[corner, k]
-                    simplex[kept, k] = simplex[corner, k]
-                kept += 1
-        count = kept
+                    simplex[kept_count, k] = simplex[corner, k]
+                kept_count += 1
+        count = kept_count
         length = np.sqrt(nearest[0] ** 2 + nearest[1] ** 2 + nearest[2] ** 2)
         upper = min(upper, length)
         if count == 4:

@@ -10,6 +10,7 @@ from scenewright.stages.kit.motion.sphere_cover import enclosing_ball, hull_vert
 from scenewright.stages.kit.simulation.shapes import link_shapes
 
 MOST_BALLS = 10
+"""Most balls that cover a piece; by eye."""
 SMALLEST_BALL = 0.045
 """Balls are not made smaller than this radius [m]; the hulls themselves decide what is finer."""
 

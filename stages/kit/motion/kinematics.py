@@ -15,7 +15,9 @@ from scenewright.stages.kit.simulation.urdf_split import read_urdf
 from scipy.spatial.transform import Rotation
 
 POSITION_TOLERANCE = 1e-4
+"""Error of the position at which inverse kinematics ends [m]."""
 ROTATION_TOLERANCE = 1e-3
+"""Error of the rotation at which inverse kinematics ends [rad]."""
 WHOLE_TURN = 2 * np.pi - 1e-6
 """Joints with a range of this [rad] do not end the search at a limit: it goes on from the limit's other side."""
 

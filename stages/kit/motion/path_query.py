@@ -94,11 +94,11 @@ def refusal_counts(checker: CollisionChecker) -> np.ndarray:
 
 def blockers(counts: np.ndarray, checker: CollisionChecker) -> Counter[str]:
     """Return how often each link refused a step, by name."""
-    parts = len(checker.compiled.parts)
+    part_count = len(checker.compiled.parts)
     result: Counter[str] = Counter()
     for index, hits in enumerate(counts[1:].tolist()):
         if hits:
-            result[checker.other_name(index - parts if index >= parts else -1 - index)] += hits
+            result[checker.other_name(index - part_count if index >= part_count else -1 - index)] += hits
     return result
 
 

@@ -30,8 +30,8 @@ from scenewright.stages.kit.motion.rrt_connect import FINER, first_collision, in
 STEP = 16
 """Longest extension of a tree, in resolutions."""
 MESH_SAMPLES, MESH_SMOOTHING = 2000, 60
-"""At most so many samples are drawn, and shortcuts tried, when the mesh checker has taken over: one of its checks costs
-as much as ten compiled ones."""
+"""Most samples that are drawn, and shortcuts tried, when the mesh checker has taken over: one of its checks costs as
+much as ten compiled ones."""
 ESCAPES = 120
 """Directions that are tried to leave a place too narrow for the compiled check."""
 REJECTIONS = 4
@@ -57,12 +57,14 @@ def find_path(
     counts = refusal_counts(checker)
     # `effort` may hold what an earlier search took: the budget is this one's own.
     most_samples, most_rejected = effort.samples + samples, effort.rejected + REJECTIONS
-    ways = [way for goal in goals if (way := leave_narrow(query, goal, checker, random, effort)) is not None]
+    ways_out = [
+        way_out for goal in goals if (way_out := leave_narrow(query, goal, checker, random, effort)) is not None
+    ]
     start = leave_narrow(query, query.start, checker, random, effort)
-    while start is not None and ways and effort.samples < most_samples and effort.rejected < most_rejected:
+    while start is not None and ways_out and effort.samples < most_samples and effort.rejected < most_rejected:
         path = _compiled_path(
             replace(query, start=start[-1]),
-            np.array([way[-1] for way in ways]),
+            np.array([way_out[-1] for way_out in ways_out]),
             checker,
             random,
             most_samples - effort.samples,
@@ -72,7 +74,7 @@ def find_path(
         )
         if path is None:
             break
-        last = next(way for way in ways if np.array_equal(way[-1], path[-1]))
+        last = next(way_out for way_out in ways_out if np.array_equal(way_out[-1], path[-1]))
         path = without_repeats(np.concatenate([start, path[1:], last[::-1][1:]]))
         if confirm(query, path, checker, effort) is None:
             return path

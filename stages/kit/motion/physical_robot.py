@@ -16,7 +16,9 @@ from scenewright.stages.kit.simulation.world import PhysicsWorld
 CONTROL_STEPS = 2
 """Physics steps per control step (120 Hz)."""
 GRIP_SECONDS = 0.7
+"""Time that the fingers get to close [s]; by eye."""
 RELEASE_SECONDS = 0.6
+"""Time that the fingers get to open [s]; by eye."""
 SLIP = 0.06
 """An item that moved this far relative to the hand while it was carried is lost [m]."""
 

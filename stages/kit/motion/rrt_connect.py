@@ -177,19 +177,19 @@ def _search(
     planner = geometric.RRTConnect(information)
     planner.setRange(step)
     setup.setPlanner(planner)
-    asked = 0
+    samples_taken = 0
 
     def spent() -> bool:  # OMPL asks before each sample
-        nonlocal asked
-        asked += 1
-        return asked > samples
+        nonlocal samples_taken
+        samples_taken += 1
+        return samples_taken > samples
 
     setup.solve(base.PlannerTerminationCondition(spent))
     if not setup.haveExactSolutionPath():
         return None, samples
     path = np.array([values(state) for state in setup.getSolutionPath().getStates()])
     path[0], path[-1] = start, goal
-    return without_repeats(path), asked
+    return without_repeats(path), samples_taken
 
 
 def shortcut(

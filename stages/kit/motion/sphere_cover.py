@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 ROUNDS = 200
-"""Of the iteration for the smallest ball; more make it a little smaller, any number makes it a cover."""
+"""Rounds of the iteration for the smallest ball; more make it a little smaller, any number makes it a cover."""
 
 
 def enclosing_ball(points: np.ndarray) -> np.ndarray:

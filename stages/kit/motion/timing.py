@@ -65,9 +65,9 @@ def sample_times(times: np.ndarray, points: np.ndarray, period: float) -> np.nda
     between the values of the two points.
     """
     count = int(np.ceil(times[-1] / period - 1e-9))
-    wanted = np.minimum(np.arange(1, count + 1) * period, times[-1])
+    sampled_at = np.minimum(np.arange(1, count + 1) * period, times[-1])
     if count == 0:
         return points[-1:]
-    rows = PchipInterpolator(times, points, axis=0)(wanted)
+    rows = PchipInterpolator(times, points, axis=0)(sampled_at)
     rows[-1] = points[-1]
     return np.asarray(rows)

@@ -15,6 +15,7 @@ from scenewright.stages.kit.open_words.relevancy import TEMPERATURE, margins, re
 from scenewright.stages.kit.open_words.vectors import Vectors
 
 MOST_ANSWERS = 20
+"""Most answers to a text unless more are asked for."""
 SHARED = 0.3
 """Regions that share more than this of the smaller one's box or Gaussians are one place."""
 
@@ -94,8 +95,8 @@ def fits(
 ) -> Fits:
     """Return how well the text rows[0] fits, against the canonical phrases rows[1:]; `classes` (R, width): vectors of
     the names of the regions' classes, NaN where they have none."""
-    seen = np.array([region.looks > 0 for region in info.regions], bool)
-    of_looks = np.where(seen, relevancy(margins(vectors.regions, rows)), 0.0)
+    was_looked_at = np.array([region.looks > 0 for region in info.regions], bool)
+    of_looks = np.where(was_looked_at, relevancy(margins(vectors.regions, rows)), 0.0)
     field = sizes = at_best = None
     if len(vectors.means):
         apart = margins(vectors.vectors, rows)
@@ -126,29 +127,29 @@ def explained(probabilities: np.ndarray, index: RegionIndex) -> np.ndarray:
 
 def ranked(info: LanguageMapFile, index: RegionIndex, probabilities: np.ndarray, most: int = MOST_ANSWERS) -> list[int]:
     """Return regions, the likeliest first, of which no two are one place."""
-    kept: list[int] = []
+    answers: list[int] = []
     for region in np.argsort(-probabilities, kind="stable"):
-        if len(kept) == most:
+        if len(answers) == most:
             break
-        if not _known_place(info, index, int(region), kept):
-            kept.append(int(region))
-    return kept
+        if not _is_known_place(info, index, int(region), answers):
+            answers.append(int(region))
+    return answers
 
 
-def _known_place(info: LanguageMapFile, index: RegionIndex, region: int, kept: list[int]) -> bool:
+def _is_known_place(info: LanguageMapFile, index: RegionIndex, region: int, answers: list[int]) -> bool:
     """Whether a region shares its box or its Gaussians with one of those kept; entities of a map are things of their
     own."""
-    if not kept or info.source == "panoptic_map":
+    if not answers or info.source == "panoptic_map":
         return False
-    edges = np.minimum(index.highs[region], index.highs[kept]) - np.maximum(index.lows[region], index.lows[kept])
+    edges = np.minimum(index.highs[region], index.highs[answers]) - np.maximum(index.lows[region], index.lows[answers])
     shared = np.prod(np.maximum(edges, 0), axis=1)
-    volumes = np.prod(np.maximum(index.highs - index.lows, 1e-3)[[region, *kept]], axis=1)
+    volumes = np.prod(np.maximum(index.highs - index.lows, 1e-3)[[region, *answers]], axis=1)
     if (shared > SHARED * np.minimum(volumes[0], volumes[1:])).any():
         return True
-    own = index.members(region)
-    for other in (kept[k] for k in np.flatnonzero((edges > 0).all(axis=1))):
-        theirs = index.members(other)
-        common = len(np.intersect1d(own, theirs, assume_unique=True))
-        if common > SHARED * min(len(own), len(theirs)):
+    own_members = index.members(region)
+    for answer in (answers[k] for k in np.flatnonzero((edges > 0).all(axis=1))):
+        theirs = index.members(answer)
+        common = len(np.intersect1d(own_members, theirs, assume_unique=True))
+        if common > SHARED * min(len(own_members), len(theirs)):
             return True
     return False

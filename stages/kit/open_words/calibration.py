@@ -16,13 +16,14 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.open_words.encoder import Encoder
 
 FILE = "words/calibration.toml"
-"""Below data/."""
+"""File below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
 NAMED_SPLAT = "named splat"
 """Source of fits for splats whose pieces have classes of a panoptic map."""
 CLOSEST = 1e-4
+"""Closest to 0 and 1 that a share may come, so that its log odds are finite."""
 SHORTEST = 0.01
-"""Edge of a region, at least [m]."""
+"""Shortest edge that a region counts with [m]."""
 
 
 @dataclass(frozen=True)
@@ -65,25 +66,25 @@ def recognised(regions: np.ndarray, extents: np.ndarray, encoder: Encoder) -> fl
     Pictures of another kind than the encoder learned from are near no name, however well they fit one rather than
     another.
     """
-    seen = (regions != 0).any(axis=1)
+    has_vector = (regions != 0).any(axis=1)
     names = [entry.name.replace("_", " ") for entry in load_vocabulary().classes]
-    known = [name for name in names if not encoder.unread(name)]
-    if not seen.any() or not known:
+    read_names = [name for name in names if not encoder.unread(name)]
+    if not has_vector.any() or not read_names:
         return 0.0
-    nearest = (regions[seen].astype(np.float32) @ encoder.texts(known).T).max(axis=1)
-    return float(np.average(nearest, weights=np.maximum(extents[seen], SHORTEST)))
+    nearest = (regions[has_vector].astype(np.float32) @ encoder.texts(read_names).T).max(axis=1)
+    return float(np.average(nearest, weights=np.maximum(extents[has_vector], SHORTEST)))
 
 
 UNFITTED = Calibration(0.0, 1.0, 0.0, 0.0, 0.0, fitted=False)
-"""Of an encoder that nothing was fitted for: the relevancy of the looks."""
+"""Calibration of an encoder that nothing was fitted for: the relevancy of the looks."""
 WEIGHTS = ("bias", "looks", "field", "extent", "extent_squared", "class_bias", "class_name")
 OF_PLACES = ("least_recognised", "strange")
 
 
 def log_odds(shares: np.ndarray) -> np.ndarray:
     """Return log(p / (1 - p)) of shares kept off 0 and 1."""
-    kept = np.clip(shares, CLOSEST, 1 - CLOSEST)
-    return np.log(kept / (1 - kept))
+    clipped = np.clip(shares, CLOSEST, 1 - CLOSEST)
+    return np.log(clipped / (1 - clipped))
 
 
 def fitted(weights: Sequence[float], least_recognised: float = -1.0, strange: float = 1.0) -> Calibration:

@@ -16,9 +16,10 @@ from scenewright.stages.kit.open_words.two_towers import SIDE, WIDTH, TwoTowers,
 FORMAT = "scenewright two towers"
 VERSION = "2"
 FILE = "words/two_towers.safetensors"
-"""Below data/."""
+"""File below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
 BATCH = 512
+"""Crops that pass the network at a time, which bounds the memory."""
 SMALL_WORDS = frozenset(("a", "an", "the", "of"))
 _OTHER = "give a file that `make words-train` wrote"
 
@@ -54,12 +55,12 @@ class EmbeddedEncoder:
 
     def pictures(self, crops: np.ndarray) -> np.ndarray:
         """Return (N, width) float32 unit vectors of crops (N, side, side, 3) uint8 RGB."""
-        found = [np.zeros((0, self.width), np.float32)]
+        batches = [np.zeros((0, self.width), np.float32)]
         with torch.inference_mode():
             for start in range(0, len(crops), BATCH):
                 part = torch.from_numpy(crops[start : start + BATCH]).permute(0, 3, 1, 2).float() / 255.0
-                found.append(self._network.picture(part).numpy())
-        return np.concatenate(found)
+                batches.append(self._network.picture(part).numpy())
+        return np.concatenate(batches)
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
         """Return (M, width) float32 unit vectors of texts. Raises UsageError for one in other letters than it reads:

@@ -9,7 +9,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 
 LONGEST_TEXT = 200
-"""Characters of a query."""
+"""Longest query [characters]."""
 
 
 class Encoder(Protocol):

@@ -65,22 +65,25 @@ class Finder:
 
     def fits(self, text: str) -> Fits:
         """Return how well a text fits every region."""
-        found = fits(
+        fits_of_text = fits(
             self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration, self.classes
         )
         believed = self.calibration.strange if self.is_strange else 1.0
-        return replace(found, probabilities=believed * found.probabilities)
+        return replace(fits_of_text, probabilities=believed * fits_of_text.probabilities)
 
     def find(self, text: str) -> list[Found]:
         """Return places, the likeliest first, of which no two are one."""
-        found = self.fits(text)
-        return [self._found(found, region) for region in ranked(self.info, self.index, found.probabilities)]
+        fits_of_text = self.fits(text)
+        return [
+            self._result_of(fits_of_text, region)
+            for region in ranked(self.info, self.index, fits_of_text.probabilities)
+        ]
 
     def find_related(self, relation: tuple[str, str, str], graph: ContactGraphFile) -> list[Found]:
         """Return places of the first thing of a relation; the probability of both is the product, and of several others
         the likeliest counts."""
-        what, word, of_what = relation
-        first, second = self.fits(what), self.fits(of_what)
+        first_words, word, of_what = relation
+        first, second = self.fits(first_words), self.fits(of_what)
         number = {region.instance: k for k, region in enumerate(self.info.regions)}
         best: dict[int, tuple[float, int]] = {}
         for a, b in sorted(related(graph, word)):
@@ -89,7 +92,7 @@ class Finder:
                 if chance > best.get(number[a], (0.0, 0))[0]:
                     best[number[a]] = (chance, b)
         order = sorted(best, key=lambda region: (-best[region][0], region))[:MOST_ANSWERS]
-        return [replace(self._found(first, k), probability=best[k][0], other=best[k][1]) for k in order]
+        return [replace(self._result_of(first, k), probability=best[k][0], other=best[k][1]) for k in order]
 
     def place(self, region: int) -> np.ndarray:
         """Return (3,) where an answer points [m]: of the Gaussians of a piece the one nearest their median, as the
@@ -99,9 +102,9 @@ class Finder:
             return np.array(self.info.regions[region].box.center)
         return points[int(np.linalg.norm(points - np.median(points, axis=0), axis=1).argmin())]
 
-    def _found(self, found: Fits, region: int) -> Found:
+    def _result_of(self, fits_of_text: Fits, region: int) -> Found:
         field, size = None, None
-        if found.field is not None and found.sizes is not None:
-            field = float(np.clip(found.field[region], 0, 1))
-            size = self.info.sizes[int(np.clip(found.sizes[region], 0, len(self.info.sizes) - 1))]
-        return Found(region, float(found.probabilities[region]), float(found.looks[region]), field, size)
+        if fits_of_text.field is not None and fits_of_text.sizes is not None:
+            field = float(np.clip(fits_of_text.field[region], 0, 1))
+            size = self.info.sizes[int(np.clip(fits_of_text.sizes[region], 0, len(self.info.sizes) - 1))]
+        return Found(region, float(fits_of_text.probabilities[region]), float(fits_of_text.looks[region]), field, size)

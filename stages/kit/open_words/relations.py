@@ -20,12 +20,12 @@ _PATTERN = re.compile(
 
 def split_relation(text: str) -> tuple[str, str, str] | None:
     """Return (what, relation, of what) of a text that says one, else None."""
-    found = _PATTERN.match(text)
-    if found is None:
+    match = _PATTERN.match(text)
+    if match is None:
         return None
-    word = found["word"].lower()
+    word = match["word"].lower()
     relation = next(name for name, words in RELATIONS.items() if re.fullmatch(words, word))
-    return found["first"], relation, found["second"]
+    return match["first"], relation, match["second"]
 
 
 def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:
@@ -47,12 +47,12 @@ def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:
             at = link.source
         if relation == "beside" and node in parents:
             siblings = (link.target for link in parents.values() if link.source == parents[node].source)
-            pairs.update((instances[node], instances[other]) for other in siblings if other != node)
+            pairs.update((instances[node], instances[sibling]) for sibling in siblings if sibling != node)
     if relation == "beside":
-        near = [link for link in graph.links if link.relation == "proximal"]
+        proximal = [link for link in graph.links if link.relation == "proximal"]
         pairs.update(
             (instances[a], instances[b])
-            for link in near
+            for link in proximal
             for a, b in ((link.source, link.target), (link.target, link.source))
         )
     if relation == "under":

@@ -8,6 +8,7 @@ from scenewright.stages.kit.open_words.encoder import Encoder
 CANONICAL = ("object", "things", "stuff", "texture")
 """Phrases that fit anything: a text is relevant where it fits better than each of these."""
 TEMPERATURE = 10.0
+"""Factor of the margins in the relevancy (LERF, Kerr et al. 2023)."""
 
 
 def query_rows(encoder: Encoder, text: str) -> np.ndarray:

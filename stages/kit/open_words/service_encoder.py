@@ -17,9 +17,13 @@ from scenewright.stages.kit.open_words.encoder import unit
 from scenewright.stages.kit.services.connection import Connection
 
 BATCH = 64
+"""Crops of one request, which bounds its size."""
 TIMEOUT, RETRIES, WAIT = 120.0, 3, 1.0
+"""Longest wait for an answer [s], most repeats, and the pause before the first [s]."""
 LARGEST_SIDE = 1024
+"""Largest side of a crop that a service may ask for [px]; a bound."""
 LARGEST_WIDTH = 65536
+"""Most numbers of a vector that a service may send; a bound."""
 _HINT = "is this an encoder of pictures and words? see docs/SPLATS.md"
 
 
@@ -37,21 +41,21 @@ class ServiceEncoder:
 
     def pictures(self, crops: np.ndarray) -> np.ndarray:
         """Return (N, width) float32 unit vectors of crops (N, side, side, 3) uint8 RGB."""
-        found = [np.zeros((0, self.width), np.float32)]
+        batches = [np.zeros((0, self.width), np.float32)]
         for start in range(0, len(crops), BATCH):
             part = [base64.b64encode(_png(crop)).decode() for crop in crops[start : start + BATCH]]
-            found.append(self._asked({"pictures": part}, len(part)))
-        return np.concatenate(found)
+            batches.append(self._request_vectors({"pictures": part}, len(part)))
+        return np.concatenate(batches)
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
         """Return (M, width) float32 unit vectors of texts."""
-        return self._asked({"texts": list(texts)}, len(texts))
+        return self._request_vectors({"texts": list(texts)}, len(texts))
 
     def unread(self, text: str) -> tuple[str, ...]:
         """Return nothing: what a service has read is not known."""
         return ()
 
-    def _asked(self, body: dict[str, Any], count: int) -> np.ndarray:
+    def _request_vectors(self, body: dict[str, Any], count: int) -> np.ndarray:
         answer = self._connection.post("/encode", json.dumps(body).encode(), "application/json")
         try:
             rows = np.array(self._document(answer.body).get("vectors"), np.float32)
@@ -65,10 +69,10 @@ class ServiceEncoder:
         return unit(rows)
 
     def _document(self, data: bytes) -> dict[str, Any]:
-        found = json_of(data, self._connection.address, hint=_HINT)
-        if not isinstance(found, dict):
+        document = json_of(data, self._connection.address, hint=_HINT)
+        if not isinstance(document, dict):
             raise BadInput(f"{self._connection.address}: no JSON object", hint=_HINT)
-        return found
+        return document
 
 
 def _png(picture: np.ndarray) -> bytes:

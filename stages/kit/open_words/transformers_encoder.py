@@ -27,6 +27,7 @@ FAMILIES = {
 SIDE = 224
 """Crops are handed over so large where the model says nothing else [px]."""
 BATCH = 32
+"""Crops that pass the network at a time, which bounds the memory."""
 PADDED = {"siglip": 64}
 """SigLIP was trained on texts of 64 tokens, padding included."""
 
@@ -51,11 +52,11 @@ class TransformersEncoder:
 
     def pictures(self, crops: np.ndarray) -> np.ndarray:
         """Return (N, width) float32 unit vectors of crops (N, side, side, 3) uint8 RGB."""
-        found = [np.zeros((0, self.width), np.float32)]
+        batches = [np.zeros((0, self.width), np.float32)]
         for start in range(0, len(crops), BATCH):
             inputs = self._processor(images=list(crops[start : start + BATCH]), return_tensors="pt")
-            found.append(self._vectors(self._model.get_image_features, inputs))
-        return np.concatenate(found)
+            batches.append(self._vectors(self._model.get_image_features, inputs))
+        return np.concatenate(batches)
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
         """Return (M, width) float32 unit vectors of texts."""
@@ -70,6 +71,6 @@ class TransformersEncoder:
 
     def _vectors(self, function: Any, inputs: Any) -> np.ndarray:
         with self._torch.inference_mode():
-            found = function(**{name: value.to(self._device) for name, value in inputs.items()})
-        pooled = getattr(found, "pooler_output", found)  # newer versions wrap the vectors
+            output = function(**{name: value.to(self._device) for name, value in inputs.items()})
+        pooled = getattr(output, "pooler_output", output)  # newer versions wrap the vectors
         return unit(pooled.float().cpu().numpy())

@@ -15,12 +15,17 @@ import torch
 from torch import nn
 
 WIDTH = 64
+"""Numbers of a vector of either tower."""
 SIDE = 48
 """Crops are looked at in this size [px]."""
 MOST_WORDS = 8
+"""Words of a text that are read."""
 MOST_PARTS = 24
+"""Parts of a word that are read: itself and its runs of letters."""
 BUCKETS = 4096
+"""Buckets into which parts of words are hashed."""
 PART_LENGTHS = (3, 4, 5)
+"""Lengths of the runs of letters of a word; by eye."""
 _WORD = re.compile(r"[a-z0-9]+")
 
 
@@ -40,9 +45,9 @@ def tokens(texts: Sequence[str]) -> torch.Tensor:
     """Return (M, MOST_WORDS, MOST_PARTS) int64: buckets of the first words of each text, 0 where there is nothing."""
     table = torch.zeros((len(texts), MOST_WORDS, MOST_PARTS), dtype=torch.int64)
     for row, text in enumerate(texts):
-        for place, word in enumerate(words_of(text)[:MOST_WORDS]):
-            parts = parts_of(word)
-            table[row, place, : len(parts)] = torch.tensor(parts)
+        for position, word in enumerate(words_of(text)[:MOST_WORDS]):
+            pieces_of_word = parts_of(word)
+            table[row, position, : len(pieces_of_word)] = torch.tensor(pieces_of_word)
     return table
 
 
@@ -82,8 +87,8 @@ class PictureTower(nn.Module):
 
     def forward(self, crops: torch.Tensor) -> torch.Tensor:
         """Return unit vectors."""
-        found = self.head(self.body(4.0 * (crops - 0.5)).flatten(1))
-        return nn.functional.normalize(found, dim=1)
+        features = self.head(self.body(4.0 * (crops - 0.5)).flatten(1))
+        return nn.functional.normalize(features, dim=1)
 
 
 class WordTower(nn.Module):
@@ -107,8 +112,8 @@ class WordTower(nn.Module):
         x = 4.0 * x + self.places
         for layer in self.layers:
             x = layer(x, src_key_padding_mask=missing)
-        kept = (~missing).unsqueeze(2).to(x.dtype)
-        return nn.functional.normalize(self.out((x * kept).sum(1) / kept.sum(1)), dim=1)
+        has_word = (~missing).unsqueeze(2).to(x.dtype)
+        return nn.functional.normalize(self.out((x * has_word).sum(1) / has_word.sum(1)), dim=1)
 
 
 class TwoTowers(nn.Module):

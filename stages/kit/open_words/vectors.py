@@ -52,28 +52,28 @@ def write_vectors(folder: Path, vectors: Vectors) -> None:
 def read_vectors(language: LanguageMap) -> Vectors:
     """Read them. Raises BadInput for arrays that do not fit each other or language.json."""
     info, path = language.info, language.path(FILE)
-    found = dict(zip(NAMES, read_arrays(path, *NAMES), strict=True))
+    array_of = dict(zip(NAMES, read_arrays(path, *NAMES), strict=True))
     count, sizes, regions = info.gaussians, len(info.sizes), len(info.regions)
     shapes = {
         "means": (count, 3),
         "opacities": (count,),
-        "pieces": (len(found["pieces"]), count),
+        "pieces": (len(array_of["pieces"]), count),
         "regions": (regions, info.width),
         "vectors": (count, sizes, info.width),
     }
     for name, shape in shapes.items():
-        array = found[name]
+        array = array_of[name]
         if array.shape != shape or array.dtype.kind not in "fi" or not np.isfinite(array).all():
             raise BadInput(
                 f"{path}: {name} has shape {array.shape}, expected {shape} finite numbers", hint="make it again"
             )
-    pieces = found["pieces"]
+    pieces = array_of["pieces"]
     if pieces.size and (pieces.min() < -1 or pieces.max() >= regions):
         raise BadInput(f"{path}: a Gaussian belongs to a region that is not there", hint="make it again")
     return Vectors(
-        found["regions"].astype(np.float32),
-        found["means"].astype(np.float32),
-        found["opacities"].astype(np.float32),
+        array_of["regions"].astype(np.float32),
+        array_of["means"].astype(np.float32),
+        array_of["opacities"].astype(np.float32),
         pieces.astype(np.int32),
-        found["vectors"].astype(np.float32),
+        array_of["vectors"].astype(np.float32),
     )

@@ -19,7 +19,7 @@ class Evaluator:
 
     def __init__(self, state: Perceived, predicates: Mapping[str, Predicate]) -> None:
         self.state, self.predicates = state, predicates
-        self._known: dict[Atom, bool] = {}
+        self._truth_by_atom: dict[Atom, bool] = {}
         self._steps = 0
 
     def holds(self, atom: Atom) -> bool:
@@ -34,20 +34,24 @@ class Evaluator:
 
     def atoms(self, names: Mapping[str, int] | None = None) -> frozenset[Atom]:
         """Return all atoms of predicates (name -> arguments; all, where none are given) that hold."""
-        wanted = names if names is not None else {name: each.arguments for name, each in self.predicates.items()}
-        found = [
+        argument_counts = (
+            names if names is not None else {name: each.arguments for name, each in self.predicates.items()}
+        )
+        holding = [
             (name, *objects)
-            for name, count in wanted.items()
+            for name, count in argument_counts.items()
             for objects in permutations(self.state.names, count)
             if self.holds((name, *objects))
         ]
-        return frozenset(found)
+        return frozenset(holding)
 
     def _atom(self, atom: Atom) -> bool:
-        if atom not in self._known:
+        if atom not in self._truth_by_atom:
             predicate = self.predicates[atom[0]]
-            self._known[atom] = self._truth(predicate.means, dict(zip(predicate.variables, atom[1:], strict=True)))
-        return self._known[atom]
+            self._truth_by_atom[atom] = self._truth(
+                predicate.means, dict(zip(predicate.variables, atom[1:], strict=True))
+            )
+        return self._truth_by_atom[atom]
 
     def _truth(self, tree: Tree, binding: dict[str, str]) -> bool:
         self._steps += 1
@@ -70,10 +74,10 @@ class Evaluator:
         if head == "is":
             return self._word(tree[1], binding) == self._word(tree[2], binding)
         if head in ("less", "at_most", "near"):
-            one, two = self._number(tree[1], binding), self._number(tree[2], binding)
+            first, two = self._number(tree[1], binding), self._number(tree[2], binding)
             if head == "less":
-                return one < two
-            return one <= two if head == "at_most" else abs(one - two) < self.state.tolerance
+                return first < two
+            return first <= two if head == "at_most" else abs(first - two) < self.state.tolerance
         names = tuple(binding[str(part)] for part in tree[1:])
         return self._atom((str(head), *names)) if head in self.predicates else self.state.related(str(head), names)
 
@@ -95,13 +99,13 @@ class Evaluator:
         numbers = [self._number(part, binding) for part in tree[1:]]
         if head == "abs":
             return abs(numbers[0])
-        one, two = numbers
+        first, two = numbers
         if head == "plus":
-            return one + two
+            return first + two
         if head == "minus":
-            return one - two
+            return first - two
         if head == "times":
-            return one * two
+            return first * two
         if two == 0.0:
             raise BadInput("a predicate divides by zero", hint="docs/INTERPRET.md has the language of predicates")
-        return one / two
+        return first / two

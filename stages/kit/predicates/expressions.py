@@ -19,14 +19,16 @@ from scenewright.stages.kit.tasks.pddl_expressions import parse_expression
 
 Tree = tuple["Tree | str | float", ...]
 ARITHMETIC = {"plus": 2, "minus": 2, "times": 2, "over": 2, "abs": 1}
+"""Arithmetic by its word, and how many numbers each takes."""
 COMPARISONS = ("less", "at_most", "near")
 CONNECTIVES = ("and", "or")
 QUANTIFIERS = ("some", "every")
 WORDS = {*ARITHMETIC, *COMPARISONS, *CONNECTIVES, *QUANTIFIERS, "not", "is", "category"}
-"""Of every vocabulary."""
+"""Words that every vocabulary has."""
 DEEPEST = 24
+"""Deepest nesting of an expression; a bound against damaged files."""
 LARGEST = 400
-"""Words of one expression."""
+"""Most words of one expression."""
 HINT = "docs/INTERPRET.md has the language of predicates"
 
 
@@ -46,7 +48,7 @@ class Predicate:
 
 def variables_of(arguments: int) -> tuple[str, ...]:
     """Return the names of so many arguments."""
-    return tuple(f"?{chr(97 + place)}" for place in range(arguments))
+    return tuple(f"?{chr(97 + number)}" for number in range(arguments))
 
 
 def text_of(tree: Tree | str | float) -> str:
@@ -73,10 +75,10 @@ def refuse(where: str, message: str) -> BadInput:
 def _tree(listed: list[Listed], where: str, depth: int) -> Tree:
     if depth > DEEPEST:
         raise refuse(where, f"nested deeper than {DEEPEST}")
-    parts: list[Tree | str | float] = []
+    branches: list[Tree | str | float] = []
     for part in listed:
         if not isinstance(part, str):
-            parts.append(_tree(part, where, depth + 1))
+            branches.append(_tree(part, where, depth + 1))
         elif part[0].isdigit():
             try:
                 number = float(part)
@@ -84,10 +86,10 @@ def _tree(listed: list[Listed], where: str, depth: int) -> Tree:
                 raise refuse(where, f"{part[:30]!r} is no number") from None
             if not math.isfinite(number) or abs(number) > 1e9:
                 raise refuse(where, f"{part[:30]!r} is too large")
-            parts.append(number)
+            branches.append(number)
         else:
-            parts.append(part)
-    return tuple(parts)
+            branches.append(part)
+    return tuple(branches)
 
 
 def check(predicates: Mapping[str, Predicate], vocabulary: Vocabulary) -> None:
@@ -112,12 +114,12 @@ def _check_circles(predicates: Mapping[str, Predicate]) -> None:
     for start in predicates:
         path: list[tuple[str, list[str]]] = [(start, sorted(used_in(predicates[start].means, predicates)))]
         while path:
-            name, left = path[-1]
-            if name in done or not left:
+            name, waiting = path[-1]
+            if name in done or not waiting:
                 done.add(name)
                 path.pop()
                 continue
-            following = left.pop()
+            following = waiting.pop()
             if following in [each for each, _ in path]:
                 circle = " -> ".join([*(each for each, _ in path), following])
                 raise refuse(f"predicate {following}", f"is defined by itself: {circle}")
@@ -126,11 +128,11 @@ def _check_circles(predicates: Mapping[str, Predicate]) -> None:
 
 def used_in(tree: Tree, predicates: Mapping[str, Predicate]) -> set[str]:
     """Return the predicates that an expression names."""
-    found = {str(tree[0])} & set(predicates) if tree else set()
+    names = {str(tree[0])} & set(predicates) if tree else set()
     for part in tree[1:]:
         if isinstance(part, tuple):
-            found |= used_in(part, predicates)
-    return found
+            names |= used_in(part, predicates)
+    return names
 
 
 def size_of(tree: Tree | str | float) -> int:
@@ -168,22 +170,22 @@ def _type_of(tree: Tree | str | float, bound: frozenset[str], words: Words, wher
         return "object"
     if not tree or not isinstance(tree[0], str):
         raise refuse(where, "an expression begins with a word")
-    head, parts = tree[0], tree[1:]
+    head, operands = tree[0], tree[1:]
     if head in QUANTIFIERS:
-        if len(parts) != 2 or not isinstance(parts[0], str) or not parts[0].startswith("?"):
+        if len(operands) != 2 or not isinstance(operands[0], str) or not operands[0].startswith("?"):
             raise refuse(where, f"`{head}` takes a variable and a truth")
-        if parts[0] in bound:
-            raise refuse(where, f"{parts[0]} is bound twice")
-        if _type_of(parts[1], bound | {parts[0]}, words, where) != "truth":
+        if operands[0] in bound:
+            raise refuse(where, f"{operands[0]} is bound twice")
+        if _type_of(operands[1], bound | {operands[0]}, words, where) != "truth":
             raise refuse(where, f"`{head}` takes a variable and a truth")
         return "truth"
-    kinds = [_type_of(part, bound, words, where) for part in parts]
+    kinds = [_type_of(part, bound, words, where) for part in operands]
     if head in CONNECTIVES:
-        wanted, result = ["truth"] * max(1, len(parts)), "truth"
+        expected, result = ["truth"] * max(1, len(operands)), "truth"
     elif head in words:
-        wanted, result = words[head]
+        expected, result = words[head]
     else:
         raise refuse(where, f"there is no `{head[:40]}`")
-    if kinds != wanted:
-        raise refuse(where, f"`{head}` takes {', '.join(wanted) or 'nothing'}, not {', '.join(kinds) or 'nothing'}")
+    if kinds != expected:
+        raise refuse(where, f"`{head}` takes {', '.join(expected) or 'nothing'}, not {', '.join(kinds) or 'nothing'}")
     return result

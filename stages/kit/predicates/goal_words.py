@@ -7,17 +7,17 @@ from collections.abc import Iterable
 
 def goal_phrases(sentence: str, names: Iterable[str]) -> list[tuple[str, tuple[str, ...]]]:
     """Return the parts of a goal that `and` joins, each as text with <1>, <2> and its objects."""
-    known = set(names)
-    parts = []
+    known_names = set(names)
+    phrases = []
     for part in " ".join(sentence.lower().rstrip(".").split()).split(" and "):
         objects: list[str] = []
         words = []
         for word in part.split():
-            if word in known:
+            if word in known_names:
                 if word not in objects:
                     objects.append(word)
                 words.append(f"<{objects.index(word) + 1}>")
             else:
                 words.append(word)
-        parts.append((" ".join(words), tuple(objects)))
-    return parts
+        phrases.append((" ".join(words), tuple(objects)))
+    return phrases

@@ -27,8 +27,9 @@ ROOM_WORDS = Vocabulary(
     of_scene=("reach_low", "reach_high", "hand_opening"),
     relations={"supported": 2, "contained": 2, "held": 1},
 )
+"""Words that expressions may use of a room and its bodies."""
 TOUCH = 0.03
-"""What `near` allows [m]."""
+"""Largest distance that `near` allows [m]."""
 UNSEEN = ("wall", "ceiling", "surroundings")
 """Classes that nothing is said of."""
 REACHED = 0.95
@@ -63,6 +64,7 @@ SIDES = {
     "bottom": (2, -1.0),
     "top": (2, 1.0),
 }
+"""Words for the sides of a body: axis, and where along it from -1 (least) to 1."""
 
 
 @dataclass(frozen=True)
@@ -125,14 +127,14 @@ def arm_heights(robot: RobotDescription) -> tuple[float, float]:
 def perceive(bodies: Iterable[SceneBody], graph: ContactGraphFile, robot: RobotDescription) -> RoomState:
     """Return what is perceived of the bodies of a scene, as its contact graph has them; walls and ceiling left out."""
     nodes = {node.id: node for node in graph.nodes}
-    seen = {each.name: _body(each, nodes.get(each.name)) for each in bodies if each.class_name not in UNSEEN}
+    body_of = {each.name: _body(each, nodes.get(each.name)) for each in bodies if each.class_name not in UNSEEN}
     supported: dict[str, str] = {}
     contained: dict[str, str] = {}
     for link in graph.links:
-        if link.target in seen and link.source in seen and link.relation in ("supports", "contains"):
+        if link.target in body_of and link.source in body_of and link.relation in ("supports", "contains"):
             (supported if link.relation == "supports" else contained)[link.target] = link.source
-    held = graph.graph.get("held", "")
-    return RoomState(seen, supported, contained, held, arm_heights(robot), robot.opening)
+    held_object = graph.graph.get("held", "")
+    return RoomState(body_of, supported, contained, held_object, arm_heights(robot), robot.opening)
 
 
 def _body(record: SceneBody, node: GraphNode | None) -> Body:

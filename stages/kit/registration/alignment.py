@@ -19,7 +19,7 @@ from scenewright.stages.kit.registration.rigid_motion import exponential, orthon
 PARAMETERS = 8
 """Rotation, translation, gain and bias."""
 ITERATIONS = (6, 8, 10)
-"""At most so many per level, the finest first."""
+"""Most iterations a level, the finest first."""
 STRIDES = (2, 1, 1)
 """Every how many-th pixel of the source is compared, per level."""
 GATES = (0.06, 0.12, 0.25)
@@ -29,6 +29,7 @@ TOLERANCES = (2.0, 4.0, 8.0)
 BRIGHTNESS_NOISE = 0.03
 """Standard deviation of the brightness of one surface point in two frames, exposure apart."""
 BRIGHTNESS_GATE = 0.3
+"""Largest difference of brightness that counts (0 to 1); by eye."""
 INDEPENDENT_SHARE = 0.01
 """Neighbouring residuals are alike: so many of them count as independent when uncertainty is stated."""
 SYSTEMATIC_DEPTH = 0.005
@@ -37,6 +38,7 @@ keeps near surfaces, whose noise is a millimetre, from outweighing everything el
 SMALLEST_STEP = 2e-5
 """Steps below this end a level [rad and m]."""
 SUMS = 8
+"""How many sums there are."""
 SAMPLES, ON_SURFACE, FLOATING, HIDDEN, PLANES, PLANE_SQUARES, COLORS, COLOR_SQUARES = range(SUMS)
 """What is summed over the pixels of the source beside the equations: how many were compared, lie on the target's
 surface, before it and behind it; how many gave an equation by distance and by brightness, and the squares of those."""
@@ -147,14 +149,14 @@ def _accumulate(
                         k += 2
                     sums[PLANES] += 1
                     sums[PLANE_SQUARES] += distance * distance
-            own = source_brightness[v, u]
-            if not use_color or own < 0:
+            source_value = source_brightness[v, u]
+            if not use_color or source_value < 0:
                 continue
-            left, top = int(np.floor(column)), int(np.floor(line))
-            a, b = column - left, line - top
+            left_column, top = int(np.floor(column)), int(np.floor(line))
+            a, b = column - left_column, line - top
             value, along_u, along_v, measured = 0.0, 0.0, 0.0, True
             for k in range(4):
-                i, j = top + k // 2, left + k % 2
+                i, j = top + k // 2, left_column + k % 2
                 measured = measured and target_brightness[i, j] >= 0
                 share = (b if k // 2 else 1.0 - b) * (a if k % 2 else 1.0 - a)
                 value += share * target_brightness[i, j]
@@ -162,7 +164,7 @@ def _accumulate(
                 along_v += share * target_gradient[i, j, 1]
             if not measured:
                 continue
-            difference = value - gain * own - bias
+            difference = value - gain * source_value - bias
             sums[COLORS] += 1
             sums[COLOR_SQUARES] += min(difference * difference, BRIGHTNESS_GATE * BRIGHTNESS_GATE)
             if abs(difference) > BRIGHTNESS_GATE:
@@ -172,7 +174,7 @@ def _accumulate(
             g0, g1 = along_u * fx / q2, along_v * fy / q2
             g2 = -(g0 * q0 + g1 * q1) / q2
             row[0], row[1], row[2] = q1 * g2 - q2 * g1, q2 * g0 - q0 * g2, q0 * g1 - q1 * g0
-            row[3], row[4], row[5], row[6], row[7] = g0, g1, g2, -own, -1.0
+            row[3], row[4], row[5], row[6], row[7] = g0, g1, g2, -source_value, -1.0
             k = 0
             for i in range(PARAMETERS):
                 right[i] -= weight * row[i] * difference
@@ -214,7 +216,7 @@ def align(
             if np.abs(step[:6]).max() < SMALLEST_STEP:
                 break
     matrix, _, sums = _normal_equations(target.levels[0], source.levels[0], motion, gain, bias, 0, use_color)
-    return _described(motion, matrix, sums)
+    return _summarise(motion, matrix, sums)
 
 
 def judge(target: Pyramid, source: Pyramid, target_from_source: np.ndarray, level: int = 0) -> Alignment:
@@ -223,7 +225,7 @@ def judge(target: Pyramid, source: Pyramid, target_from_source: np.ndarray, leve
     matrix, _, sums = _normal_equations(
         target.levels[number], source.levels[number], np.asarray(target_from_source, dtype=float), 1, 0, number, False
     )
-    return _described(np.asarray(target_from_source, dtype=float), matrix, sums)
+    return _summarise(np.asarray(target_from_source, dtype=float), matrix, sums)
 
 
 def _normal_equations(
@@ -246,7 +248,7 @@ def _damping(matrix: np.ndarray) -> np.ndarray:
     return np.diag(diagonal)
 
 
-def _described(motion: np.ndarray, matrix: np.ndarray, sums: np.ndarray) -> Alignment:
+def _summarise(motion: np.ndarray, matrix: np.ndarray, sums: np.ndarray) -> Alignment:
     samples, on_surface, floating, _, planes, plane_squares, colors, color_squares = sums
     motion_part, mixed, exposure = matrix[:6, :6], matrix[:6, 6:], matrix[6:, 6:]
     # What the unknown exposure takes from the motion's certainty (Schur complement).

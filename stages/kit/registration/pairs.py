@@ -61,14 +61,14 @@ def agreed(
 ) -> Alignment | None:
     """Return where `source` is in `target` if the limits believe it and the alignment the other way round has found the
     same motion; None otherwise."""
-    there = align(target, source, guess, use_color=use_color, coarsest=coarsest)
-    if not limits.good(there):
+    forward = align(target, source, guess, use_color=use_color, coarsest=coarsest)
+    if not limits.good(forward):
         return None
-    back = align(source, target, inverse(there.target_from_source), use_color=use_color, coarsest=0)
+    back = align(source, target, inverse(forward.target_from_source), use_color=use_color, coarsest=0)
     if not limits.good(back):
         return None
-    turn = there.target_from_source @ back.target_from_source
-    return None if distance_of(turn) > RETURN_DISTANCE or angle_of(turn) > RETURN_ANGLE else there
+    turn = forward.target_from_source @ back.target_from_source
+    return None if distance_of(turn) > RETURN_DISTANCE or angle_of(turn) > RETURN_ANGLE else forward
 
 
 def with_systematic_error(information: np.ndarray) -> np.ndarray:
@@ -98,20 +98,20 @@ def overlap_candidates(
     `world_from_key` is (N, 4, 4), one camera a key frame. Pairs of different parts of the graph must not be asked for.
     For each later key frame the candidates are spread: the best ones that are no neighbours of one that was taken.
     """
-    taken = set(linked)
+    linked_pairs = set(linked)
     pairs = []
     for later in range(2, len(keys)):
         guesses = inverses(world_from_key[: later - 1]) @ world_from_key[later]
-        found = seen_shares(keys[: later - 1], keys[later], guesses, cameras)
-        shares = list(zip(found.tolist(), range(later - 1), strict=True))
+        shares_seen = seen_shares(keys[: later - 1], keys[later], guesses, cameras)
+        shares = list(zip(shares_seen.tolist(), range(later - 1), strict=True))
         chosen: list[int] = []
         for share, earlier in sorted(shares, key=lambda entry: (-entry[0], entry[1])):
             if share < least_overlap or len(chosen) >= per_key:
                 break
-            if any(abs(earlier - other) < 2 for other in chosen):
+            if any(abs(earlier - near_by) < 2 for near_by in chosen):
                 continue
             chosen.append(earlier)
-        pairs += [(earlier, later) for earlier in chosen if (earlier, later) not in taken]
+        pairs += [(earlier, later) for earlier in chosen if (earlier, later) not in linked_pairs]
     return pairs
 
 
@@ -132,8 +132,8 @@ def seen_shares(
         [(c.fx, c.fy, c.cx, c.cy, c.width, c.height, targets[k].median_depth) for k in facing for c in (cameras[k],)]
     ).T[..., None]
     u, v = fx * x / np.maximum(z, 1e-6) + cx, fy * y / np.maximum(z, 1e-6) + cy
-    near = (z > 0.2) & (z < 3 * np.maximum(depth, 0.5))
-    shares[facing] = (near & (u >= 0) & (u < width) & (v >= 0) & (v < height)).mean(axis=1)
+    in_range = (z > 0.2) & (z < 3 * np.maximum(depth, 0.5))
+    shares[facing] = (in_range & (u >= 0) & (u < width) & (v >= 0) & (v < height)).mean(axis=1)
     return shares
 
 

@@ -23,6 +23,7 @@ standard deviations each) begin to lose weight."""
 ANCHOR = 1e12
 """Information with which the first node of each connected part is held."""
 MAXIMUM_ITERATIONS = 50
+"""Most iterations of the optimisation; by eye."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +86,10 @@ def laid_out(poses: np.ndarray, edges: Sequence[Edge]) -> np.ndarray:
     waiting.sort(key=lambda edge: -float(np.linalg.eigvalsh(edge.information)[0]))
     while True:
         for edge in waiting:
-            there, here = part[edge.target] in placed, part[edge.source] in placed
-            if there == here:
+            has_target, has_source = part[edge.target] in placed, part[edge.source] in placed
+            if has_target == has_source:
                 continue
-            if there:
+            if has_target:
                 moved = int(part[edge.source])
                 motion = poses[edge.target] @ edge.target_from_source @ inverse(poses[edge.source])
             else:
@@ -185,8 +186,8 @@ def _assemble(
     i, j = graph.targets, graph.sources
     first = np.concatenate([i, j, i, j, anchors])
     second = np.concatenate([i, j, j, i, anchors])
-    held = np.repeat(ANCHOR * np.eye(6)[None], len(anchors), axis=0)
-    values = np.concatenate([contents, contents, -contents, -contents, held])
+    anchor_blocks = np.repeat(ANCHOR * np.eye(6)[None], len(anchors), axis=0)
+    values = np.concatenate([contents, contents, -contents, -contents, anchor_blocks])
     row, column = np.divmod(np.arange(36), 6)
     rows, columns = 6 * first[:, None] + row, 6 * second[:, None] + column
     shape = (6 * len(poses), 6 * len(poses))

@@ -87,14 +87,14 @@ def _points_and_normals(
             z = depth[v, u]
             if z <= 0:
                 continue
-            left, right = depth[v, u - reach], depth[v, u + reach]
+            left_depth, right = depth[v, u - reach], depth[v, u + reach]
             above, below = depth[v - reach, u], depth[v + reach, u]
-            if left <= 0 or right <= 0 or above <= 0 or below <= 0:
+            if left_depth <= 0 or right <= 0 or above <= 0 or below <= 0:
                 continue
             # An edge bends the depth; a floor that is seen at a grazing angle only slants it.
-            if abs(left + right - 2 * z) > jump * z or abs(above + below - 2 * z) > jump * z:
+            if abs(left_depth + right - 2 * z) > jump * z or abs(above + below - 2 * z) > jump * z:
                 continue
-            if abs(right - left) > STEEPEST * z or abs(below - above) > STEEPEST * z:
+            if abs(right - left_depth) > STEEPEST * z or abs(below - above) > STEEPEST * z:
                 continue
             a0 = points[v, u + reach, 0] - points[v, u - reach, 0]
             a1 = points[v, u + reach, 1] - points[v, u - reach, 1]

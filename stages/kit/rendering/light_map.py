@@ -19,9 +19,11 @@ LIGHT_POINTS = 4
 DIRECTIONS = 48
 """So many look for light over every sample: a Vogel disk lifted to the hemisphere (Malley's method)."""
 MOST_SUBDIVISIONS = 128
+"""Most subdivisions of a triangle's edge in the map; a bound on its memory."""
 RAY_DIRECTION = 3
 """Rays (N, 6): the origin, and from this column on the direction."""
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+"""Turn between two samples of a Vogel disk [rad]."""
 BURIED_SHARE = 0.5
 """A sample from which this share of directions meets back faces lies inside a solid."""
 
@@ -185,10 +187,10 @@ def _form_factor(
         dy = point[1] - positions[k, 1]
         dz = point[2] - positions[k, 2]
         square = dx * dx + dy * dy + dz * dz
-        here = normals[k, 0] * dx + normals[k, 1] * dy + normals[k, 2] * dz
-        there = -(shine[0] * dx + shine[1] * dy + shine[2] * dz)
-        if here > 0.0 and there > 0.0:
-            result[k] = here * there / (square * square * np.pi) * area
+        cosine_here = normals[k, 0] * dx + normals[k, 1] * dy + normals[k, 2] * dz
+        cosine_there = -(shine[0] * dx + shine[1] * dy + shine[2] * dz)
+        if cosine_here > 0.0 and cosine_there > 0.0:
+            result[k] = cosine_here * cosine_there / (square * square * np.pi) * area
     return result
 
 
@@ -256,8 +258,8 @@ def _add_bounce(
             if t >= triangles:
                 value = sky[channel]
             else:
-                here = lookup(direct, offset[t], subdivisions[t], uvs[k, 0], uvs[k, 1], channel)
-                value = albedo[t, channel] * (here + ambient[channel])
+                direct_light = lookup(direct, offset[t], subdivisions[t], uvs[k, 0], uvs[k, 1], channel)
+                value = albedo[t, channel] * (direct_light + ambient[channel])
             total[start + k, channel] += weight * value
 
 
@@ -281,12 +283,12 @@ def _fill_buried(light: np.ndarray, buried: np.ndarray, offset: np.ndarray, subd
                         a, b = i + di[k], j + dj[k]
                         if a < 0 or b < 0 or a + b > n:
                             continue
-                        other = first + a * (n + 1) - a * (a - 1) // 2 + b
-                        if not buried[other]:
+                        neighbour = first + a * (n + 1) - a * (a - 1) // 2 + b
+                        if not buried[neighbour]:
                             count += 1
-                            red += light[other, 0]
-                            green += light[other, 1]
-                            blue += light[other, 2]
+                            red += light[neighbour, 0]
+                            green += light[neighbour, 1]
+                            blue += light[neighbour, 2]
                     if count > 0:
                         light[first + row, 0] = red / count
                         light[first + row, 1] = green / count

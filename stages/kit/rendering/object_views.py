@@ -14,7 +14,7 @@ from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scipy.ndimage import binary_erosion
 
 LEAST_PIXELS = 25
-"""Of a mask (ConceptGraphs)."""
+"""Fewest pixels of a mask (ConceptGraphs)."""
 LINK = 0.05
 """Distance of points of one cluster [m] (ConceptGraphs)."""
 
@@ -48,10 +48,10 @@ def take(
     renderer: SceneRenderer, camera: Camera, world_from_camera: np.ndarray, random: np.random.Generator
 ) -> Picture:
     """Take a picture with the noise of a depth camera."""
-    seen = renderer.render(camera, world_from_camera)
-    reflectance = seen.albedo.mean(axis=2)
-    depth = disturb_depth(seen.depth, seen.incidence, reflectance, np.zeros_like(reflectance), camera, random)
-    return Picture(seen.color, depth, seen.instance, camera)
+    rendered = renderer.render(camera, world_from_camera)
+    reflectance = rendered.albedo.mean(axis=2)
+    depth = disturb_depth(rendered.depth, rendered.incidence, reflectance, np.zeros_like(reflectance), camera, random)
+    return Picture(rendered.color, depth, rendered.instance, camera)
 
 
 def cloud(picture: Picture, mask: np.ndarray, map_from_camera: np.ndarray, *, whole: bool = False) -> np.ndarray:

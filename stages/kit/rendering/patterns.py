@@ -19,8 +19,9 @@ _PLAIN, _PLANKS, _TILES, _CARPET, _PLASTER, _WOOD, _FABRIC, _SPECKLE = range(len
 PATTERN, STRENGTH, PERIOD, GLOSS, SHARPNESS, SEED, TRANSFORM = range(7)
 """Columns of the material table (M, ROW), as in Material; the 12 of pattern_from_world begin at TRANSFORM."""
 SKIRTING = TRANSFORM + 12
+"""Column of the skirting, behind the 12 of the transform."""
 ROW = SKIRTING + 2
-"""One column is spare."""
+"""Columns of the material table; one is spare."""
 
 
 @dataclass(frozen=True)

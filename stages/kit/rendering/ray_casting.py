@@ -24,8 +24,9 @@ from scenewright.stages.kit.rendering.shading import Hits, Surfaces
 from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup, linear_to_srgb
 
 BACKGROUND = (0.86, 0.89, 0.92)
-"""sRGB where no ray hits."""
+"""Colour where no ray hits (sRGB, 0 to 1)."""
 _SRGB_TABLE = np.round(linear_to_srgb(np.arange(4096) / 4095.0) * 255.0).astype(np.uint8)
+"""8-bit sRGB of 4096 steps of linear light."""
 
 
 @dataclass(frozen=True)
@@ -165,12 +166,12 @@ class SceneRenderer:
         missed = hits.primitive == shading.MISS
         if missed.any():
             # The background passes through the tone curve: give what comes out as the wanted colour.
-            wanted = np.where(
+            exposed = np.where(
                 self.background <= 0.04045, self.background / 12.92, ((self.background + 0.055) / 1.055) ** 2.4
             )
-            over = np.maximum(wanted - 0.6, 0.0) / 0.4
+            over = np.maximum(exposed - 0.6, 0.0) / 0.4
             result[missed] = (
-                np.where(wanted > 0.6, 0.6 - 0.4 * np.log(np.maximum(1.0 - over, 1e-3)), wanted) / self.exposure
+                np.where(exposed > 0.6, 0.6 - 0.4 * np.log(np.maximum(1.0 - over, 1e-3)), exposed) / self.exposure
             )
         return albedo, result
 
@@ -185,10 +186,10 @@ class SceneRenderer:
             color = color * np.float32(lamp.area / 6.0)
             blocked = np.zeros(len(light), dtype=np.bool_)
         else:
-            blocked = self._blocked(hits, point)
+            blocked = self._shadow_mask(hits, point)
         shading.add_light(light, highlight, hits, self._surfaces(), blocked, point, color, self.light_map is None)
 
-    def _blocked(self, hits: Hits, point: np.ndarray) -> np.ndarray:
+    def _shadow_mask(self, hits: Hits, point: np.ndarray) -> np.ndarray:
         if not self.shadows:
             return np.zeros(len(hits.t), dtype=np.bool_)
         t = np.where(hits.primitive != shading.MISS, hits.t, 0.0)[:, None]

@@ -10,6 +10,7 @@ from scenewright.stages.kit.rendering.light_map import RAY_DIRECTION, LightMap, 
 from scenewright.stages.kit.rendering.patterns import GLOSS, PATTERN, SHARPNESS, SKIRTING, pattern_factor, pattern_line
 
 MISS = np.uint32(0xFFFFFFFF)
+"""Triangle of a ray that hits nothing."""
 
 
 class Hits(NamedTuple):

@@ -82,16 +82,16 @@ def _smooth_normals(
             vertex = vertex_of_corner[face, corner]
             x, y, z = 0.0, 0.0, 0.0
             for k in range(start[vertex], start[vertex + 1]):
-                other = faces_of_vertex[k]
+                other_face = faces_of_vertex[k]
                 cosine = (
-                    normals[face, 0] * normals[other, 0]
-                    + normals[face, 1] * normals[other, 1]
-                    + normals[face, 2] * normals[other, 2]
+                    normals[face, 0] * normals[other_face, 0]
+                    + normals[face, 1] * normals[other_face, 1]
+                    + normals[face, 2] * normals[other_face, 2]
                 )
                 if cosine > crease_cosine:
-                    x += areas[other] * normals[other, 0]
-                    y += areas[other] * normals[other, 1]
-                    z += areas[other] * normals[other, 2]
+                    x += areas[other_face] * normals[other_face, 0]
+                    y += areas[other_face] * normals[other_face, 1]
+                    z += areas[other_face] * normals[other_face, 2]
             length = np.sqrt(x * x + y * y + z * z)
             if length > 0.0:
                 result[face, corner, 0] = x / length
@@ -131,7 +131,7 @@ def build_soup(
     """
     materials = materials or {}
     table = [Material()]
-    parts: list[tuple[np.ndarray, ...]] = []
+    arrays_of_meshes: list[tuple[np.ndarray, ...]] = []
     for instance, mesh in meshes:
         corners = np.asarray(mesh.vertices, dtype=np.float64)[mesh.faces]
         edge = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -150,7 +150,7 @@ def build_soup(
             if material.only_wood:
                 rows[~is_wood(srgb.mean(axis=1))] = len(table)
                 table.append(replace(material, pattern="plain"))
-        parts.append(
+        arrays_of_meshes.append(
             (
                 corners.astype(np.float32),
                 normals.astype(np.float32),
@@ -160,9 +160,9 @@ def build_soup(
                 rows,
             )
         )
-    if not parts:
+    if not arrays_of_meshes:
         raise BadInput("nothing to render: the meshes hold no triangle with an area")
-    joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+    joined = [np.concatenate(columns) for columns in zip(*arrays_of_meshes, strict=True)]
     corners, normals, smooth, colors, instances, rows = joined
     rows_of_table = np.stack([material.row() for material in table])
     return TriangleSoup(corners, normals, smooth, colors, instances, rows, rows_of_table)

@@ -16,16 +16,16 @@ def check_address(address: str, *, form: str) -> str:
     a query or a fragment.
     """
     try:
-        parts = urlsplit(address)
-        port_is_sound = parts.port is None or parts.port > 0
+        url = urlsplit(address)
+        port_is_sound = url.port is None or url.port > 0
     except ValueError as error:  # a port that is no number, a torn IPv6 address
         raise ValueError(f"not the address of a service: {error}") from None
-    sound = parts.scheme in ("http", "https") and parts.hostname and port_is_sound
+    sound = url.scheme in ("http", "https") and url.hostname and port_is_sound
     if not sound or not address.isascii() or not address.isprintable() or " " in address:
         raise ValueError(f"not the address of a service: it reads {form}")
-    if parts.username is not None or parts.password is not None:
+    if url.username is not None or url.password is not None:
         raise ValueError("a user or password in the address would be written into every manifest")
-    if parts.query or parts.fragment:
+    if url.query or url.fragment:
         raise ValueError("the address of a service ends with its path: no '?' and no '#'")
     return address.rstrip("/")
 

@@ -23,7 +23,8 @@ LONGEST_WAIT = 30.0
 LARGEST_BODY = 64 * 2**20
 """Bytes of an answer, unless the client says otherwise."""
 SHORTEST_SECRET = 8
-"""Characters; shorter ones (`none`, `EMPTY`, which local servers accept) would be hidden in the midst of words."""
+"""Shortest secret that is hidden [characters]; shorter ones (`none`, `EMPTY`, which local servers accept) would be
+hidden in the midst of words."""
 HIDDEN = "[key]"
 """Stands where a service says the key back."""
 LONGEST_EXCERPT = 200
@@ -96,7 +97,7 @@ class Connection:
         self.repeats = 0
         self._key, self._refused_hint, self._now = key, refused_hint, now
         self._largest_body, self._longest_wait = largest_body, longest_wait
-        self._parts = urlsplit(address)
+        self._url = urlsplit(address)
         self._timeout, self._retries, self._retry_wait, self._sleep = timeout, retries, retry_wait, sleep
         self._open: http.client.HTTPConnection | None = None
 
@@ -134,9 +135,9 @@ class Connection:
                 raise
             except TryAgain as error:
                 self.close()
-                reason, asked, status = str(error), error.wait, error.status
+                reason, asked_wait, status = str(error), error.wait, error.status
             if attempt < self._retries:
-                wait = min(self._longest_wait, max(asked, self._retry_wait * 2**attempt))
+                wait = min(self._longest_wait, max(asked_wait, self._retry_wait * 2**attempt))
                 logger.warning(
                     "%s: %s; asked again in %g s (%d of %d)", self.address, reason, wait, attempt + 1, self._retries
                 )
@@ -152,7 +153,7 @@ class Connection:
         timer: threading.Timer | None = None
         reused = self._open is not None
         try:
-            connection = self._connected()
+            connection = self._connect()
             timer = threading.Timer(self._timeout, _cut, (connection, late))
             timer.daemon = True
             timer.start()
@@ -161,7 +162,7 @@ class Connection:
                 headers["Authorization"] = f"Bearer {self._key}"
             if body is not None:
                 headers["Content-Type"] = content_type
-            connection.request(method, self._parts.path + path, body, headers)
+            connection.request(method, self._url.path + path, body, headers)
             response = connection.getresponse()
             data = self._read(response)
         except (OSError, http.client.HTTPException, ValueError) as error:
@@ -186,7 +187,7 @@ class Connection:
         if response.status in RETRIED:
             raise TryAgain(
                 f"status {response.status} ({excerpt})",
-                self._asked_wait(response.getheader("Retry-After", "")),
+                self._parse_retry_after(response.getheader("Retry-After", "")),
                 response.status,
             )
         if response.status != 200:
@@ -198,7 +199,7 @@ class Connection:
             )
         return Answer(data, self.hide(response.getheader("Content-Type", "")))
 
-    def _asked_wait(self, text: str) -> float:
+    def _parse_retry_after(self, text: str) -> float:
         """Return the seconds of a Retry-After header, which holds a number or a date (RFC 9110, 10.2.3); else 0."""
         if text.isascii() and text.isdigit():
             return float(text[:9])
@@ -218,11 +219,11 @@ class Connection:
             raise http.client.IncompleteRead(data, length - len(data))
         return data
 
-    def _connected(self) -> http.client.HTTPConnection:
+    def _connect(self) -> http.client.HTTPConnection:
         if self._open is None:
-            assert self._parts.hostname is not None
-            kind = http.client.HTTPSConnection if self._parts.scheme == "https" else http.client.HTTPConnection
-            self._open = kind(self._parts.hostname, self._parts.port, timeout=self._timeout)
+            assert self._url.hostname is not None
+            kind = http.client.HTTPSConnection if self._url.scheme == "https" else http.client.HTTPConnection
+            self._open = kind(self._url.hostname, self._url.port, timeout=self._timeout)
             self._open.connect()
             if self._open.sock is not None:  # small packets go at once
                 self._open.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

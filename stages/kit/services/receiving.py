@@ -24,23 +24,24 @@ from scenewright.schemas.errors import MachineFailure, UsageError
 IDLE_SECONDS = 60.0
 """A connection on which nothing comes for so long is closed."""
 HEAD_SECONDS = 10.0
-"""From the first byte of a request to the end of its header."""
+"""Time from the first byte of a request to the end of its header [s]."""
 BODY_SECONDS = 60.0
-"""From there to the end of its body."""
+"""Time from the end of a request's header to the end of its body [s]."""
 SEND_SECONDS = 60.0
-"""For an answer, all of it."""
+"""Time for an answer, all of it [s]."""
 LINGER_SECONDS = 2.0
 """How long what a refused sender still sends is thrown away, so that it can read why."""
 LARGEST_HEAD = 32 * 2**10
 """Bytes of a request line and header."""
 LARGEST_BODY = 64 * 2**20
-"""Bytes of a request or an answer."""
+"""Largest request or answer [bytes]."""
 MOST_BODIES = 256 * 2**20
 """Bytes of all bodies that are held at a time."""
 MOST_CONNECTIONS = 64
 """Each has a thread; beyond them the one that has waited longest for a request is closed, or the new
 one told to wait."""
 PIECE = 1 << 20
+"""Bytes of a body that are read at a time; by eye."""
 JSON = "application/json"
 BUSY = b'{"error": "too many connections"}'
 
@@ -62,7 +63,7 @@ class BoundedServer(ThreadingHTTPServer):
         self._host = host.lower()
         self._slots = threading.BoundedSemaphore(self.most_connections)
         self._expecting: dict[socket.socket, None] = {}
-        self._held = 0
+        self._held_bytes = 0
         self._lock = threading.Lock()
         if ":" in host:
             self.address_family = socket.AF_INET6
@@ -154,9 +155,9 @@ class BoundedServer(ThreadingHTTPServer):
     def hold(self, size: int) -> bool:
         """Count bytes of bodies that are held (negative: no longer); False, and nothing counted, for too many."""
         with self._lock:
-            if self._held + size > self.most_bodies:
+            if self._held_bytes + size > self.most_bodies:
                 return False
-            self._held += size
+            self._held_bytes += size
             return True
 
 
@@ -179,12 +180,12 @@ class _TimedStream(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
-        left = self._deadline - time.monotonic()
-        if left <= 0:
+        remaining = self._deadline - time.monotonic()
+        if remaining <= 0:
             raise TimeoutError
         if self._room <= 0:
             raise _HeadTooLarge
-        self._connection.settimeout(left)
+        self._connection.settimeout(remaining)
         size = self._connection.recv_into(buffer)
         self._room -= size
         self.begun = self.begun or size > 0
@@ -251,8 +252,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
         elif self.own_pages_only and not self._own_page_asks(hosts):
             self._refuse_unread(403, "pages of other origins may not ask here")
         elif (methods := self.routes.get(self.path)) is None:
-            there = f"; there are {', '.join(self.routes)}" if self.tells_routes else ""
-            self._refuse_unread(404, f"no {self.path:.80}{there}")
+            routes_there = f"; there are {', '.join(self.routes)}" if self.tells_routes else ""
+            self._refuse_unread(404, f"no {self.path:.80}{routes_there}")
         elif self.command not in methods:
             allowed = ", ".join(methods)
             self._refuse_unread(405, f"{self.path} takes {allowed}", {"Allow": allowed})
@@ -300,32 +301,32 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self.end_headers()
         self._stream.allow(BODY_SECONDS, self.largest_body + 1)
         self._stream.begun = True
-        parts: list[bytes] = []
+        pieces: list[bytes] = []
         received = 0
         try:
             while received < length:
-                wanted = min(PIECE, length - received)
-                if not self.server.hold(wanted):
+                piece_size = min(PIECE, length - received)
+                if not self.server.hold(piece_size):
                     self._refuse_unread(503, "too many bytes are waiting", {"Retry-After": "1"})
                     return None
-                received += wanted  # counted before it is there, as it is given back by what was counted
-                part = self.rfile.read(wanted)
-                parts.append(part)
-                if len(part) < wanted:
+                received += piece_size  # counted before it is there, as it is given back by what was counted
+                part = self.rfile.read(piece_size)
+                pieces.append(part)
+                if len(part) < piece_size:
                     self.close_connection = True
                     return None  # the client is gone
-            kept, received = received, 0
-            self._kept = kept
-            return b"".join(parts)
+            held_bytes, received = received, 0
+            self._held_for_request = held_bytes
+            return b"".join(pieces)
         finally:
             self.server.hold(-received)
 
-    _kept = 0
+    _held_for_request = 0
 
     def done(self) -> None:
         """Say that the body is held no longer."""
-        self.server.hold(-self._kept)
-        self._kept = 0
+        self.server.hold(-self._held_for_request)
+        self._held_for_request = 0
 
     def _refuse_unread(self, status: int, reason: str, headers: Mapping[str, str] | None = None) -> None:
         """Refuse a request whose body may still come: the connection ends with it."""
@@ -361,8 +362,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
         with suppress(OSError):
             self.connection.shutdown(socket.SHUT_WR)
             deadline = time.monotonic() + LINGER_SECONDS
-            while (left := deadline - time.monotonic()) > 0:
-                self.connection.settimeout(left)
+            while (remaining := deadline - time.monotonic()) > 0:
+                self.connection.settimeout(remaining)
                 if not self.connection.recv(1 << 16):
                     break
 

@@ -29,14 +29,17 @@ PROTOCOL = "scenewright-segmentation/1"
 INFO_PATH, SEGMENT_PATH, HEALTH_PATH = "/v1/info", "/v1/segment", "/health"
 STREAMS = ("color", "depth", "pose")
 LARGEST_BODY = 64 * 2**20
-"""Bytes of a request or a reply."""
+"""Largest request or reply [bytes]."""
 MOST_SEGMENTS = 65536
+"""Most segments of an answer; a bound, by eye."""
 LONGEST_TEXT = 200
-"""Characters of a name."""
+"""Longest name [characters]."""
 PART_HEADER_LIMIT = 4096
+"""Longest header of a part [bytes]; a bound, by eye."""
 LARGEST_PART = 64 * 2**10
 """Bytes of the part `request`: JSON takes many times as much when it is read."""
 MOST_PARTS = 8
+"""Most parts of a message; a bound, by eye."""
 
 
 class Category(Model):
@@ -154,23 +157,23 @@ def encode_request(request: SegmentRequest, streams: tuple[str, ...], color: byt
     }
     if "pose" in streams and frame.world_from_camera is not None:
         description["world_from_camera"] = frame.world_from_camera.tolist()
-    parts = [("request", "application/json", canonical_json(description).encode())]
+    sections = [("request", "application/json", canonical_json(description).encode())]
     if "color" in streams and frame.color is not None:
         data = color or _png(np.ascontiguousarray(frame.color[..., ::-1]))
-        parts.append(("color", "image/png" if data.startswith(PNG_START) else "image/jpeg", data))
+        sections.append(("color", "image/png" if data.startswith(PNG_START) else "image/jpeg", data))
     if "depth" in streams and frame.depth is not None:
-        parts.append(("depth", "image/png", _png(foxglove.depth_to_millimetres(frame.depth))))
-    return _multipart(parts)
+        sections.append(("depth", "image/png", _png(foxglove.depth_to_millimetres(frame.depth))))
+    return _multipart(sections)
 
 
 def parse_request(body: bytes, content_type: str, *, most_pixels: int = LARGEST_IMAGE) -> SegmentRequest:
     """Return what a client asks, about a frame of at most `most_pixels`. Raises BadInput."""
-    parts = split_multipart(body, content_type)
-    if "request" not in parts:
+    content_of = split_multipart(body, content_type)
+    if "request" not in content_of:
         _refuse("the part `request` is missing")
-    if len(parts["request"]) > LARGEST_PART:
+    if len(content_of["request"]) > LARGEST_PART:
         _refuse(f"the part `request` has more than {LARGEST_PART} bytes")
-    description = _json_object(parts["request"], "application/json")
+    description = _json_object(content_of["request"], "application/json")
     _check_protocol(description)
     try:
         camera = Camera(**description["intrinsics"])
@@ -190,10 +193,10 @@ def parse_request(body: bytes, content_type: str, *, most_pixels: int = LARGEST_
     ):
         _refuse("the part `request` is malformed (frame, seed or world_from_camera)")
     color = depth = None
-    if "color" in parts:
-        color = _decoded("color", parts["color"], camera, foxglove.decode_color)
-    if "depth" in parts:
-        depth = _decoded("depth", parts["depth"], camera, _millimetres)
+    if "color" in content_of:
+        color = _decode("color", content_of["color"], camera, foxglove.decode_color)
+    if "depth" in content_of:
+        depth = _decode("depth", content_of["depth"], camera, _millimetres)
         if description.get("depth_unit_m") != 0.001:
             _refuse("depth_unit_m is not 0.001")
         depth = foxglove.millimetres_to_depth(depth)
@@ -232,24 +235,26 @@ def parse_reply(body: bytes, content_type: str, shape: tuple[int, int], categori
 
 def split_multipart(body: bytes, content_type: str) -> dict[str, bytes]:
     """Return name -> content of the parts of multipart/form-data. Raises BadInput."""
-    kind, _, rest = content_type.partition(";")
-    boundaries = [item.strip()[len("boundary=") :] for item in rest.split(";") if item.strip().startswith("boundary=")]
+    kind, _, options = content_type.partition(";")
+    boundaries = [
+        item.strip()[len("boundary=") :] for item in options.split(";") if item.strip().startswith("boundary=")
+    ]
     boundary = boundaries[0].strip('"').encode("ascii", "replace") if boundaries else b""
     if kind.strip().lower() != "multipart/form-data" or not 0 < len(boundary) <= 70:
         _refuse(f"content type {content_type!r:.80} is no multipart/form-data with a boundary")
     pieces = (b"\r\n" + body).split(b"\r\n--" + boundary, MOST_PARTS + 2)
     if len(pieces) < 3 or not pieces[-1].startswith(b"--") or len(pieces) - 2 > MOST_PARTS:
         _refuse("its parts are torn, or too many")
-    parts: dict[str, bytes] = {}
+    content_of: dict[str, bytes] = {}
     for piece in pieces[1:-1]:
         head, separator, content = piece.partition(b"\r\n\r\n")
         if not separator or len(head) > PART_HEADER_LIMIT:
             _refuse("a part has no header, or one that does not end")
         name = _part_name(head)
-        if name in parts:
+        if name in content_of:
             _refuse(f"part {name!r:.60} comes twice")
-        parts[name] = content
-    return parts
+        content_of[name] = content
+    return content_of
 
 
 def _part_name(head: bytes) -> str:
@@ -262,11 +267,11 @@ def _part_name(head: bytes) -> str:
     _refuse("a part has no name")
 
 
-def _multipart(parts: list[tuple[str, str, bytes]]) -> tuple[bytes, str]:
+def _multipart(sections: list[tuple[str, str, bytes]]) -> tuple[bytes, str]:
     # Made of the content, so that the same request has the same bytes, and so long that no content holds it by chance.
-    boundary = "scenewright-" + hashlib.sha256(b"".join(content for _, _, content in parts)).hexdigest()[:40]
+    boundary = "scenewright-" + hashlib.sha256(b"".join(content for _, _, content in sections)).hexdigest()[:40]
     lines = []
-    for name, kind, content in parts:
+    for name, kind, content in sections:
         file_name = "" if name == "request" else f'; filename="{name}.{kind.split("/")[1]}"'
         head = (
             f'--{boundary}\r\nContent-Disposition: form-data; name="{name}"{file_name}\r\nContent-Type: {kind}\r\n\r\n'
@@ -288,7 +293,7 @@ def _millimetres(data: bytes) -> np.ndarray | None:
     return image if image is not None and image.ndim == 2 and image.dtype == np.uint16 else None
 
 
-def _decoded(name: str, data: bytes, camera: Camera, decode: Any) -> np.ndarray:
+def _decode(name: str, data: bytes, camera: Camera, decode: Any) -> np.ndarray:
     if not may_be_decoded(data):
         _refuse(f"the part `{name}` is no image, or declares more pixels than it holds")
     if image_size(data) != (camera.width, camera.height):
@@ -371,15 +376,15 @@ def _integer(value: Any) -> int:
     return value
 
 
-def _text(value: Any, what: str) -> str:
+def _text(value: Any, subject: str) -> str:
     if not isinstance(value, str) or not 0 < len(value) <= LONGEST_TEXT or not value.isprintable():
-        _refuse(f"{what} is no printable text of at most {LONGEST_TEXT} characters")
+        _refuse(f"{subject} is no printable text of at most {LONGEST_TEXT} characters")
     return value
 
 
-def _streams(value: Any, what: str) -> tuple[str, ...]:
+def _streams(value: Any, subject: str) -> tuple[str, ...]:
     if not isinstance(value, list) or any(item not in STREAMS for item in value):
-        _refuse(f"{what} of its description are not among {', '.join(STREAMS)}")
+        _refuse(f"{subject} of its description are not among {', '.join(STREAMS)}")
     return tuple(stream for stream in STREAMS if stream in value)
 
 

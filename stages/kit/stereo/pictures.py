@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 UNKNOWN = (20, 20, 20)
-"""RGB of pixels without a disparity."""
+"""Colour of pixels without a disparity (sRGB, of 255)."""
 
 
 def disparity_colors(disparity: np.ndarray, limits: tuple[float, float] | None = None) -> np.ndarray:

@@ -22,9 +22,9 @@ from scenewright.stages.kit.tasks.task_planner import TaskPlan
 PACKAGE = "up_fast_downward"
 ALIAS = "lama-first"
 UNSOLVABLE = (10, 11, 12)
-"""Its exit codes for tasks without a plan."""
+"""Exit codes of Fast Downward for tasks without a plan."""
 LONGEST = 60.0
-"""After this the planner is stopped: a guard against a hang, not a budget [s]."""
+"""Time after which the planner is stopped [s]: a guard against a hang, not a budget."""
 INSTEAD = "take --planner builtin"
 
 
@@ -47,7 +47,7 @@ def plan_with_fast_downward(domain: Domain, problem: Problem, actions: list[Grou
     Raises MissingDependency without the planner, BadInput when its answer is no plan. Its states are not counted.
     """
     program = driver()
-    task_domain, task_problem, names = _restricted(domain, problem, actions)
+    task_domain, task_problem, names = _restrict(domain, problem, actions)
     with tempfile.TemporaryDirectory() as folder:
         files = [Path(folder) / name for name in ("domain.pddl", "problem.pddl", "plan")]
         files[0].write_text(domain_text(task_domain), encoding="utf-8")
@@ -88,7 +88,7 @@ def read_plan(text: str, actions: dict[str, GroundAction]) -> list[GroundAction]
     return plan
 
 
-def _restricted(
+def _restrict(
     domain: Domain, problem: Problem, actions: list[GroundAction]
 ) -> tuple[Domain, Problem, dict[str, GroundAction]]:
     """Return domain and problem in which only `actions` can be done, objects as `o<k>`, and the action of each line.

@@ -28,15 +28,15 @@ class Landmarks:
 
     def accept(self, accepted: np.ndarray, state: np.ndarray) -> np.ndarray:
         """Return what is accepted (K,) after a step to `state` (A,): landmarks that hold, all before them accepted."""
-        held = state[self.atoms].astype(bool)
+        is_true = state[self.atoms].astype(bool)
         ready = ~(self.before & ~accepted[None, :]).any(axis=1)
-        return accepted | (held & ready)
+        return accepted | (is_true & ready)
 
     def left(self, accepted: np.ndarray, state: np.ndarray) -> int:
         """Return how many landmarks are not accepted, or are but have to be true again."""
-        held = state[self.atoms].astype(bool)
-        wanted = self.goal | (self.needed & ~accepted[:, None]).any(axis=0)
-        return int((~accepted | (~held & wanted)).sum())
+        is_true = state[self.atoms].astype(bool)
+        is_needed = self.goal | (self.needed & ~accepted[:, None]).any(axis=0)
+        return int((~accepted | (~is_true & is_needed)).sum())
 
     def achievers_wanted(self, accepted: np.ndarray) -> np.ndarray:
         """Return the atoms of the landmarks that could be accepted next."""
@@ -63,13 +63,13 @@ def find_landmarks(task: Relaxed) -> Landmarks:
             landmarks.append(atom)
             possible.append(cost < FAR)
     atoms = np.array(landmarks, dtype=np.int32)
-    place = {atom: k for k, atom in enumerate(landmarks)}
+    row_of = {atom: k for k, atom in enumerate(landmarks)}
     needed = np.zeros((len(landmarks), len(landmarks)), dtype=bool)
     achievers: list[list[int]] = [[] for _ in landmarks]
     for action in range(len(task.actions)):
         for added in task.add[task.add_at[action] : task.add_at[action + 1]]:
-            if int(added) in place:
-                achievers[place[int(added)]].append(action)
+            if int(added) in row_of:
+                achievers[row_of[int(added)]].append(action)
     for k, atom in enumerate(landmarks):
         if task.initial[atom]:
             continue
@@ -78,17 +78,17 @@ def find_landmarks(task: Relaxed) -> Landmarks:
             needs = task.pre[task.pre_at[action] : task.pre_at[action + 1]]
             if possible[k][needs].all():
                 common = set(needs.tolist()) if common is None else common & set(needs.tolist())
-        for other in common or ():
-            if other in place:
-                needed[k, place[other]] = True
+        for other_atom in common or ():
+            if other_atom in row_of:
+                needed[k, row_of[other_atom]] = True
     goal = np.isin(atoms, task.goal)
-    before = needed | _reasonable(task, atoms, needed, goal, achievers)
+    before = needed | _reasonable_orders(task, atoms, needed, goal, achievers)
     initial = task.initial[atoms].astype(bool)
     first = initial & ~before.any(axis=1)
     return Landmarks(atoms, before, needed, goal, first)
 
 
-def _reasonable(
+def _reasonable_orders(
     task: Relaxed, atoms: np.ndarray, needed: np.ndarray, goal: np.ndarray, achievers: list[list[int]]
 ) -> np.ndarray:
     """Return orders [k, m] of goals: m had better come before k, as k in place destroys what m needs.

@@ -15,6 +15,7 @@ from scenewright.stages.kit.tasks.landmarks import Landmarks
 from scenewright.stages.kit.tasks.relaxed import FAR, Relaxed, applicable, successor
 
 BOOST = 1000
+"""Turns that the queues of preferred actions get whenever a heuristic falls to a new low (Richter & Westphal 2010)."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class _Queues:
         filled = [which for which in range(4) if self.heaps[which]]
         if not filled:
             return None
-        which = min(filled, key=lambda place: self.turns[place])
+        which = min(filled, key=lambda queue: self.turns[queue])
         self.turns[which] += 1
         _, _, node, action = heapq.heappop(self.heaps[which])
         return node, action
@@ -85,13 +86,13 @@ class LazySearch:
         """
         task = self.task
         nodes: list[_Node] = []
-        seen: dict[bytes, int] = {}
+        node_of_state: dict[bytes, int] = {}
         queues = _Queues()
         lows = [FAR, FAR]
         expanded = 0
-        taken: tuple[int, int] | None = (-1, -1)
-        while taken is not None:
-            number = self._reach(nodes, seen, *taken, bound)
+        node_and_action: tuple[int, int] | None = (-1, -1)
+        while node_and_action is not None:
+            number = self._reach(nodes, node_of_state, *node_and_action, bound)
             if number is not None:
                 node = nodes[number]
                 if node.state[task.goal].all():
@@ -105,11 +106,11 @@ class LazySearch:
                         lows = [min(value, low) for value, low in zip(values, lows, strict=True)]
                         queues.boost()
                     self._expand(queues, node, number, values, weight)
-            taken = queues.pop()
+            node_and_action = queues.pop()
         return Found(None, expanded, True)
 
     def _reach(
-        self, nodes: list[_Node], seen: dict[bytes, int], parent: int, action: int, bound: int | None
+        self, nodes: list[_Node], node_of_state: dict[bytes, int], parent: int, action: int, bound: int | None
     ) -> int | None:
         """Make the node of an action after a node; None when its state is known as cheaply, or lies over the bound."""
         task = self.task
@@ -122,23 +123,23 @@ class LazySearch:
                 return None
             state = successor(task, before.state, action)
         key = state.tobytes()
-        earlier = seen.get(key)
+        earlier = node_of_state.get(key)
         if earlier is not None and (bound is None or nodes[earlier].cost <= cost):
             return None
         if parent >= 0:
             accepted = self.landmarks.accept(nodes[parent].accepted, state)
         nodes.append(_Node(state, accepted, parent, action, cost))
-        seen[key] = len(nodes) - 1
+        node_of_state[key] = len(nodes) - 1
         return len(nodes) - 1
 
     def _expand(self, queues: _Queues, node: _Node, number: int, values: tuple[int, int], weight: int | None) -> None:
         task = self.task
-        wanted: set[int] = set()
+        landmark_actions: set[int] = set()
         for atom in self.landmarks.achievers_wanted(node.accepted).tolist():
-            wanted |= self._achievers[atom]
+            landmark_actions |= self._achievers[atom]
         key = values if weight is None else (node.cost + weight * values[0], node.cost + weight * values[1])
         for action in applicable(node.state, task.pre, task.pre_at).tolist():
-            queues.push(key, number, action, bool(self._estimate.preferred[action]) or action in wanted)
+            queues.push(key, number, action, bool(self._estimate.preferred[action]) or action in landmark_actions)
 
 
 def _trace(nodes: list[_Node], number: int) -> list[int]:

@@ -17,7 +17,7 @@ Literals = tuple[tuple[Atom, ...], tuple[Atom, ...]]
 """Positive atoms and negated ones."""
 
 
-def _typed(pairs: list[tuple[str, str]], types: bool = True) -> str:
+def _typed_list(pairs: list[tuple[str, str]], types: bool = True) -> str:
     # Every name gets its type: a bare one before `b - kind` would read back as a kind.
     if not types:
         return " ".join(name for name, _ in pairs)
@@ -25,26 +25,28 @@ def _typed(pairs: list[tuple[str, str]], types: bool = True) -> str:
 
 
 def _conjunction(atoms: list[Atom], negated: list[Atom] | None = None) -> str:
-    parts = [f"({' '.join(atom)})" for atom in atoms] + [f"(not ({' '.join(atom)}))" for atom in negated or []]
-    return f"(and {' '.join(parts)})"
+    literals = [f"({' '.join(atom)})" for atom in atoms] + [f"(not ({' '.join(atom)}))" for atom in negated or []]
+    return f"(and {' '.join(literals)})"
 
 
 def domain_text(domain: Domain) -> str:
     """Return the PDDL text of a domain; one without types asks for none, as some parsers know no `object` then."""
-    asked = (True, bool(domain.types), any(schema.negative for schema in domain.schemas))
-    requirements = [word for word, needed in zip(REQUIREMENTS, asked, strict=True) if needed]
+    used_features = (True, bool(domain.types), any(schema.negative for schema in domain.schemas))
+    requirements = [word for word, needed in zip(REQUIREMENTS, used_features, strict=True) if needed]
     lines = [f"(define (domain {domain.name})", f"  (:requirements {' '.join(requirements)})"]
     if domain.types:
-        lines.append(f"  (:types {_typed(list(domain.types.items()))})")
+        lines.append(f"  (:types {_typed_list(list(domain.types.items()))})")
     lines.append("  (:predicates")
     for name, kinds in domain.predicates.items():
-        arguments = _typed([(f"?{chr(97 + place)}", kind) for place, kind in enumerate(kinds)], bool(domain.types))
+        arguments = _typed_list(
+            [(f"?{chr(97 + number)}", kind) for number, kind in enumerate(kinds)], bool(domain.types)
+        )
         lines.append(f"    ({name} {arguments})" if arguments else f"    ({name})")
     lines.append("  )")
     for schema in domain.schemas:
         lines += [
             f"  (:action {schema.name}",
-            f"    :parameters ({_typed(list(schema.parameters), bool(domain.types))})",
+            f"    :parameters ({_typed_list(list(schema.parameters), bool(domain.types))})",
             f"    :precondition {_conjunction(list(schema.preconditions), list(schema.negative))}",
             f"    :effect {_conjunction(list(schema.add), list(schema.delete))})",
         ]
@@ -56,36 +58,36 @@ def problem_text(problem: Problem, domain_name: str) -> str:
     initial = "\n".join(f"    ({' '.join(atom)})" for atom in sorted(problem.initial))
     return (
         f"(define (problem {problem.name})\n  (:domain {domain_name})\n"
-        f"  (:objects {_typed(sorted(problem.objects.items()), any(problem.objects.values()))})\n"
+        f"  (:objects {_typed_list(sorted(problem.objects.items()), any(problem.objects.values()))})\n"
         f"  (:init\n{initial})\n"
         f"  (:goal {_conjunction(sorted(problem.goal), sorted(problem.negative_goal))}))\n"
     )
 
 
-def _literals(expression: Expression, what: str) -> Literals:
+def _literals(expression: Expression, subject: str) -> Literals:
     """Return the positive and the negated atoms of a conjunction."""
-    listed = entries(expression, what)
+    listed = entries(expression, subject)
     items = listed[1:] if listed and listed[0] == "and" else [listed] if listed else []
     positive: list[Atom] = []
     negative: list[Atom] = []
     for item in items:
-        inner = entries(item, f"a literal of {what}")
+        inner = entries(item, f"a literal of {subject}")
         if inner and inner[0] == "not":
             if len(inner) != 2:
-                raise refuse(f"`not` in {what} takes one atom")
-            negative.append(_atom(inner[1], what))
+                raise refuse(f"`not` in {subject} takes one atom")
+            negative.append(_atom(inner[1], subject))
         else:
-            positive.append(_atom(inner, what))
+            positive.append(_atom(inner, subject))
     return tuple(positive), tuple(negative)
 
 
-def _atom(expression: Expression, what: str) -> Atom:
-    terms = entries(expression, f"an atom of {what}")
+def _atom(expression: Expression, subject: str) -> Atom:
+    terms = entries(expression, f"an atom of {subject}")
     if not terms:
-        raise refuse(f"an atom of {what} is empty")
+        raise refuse(f"an atom of {subject} is empty")
     if terms[0] in ("and", "or", "not", "imply", "forall", "exists", "when", "=", "increase", "either"):
-        raise refuse(f"{what} has `{terms[0]}`, which typed STRIPS does not know")
-    return tuple(word(term, f"a term of {what}") for term in terms)
+        raise refuse(f"{subject} has `{terms[0]}`, which typed STRIPS does not know")
+    return tuple(word(term, f"a term of {subject}") for term in terms)
 
 
 def _sections(text: str, kind: str) -> tuple[str, dict[str, list[Expression]], list[list[Expression]]]:
@@ -133,28 +135,28 @@ def parse_domain(text: str) -> Domain:
         if predicate in predicates:
             raise refuse(f"predicate {predicate} is declared twice")
         kinds = [kind for _, kind in typed_names(listed[1:], f"predicate {predicate}")]
-        predicates[predicate] = tuple(_known_type(kind, types, f"predicate {predicate}") for kind in kinds)
+        predicates[predicate] = tuple(_check_type(kind, types, f"predicate {predicate}") for kind in kinds)
     schemas = tuple(_schema(part, types, predicates) for part in actions)
     for schema in schemas:
-        if sum(other.name == schema.name for other in schemas) > 1:
+        if sum(each.name == schema.name for each in schemas) > 1:
             raise refuse(f"action {schema.name} occurs twice")
     return Domain(name, types, predicates, schemas)
 
 
 def _check_ancestors(kind: str, types: dict[str, str]) -> None:
-    seen = {kind}
+    passed = {kind}
     while types[kind]:
         kind = types[kind]
         if kind not in types:
             raise refuse(f"type {kind!r} is not declared")
-        if kind in seen:
+        if kind in passed:
             raise refuse(f"type {kind!r} is below itself")
-        seen.add(kind)
+        passed.add(kind)
 
 
-def _known_type(kind: str, types: dict[str, str], what: str) -> str:
+def _check_type(kind: str, types: dict[str, str], subject: str) -> str:
     if kind and kind not in types:
-        raise refuse(f"{what}: type {kind!r} is not declared")
+        raise refuse(f"{subject}: type {kind!r} is not declared")
     return kind
 
 
@@ -162,35 +164,35 @@ def _schema(part: list[Expression], types: dict[str, str], predicates: dict[str,
     if len(part) < 2 or len(part) % 2:
         raise refuse("an action lacks its name, or one of its fields has no value")
     name = word(part[1], "the name of an action")
-    what = f"action {name}"
-    fields = {word(part[place], f"a field of {what}"): part[place + 1] for place in range(2, len(part), 2)}
+    subject = f"action {name}"
+    fields = {word(part[position], f"a field of {subject}"): part[position + 1] for position in range(2, len(part), 2)}
     if len(fields) != (len(part) - 2) // 2:
-        raise refuse(f"{what}: a field occurs twice")
+        raise refuse(f"{subject}: a field occurs twice")
     for unknown in set(fields) - {":parameters", ":precondition", ":effect"}:
-        raise refuse(f"{what}: field {unknown} is not read")
+        raise refuse(f"{subject}: field {unknown} is not read")
     parameters = tuple(
-        (variable, _known_type(kind, types, what))
-        for variable, kind in typed_names(entries(fields.get(":parameters", []), f"{what}: parameters"), what)
+        (variable, _check_type(kind, types, subject))
+        for variable, kind in typed_names(entries(fields.get(":parameters", []), f"{subject}: parameters"), subject)
     )
     for variable, _ in parameters:
         if not variable.startswith("?"):
-            raise refuse(f"{what}: parameter {variable!r} does not begin with ?")
-    positive, negative = _literals(fields.get(":precondition", []), f"{what}: precondition")
-    add, delete = _literals(fields.get(":effect", []), f"{what}: effect")
+            raise refuse(f"{subject}: parameter {variable!r} does not begin with ?")
+    positive, negative = _literals(fields.get(":precondition", []), f"{subject}: precondition")
+    add, delete = _literals(fields.get(":effect", []), f"{subject}: effect")
     variables = {variable for variable, _ in parameters}
     for atom in (*positive, *negative, *add, *delete):
-        _check_atom(atom, predicates, what)
+        _check_atom(atom, predicates, subject)
         for term in atom[1:]:
             if term not in variables:
-                raise refuse(f"{what}: {term!r} is no parameter of it")
+                raise refuse(f"{subject}: {term!r} is no parameter of it")
     return Schema(name, parameters, positive, add, delete, negative)
 
 
-def _check_atom(atom: Atom, predicates: dict[str, tuple[str, ...]], what: str) -> None:
+def _check_atom(atom: Atom, predicates: dict[str, tuple[str, ...]], subject: str) -> None:
     if atom[0] not in predicates:
-        raise refuse(f"{what}: predicate {atom[0]!r} is not declared")
+        raise refuse(f"{subject}: predicate {atom[0]!r} is not declared")
     if len(predicates[atom[0]]) != len(atom) - 1:
-        raise refuse(f"{what}: {atom[0]} takes {len(predicates[atom[0]])} arguments, not {len(atom) - 1}")
+        raise refuse(f"{subject}: {atom[0]} takes {len(predicates[atom[0]])} arguments, not {len(atom) - 1}")
 
 
 def parse_problem(text: str, domain: Domain | None = None) -> Problem:
@@ -214,7 +216,7 @@ def parse_problem(text: str, domain: Domain | None = None) -> Problem:
 def check_problem(domain: Domain, problem: Problem) -> None:
     """Raises BadInput when a problem names types, predicates or objects that there are not, or of a wrong type."""
     for name, kind in problem.objects.items():
-        _known_type(kind, domain.types, f"object {name}")
+        _check_type(kind, domain.types, f"object {name}")
     for atom in sorted(problem.initial | problem.goal | problem.negative_goal):
         _check_atom(atom, domain.predicates, "the problem")
         for term, kind in zip(atom[1:], domain.predicates[atom[0]], strict=True):

@@ -61,17 +61,17 @@ def typed_names(terms: list[Expression], what: str) -> list[tuple[str, str]]:
     pairs: list[tuple[str, str]] = []
     waiting: list[str] = []
     words = [word(term, f"an entry of {what}") for term in terms]
-    place = 0
-    while place < len(words):
-        if words[place] != "-":
-            waiting.append(words[place])
-            place += 1
+    position = 0
+    while position < len(words):
+        if words[position] != "-":
+            waiting.append(words[position])
+            position += 1
             continue
-        if place + 1 >= len(words) or words[place + 1] == "-" or not waiting:
+        if position + 1 >= len(words) or words[position + 1] == "-" or not waiting:
             raise refuse(f"a dash in {what} is not between names and a type")
-        kind = "" if words[place + 1] == "object" else words[place + 1]
+        kind = "" if words[position + 1] == "object" else words[position + 1]
         pairs += [(name, kind) for name in waiting]
-        waiting, place = [], place + 2
+        waiting, position = [], position + 2
     pairs += [(name, "") for name in waiting]
     names = [name for name, _ in pairs]
     for name in names:

@@ -31,6 +31,7 @@ class Effects(NamedTuple):
 
 
 _EFFECTS = types.NamedUniTuple(types.int32[::1], len(Effects._fields), Effects)
+"""Type of `Effects` for numba."""
 
 
 @dataclass(frozen=True)
@@ -75,16 +76,16 @@ def relax(problem: Problem, actions: list[GroundAction]) -> Relaxed:
     static = problem.initial - changed
     usable = [action for action in actions if action.preconditions <= changed | static]
     atoms = sorted((problem.initial - static) | changed | problem.goal)
-    number = {atom: place for place, atom in enumerate(atoms)}
+    number = {atom: index for index, atom in enumerate(atoms)}
     always = len(atoms)
     atoms.append(("",))
     pre = [sorted(number[a] for a in action.preconditions - static) or [always] for action in usable]
     add = [sorted(number[a] for a in action.add) for action in usable]
     delete = [sorted(number[a] for a in action.delete) for action in usable]
     users: list[list[int]] = [[] for _ in atoms]
-    for place, needs in enumerate(pre):
+    for index, needs in enumerate(pre):
         for atom in needs:
-            users[atom].append(place)
+            users[atom].append(index)
     initial = np.zeros(len(atoms), dtype=np.uint8)
     initial[[number[atom] for atom in problem.initial if atom in number] + [always]] = 1
     goal = np.array(sorted(number[atom] for atom in problem.goal), dtype=np.int32)
@@ -106,8 +107,8 @@ def applicable(state, pre, pre_at):  # type: ignore[no-untyped-def]
     count = 0
     for action in range(len(pre_at) - 1):
         holds = True
-        for place in range(pre_at[action], pre_at[action + 1]):
-            if state[pre[place]] == 0:
+        for index in range(pre_at[action], pre_at[action + 1]):
+            if state[pre[index]] == 0:
                 holds = False
                 break
         if holds:
@@ -151,9 +152,9 @@ def costs(state, effects, without, use_max, cost, by):  # type: ignore[no-untype
     level = 0
     while level <= highest:
         while head[level] >= 0:
-            place = head[level]
-            head[level] = following[place]
-            atom = entry_atom[place]
+            entry = head[level]
+            head[level] = following[entry]
+            atom = entry_atom[entry]
             if done[atom] == 1 or cost[atom] != level:
                 continue
             done[atom] = 1
@@ -175,10 +176,10 @@ def costs(state, effects, without, use_max, cost, by):  # type: ignore[no-untype
                         continue
                 price = total[action] + 1
                 for added in range(add_at[action], add_at[action + 1]):
-                    other = add[added]
-                    if price < cost[other]:
-                        cost[other] = price
-                        by[other] = action
+                    added_atom = add[added]
+                    if price < cost[added_atom]:
+                        cost[added_atom] = price
+                        by[added_atom] = action
                         if price >= size:
                             grown = np.full(2 * price, -1, dtype=np.int32)
                             grown[:size] = head
@@ -190,7 +191,7 @@ def costs(state, effects, without, use_max, cost, by):  # type: ignore[no-untype
                             longer = np.empty(2 * used, dtype=np.int32)
                             longer[:used] = following
                             following = longer
-                        entry_atom[used] = other
+                        entry_atom[used] = added_atom
                         following[used] = head[price]
                         head[price] = used
                         used += 1
@@ -205,17 +206,17 @@ def relaxed_plan(state, pre, pre_at, goal, cost, by, preferred):  # type: ignore
     `cost` and `by` come from `costs`; `preferred` (N,) is written.
     """
     preferred[:] = 0
-    for place in range(len(goal)):
-        if cost[goal[place]] >= FAR:
+    for index in range(len(goal)):
+        if cost[goal[index]] >= FAR:
             return FAR
-    wanted = np.zeros(len(state), dtype=np.uint8)
+    is_needed = np.zeros(len(state), dtype=np.uint8)
     chosen = np.zeros(len(pre_at) - 1, dtype=np.uint8)
     stack = np.empty(len(state), dtype=np.int32)
     depth = 0
-    for place in range(len(goal)):
-        if wanted[goal[place]] == 0:
-            wanted[goal[place]] = 1
-            stack[depth] = goal[place]
+    for index in range(len(goal)):
+        if is_needed[goal[index]] == 0:
+            is_needed[goal[index]] = 1
+            stack[depth] = goal[index]
             depth += 1
     count = 0
     while depth > 0:
@@ -226,12 +227,12 @@ def relaxed_plan(state, pre, pre_at, goal, cost, by, preferred):  # type: ignore
         chosen[action] = 1
         count += 1
         now = True
-        for place in range(pre_at[action], pre_at[action + 1]):
-            atom = pre[place]
+        for index in range(pre_at[action], pre_at[action + 1]):
+            atom = pre[index]
             if state[atom] == 0:
                 now = False
-            if wanted[atom] == 0:
-                wanted[atom] = 1
+            if is_needed[atom] == 0:
+                is_needed[atom] = 1
                 stack[depth] = atom
                 depth += 1
         if now:

@@ -118,7 +118,8 @@ def _ground_all(domain: Domain, problem: Problem) -> list[tuple[GroundAction, fr
     """Return ground actions with the atoms that must not hold before them."""
     changed = {atom[0] for schema in domain.schemas for atom in (*schema.add, *schema.delete)}
     by_type = {
-        kind: [name for name, own in problem.objects.items() if domain.is_a(own, kind)] for kind in (*domain.types, "")
+        kind: [name for name, object_kind in problem.objects.items() if domain.is_a(object_kind, kind)]
+        for kind in (*domain.types, "")
     }
     return [entry for schema in domain.schemas for entry in _ground_schema(schema, by_type, changed, problem)]
 
@@ -131,13 +132,13 @@ def _ground_schema(
     static += [(atom, False) for atom in schema.negative if atom[0] not in changed]
     variables = [name for name, _ in schema.parameters]
     checks: list[list[tuple[Atom, bool]]] = [[] for _ in range(len(variables) + 1)]
-    for atom, wanted in static:
+    for atom, truth in static:
         last = max((variables.index(term) + 1 for term in atom[1:] if term in variables), default=0)
-        checks[last].append((atom, wanted))
+        checks[last].append((atom, truth))
 
     def extend(binding: dict[str, str]) -> Iterator[dict[str, str]]:
-        for atom, wanted in checks[len(binding)]:
-            if ((atom[0], *(binding.get(term, term) for term in atom[1:])) in problem.initial) != wanted:
+        for atom, truth in checks[len(binding)]:
+            if ((atom[0], *(binding.get(term, term) for term in atom[1:])) in problem.initial) != truth:
                 return
         if len(binding) == len(variables):
             yield binding

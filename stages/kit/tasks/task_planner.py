@@ -21,9 +21,9 @@ from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem
 
 Heuristic = Literal["landmarks", "add", "max", "ff"]
 WEIGHTS = (5, 2, 1)
-"""Of the heuristic in the searches that shorten the first plan."""
+"""Weights of the heuristic in the searches that shorten the first plan."""
 IMPROVEMENT = 600
-"""Most states expanded in each of them."""
+"""Most states that are expanded in each search that shortens the first plan."""
 
 
 @dataclass(frozen=True)

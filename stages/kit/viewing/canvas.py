@@ -164,8 +164,8 @@ def vertex_colors(mesh: trimesh.Trimesh, colors: np.ndarray | None) -> tuple[tri
         return mesh, np.repeat(face_colors, 3, axis=0)
     if isinstance(visual, trimesh.visual.TextureVisuals):
         visual = visual.to_color()
-    own = np.asarray(visual.vertex_colors)
-    return mesh, own if own.shape == (len(mesh.vertices), 4) else None
+    stored = np.asarray(visual.vertex_colors)
+    return mesh, stored if stored.shape == (len(mesh.vertices), 4) else None
 
 
 def trust_color(share: float) -> Color:

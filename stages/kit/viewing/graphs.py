@@ -39,7 +39,7 @@ def trust_of(graph: ContactGraphFile, more: Mapping[str, Trust] | None = None) -
     The least of the node's and its support's confidence; half of it for what no mask gave a name. `more`: what else is
     known of some of them.
     """
-    found = {}
+    trusts = {}
     for node in graph.nodes:
         if node.box is None:
             continue
@@ -53,10 +53,10 @@ def trust_of(graph: ContactGraphFile, more: Mapping[str, Trust] | None = None) -
             share = min(share, link.confidence)
             if link.confidence < SURE:
                 reasons.append(f"that {link.source} {link.relation.replace('_', ' ')} it: {evidence(link)}")
-        if (other := (more or {}).get(node.id)) is not None:
-            share, reasons = min(share, other.share), [*reasons, *other.reasons]
-        found[node.id] = Trust(share, tuple(reasons))
-    return found
+        if (further := (more or {}).get(node.id)) is not None:
+            share, reasons = min(share, further.share), [*reasons, *further.reasons]
+        trusts[node.id] = Trust(share, tuple(reasons))
+    return trusts
 
 
 def draw_graph(
@@ -77,9 +77,9 @@ def draw_graph(
         ("boxes", [node for node in boxed if node.node_type != "layout"]),
         ("boxes_of_layout", [node for node in boxed if node.node_type == "layout"]),
     ):
-        found = [node.box for node in group if node.box is not None]
+        node_boxes = [node.box for node in group if node.box is not None]
         if boxes or path != "boxes":
-            canvas.boxes(path, found, [node.id for node in group], [_color(node) for node in group])
+            canvas.boxes(path, node_boxes, [node.id for node in group], [_color(node) for node in group])
     for node in boxed:
         if node.box is not None:
             corners = box_corners(node.box)

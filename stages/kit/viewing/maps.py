@@ -72,7 +72,7 @@ def draw_map(
     vocabulary = load_vocabulary()
     of_class = {thing.instance: instance_color(vocabulary.by_name(thing.class_name).id) for thing in things}
     trust = {thing.instance: trust_color(thing.confidence) for thing in things}
-    parts = Parts(instances, {thing.instance: thing.name for thing in things})
+    instance_parts = Parts(instances, {thing.instance: thing.name for thing in things})
     layers = {
         "color": None,
         "instance": instance_colors(instances),
@@ -80,7 +80,7 @@ def draw_map(
         "trust": painted(instances, trust),
     }
     for name, colors in layers.items():
-        canvas.mesh(name, mesh, colors, front_only=True, parts=parts)
+        canvas.mesh(name, mesh, colors, front_only=True, parts=instance_parts)
     for view, layer in (("by instance", "instance"), ("colour", "color"), ("by class", "class"), ("by trust", "trust")):
         without = ("boxes",) if layer in ("color", "trust") else ()
         canvas.view(view, *(name for name in layers if name != layer), *without, *hidden)

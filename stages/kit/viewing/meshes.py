@@ -22,8 +22,8 @@ def load_mesh(path: Path) -> trimesh.Trimesh:
 
 def merged(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Return several meshes (at least one) as one."""
-    whole: Any = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
-    return whole
+    combined: Any = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
+    return combined
 
 
 def draw_solid(path: str, box: Box, color: Color, canvas: Canvas) -> None:

@@ -32,7 +32,7 @@ def draw_scene_with_graph(scene: InteractiveScene, cad_scene: CadSceneFile | Non
 def trust_of_models(cad_scene: CadSceneFile) -> dict[str, Trust]:
     """Return how far what stands for the nodes can be trusted: a model by how near it lies to what was seen and by the
     grounds for its joints, a scanned mesh only for what was seen of it."""
-    found = {}
+    trusts = {}
     for replacement in cad_scene.replacements:
         share, reasons = 1.0, []
         if replacement.decision == "mesh":
@@ -46,8 +46,8 @@ def trust_of_models(cad_scene: CadSceneFile) -> dict[str, Trust]:
             names = ", ".join(sorted(replacement.held))
             share, reasons = min(share, 0.5), [*reasons, f"nothing in the map speaks for its joints: {names}"]
         if replacement.decision != "layout":
-            found[replacement.node] = Trust(share, tuple(reasons))
-    return found
+            trusts[replacement.node] = Trust(share, tuple(reasons))
+    return trusts
 
 
 def draw_scene_folder(
@@ -99,8 +99,8 @@ def draw_settling(scene: InteractiveScene, canvas: Canvas, prefix: str = "scene"
                 canvas.transform(_path(link, shell, prefix), moved @ drawn[link])
         if body.leaves is not None:
             fate = "falls through the floor" if body.fell_through else "does not stay"
-            said = f"{body.name} {fate}: {1000 * body.moved:.0f} mm, {np.degrees(body.turned):.0f} degrees in the end"
-            canvas.moment(body.leaves, said, bad=True)
+            text = f"{body.name} {fate}: {1000 * body.moved:.0f} mm, {np.degrees(body.turned):.0f} degrees in the end"
+            canvas.moment(body.leaves, text, bad=True)
     canvas.always()
     canvas.moment(0.0, "let go")
     for trouble in settling.troubles:
@@ -119,7 +119,7 @@ def jointed_links(urdf: Urdf, values: Mapping[str, float], paths: Mapping[str, s
     children: dict[str, list[UrdfJoint]] = {}
     for joint in urdf.joints:
         children.setdefault(joint.parent, []).append(joint)
-    found = [JointedLink(path_of[root], "", np.eye(4)) for root in urdf.roots()]
+    links = [JointedLink(path_of[root], "", np.eye(4)) for root in urdf.roots()]
     waiting = list(urdf.roots())
     while waiting:
         parent = waiting.pop(0)
@@ -129,7 +129,7 @@ def jointed_links(urdf: Urdf, values: Mapping[str, float], paths: Mapping[str, s
                 kind = "turning"
             elif joint.type == "prismatic":
                 kind = "sliding"
-            found.append(
+            links.append(
                 JointedLink(
                     path_of[joint.child],
                     path_of[parent],
@@ -143,4 +143,4 @@ def jointed_links(urdf: Urdf, values: Mapping[str, float], paths: Mapping[str, s
                 )
             )
             waiting.append(joint.child)
-    return found
+    return links

@@ -22,7 +22,9 @@ from scenewright.stages.library.design import (
 from scenewright.stages.library.families.storage import GAP
 
 WHITE = Paint((242, 244, 246), 220.0)
+"""White liner of appliances: colour, and density [kg/m^3]; by eye."""
 SHELF_GLASS = Paint((206, 222, 226), 2400.0)
+"""Glass of shelves and turntables: density [kg/m^3]; by eye."""
 
 
 def _hollow(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], wall: float) -> list[Solid]:

@@ -90,10 +90,10 @@ def tray(random: np.random.Generator, style: int) -> Design:
             pieces += painted(paint.darker(0.85), box((x[0] - 0.003, x[1] + 0.003), grip, (rim + 0.035, rim + 0.05)))
         else:
             metal, out = STEEL.sample(random), sign * (long + 0.03)
-            near, height = sign * long, 0.6 * rim
+            near_end, height = sign * long, 0.6 * rim
             pieces += painted(metal, bar(np.array([out, -0.05, height]), np.array([out, 0.05, height]), 0.005, count=8))
             for end in (-0.05, 0.05):
                 pieces += painted(
-                    metal, bar(np.array([near, end, height]), np.array([out, end, height]), 0.0045, count=8)
+                    metal, bar(np.array([near_end, end, height]), np.array([out, end, height]), 0.0045, count=8)
                 )
     return Design("tray", tuple(pieces), recipe={"style": kind})

@@ -7,7 +7,9 @@ from scenewright.stages.kit.geometry.solids import Solid, bar, box, cylinder, hu
 from scenewright.stages.library.design import CERAMIC, GLASS, PLASTIC, STEEL, WOOD, Design, Paint, painted
 
 LEAVES = ((70, 120, 60), (58, 104, 66), (96, 140, 70))
+"""Colours of leaves; by eye."""
 EARTH = Paint((74, 54, 40), 1100.0)
+"""Earth of a flower pot: density [kg/m^3]; by eye."""
 
 
 def _leaf(root: np.ndarray, turn: float, pitch: float, long: float, wide: float) -> Solid:

@@ -9,8 +9,9 @@ from scenewright.stages.kit.geometry.solids import Solid, bar, box, cylinder, hu
 from scenewright.stages.library.design import CERAMIC, DARK_PLASTIC, PLASTIC, STEEL, Design, Moving, Paint, painted
 
 SHEET = 2700.0
-"""Pans and pots: aluminium [kg/m^3]."""
+"""Density of the aluminium of pans and pots [kg/m^3]."""
 SIDES = 16
+"""Sides of a round dish or pan."""
 
 
 def arc_handle(middle: np.ndarray, outward: np.ndarray, reach: float, half: float, radius: float) -> list[Solid]:

@@ -9,7 +9,7 @@ from scenewright.stages.kit.geometry.solids import Solid, bar, box
 from scenewright.stages.library.design import Moving, Paint, Piece, bar_handle, painted
 
 GAP = 0.002
-"""Between what moves and what stays [m]."""
+"""Gap between what moves and what stays [m]; by eye."""
 KNOB_TURN = 4.7
 """Range of a knob [rad]: three quarters of a turn."""
 

@@ -82,8 +82,10 @@ def _upholstered_chair(random: np.random.Generator) -> Design:
     base = seat - 0.07
     solids = _four_legs(width, depth, base, leg, base + 0.10, 0.01)[:4]
     pad = cushion((-width / 2 - 0.01, width / 2 + 0.01), (-depth / 2 - 0.01, depth / 2), (base, seat), 0.015)
-    rest = _leaning_post((-width / 2, width / 2), depth / 2 - 0.05, (seat - 0.001, back), 0.05, lean)
-    return Design("chair", tuple(painted(wood, solids) + painted(fabric, pad, rest)), recipe={"style": "upholstered"})
+    back_rest = _leaning_post((-width / 2, width / 2), depth / 2 - 0.05, (seat - 0.001, back), 0.05, lean)
+    return Design(
+        "chair", tuple(painted(wood, solids) + painted(fabric, pad, back_rest)), recipe={"style": "upholstered"}
+    )
 
 
 def _panel_chair(random: np.random.Generator) -> Design:
@@ -145,8 +147,8 @@ def _swivel_chair(random: np.random.Generator) -> Design:
     pieces += painted(caster, box((-0.10, 0.10), (-0.10, 0.10), (seat - 0.10, seat - 0.08)))
     pieces += painted(fabric, cushion((-width / 2, width / 2), (-depth / 2, depth / 2), (seat - 0.08, seat), 0.025))
     pieces += painted(caster, box((-0.04, 0.04), (depth / 2, depth / 2 + 0.02), (seat - 0.06, seat + 0.22)))
-    rest = _leaning_post((-width / 2 + 0.02, width / 2 - 0.02), depth / 2 - 0.03, (seat + 0.10, back), 0.05, 0.05)
-    pieces += painted(fabric, rest)
+    back_rest = _leaning_post((-width / 2 + 0.02, width / 2 - 0.02), depth / 2 - 0.03, (seat + 0.10, back), 0.05, 0.05)
+    pieces += painted(fabric, back_rest)
     if random.random() < 0.6:
         for sign in (-1, 1):
             x = (sign * (width / 2 + 0.03) - 0.025, sign * (width / 2 + 0.03) + 0.025)

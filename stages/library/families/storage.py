@@ -11,10 +11,11 @@ from scenewright.stages.kit.geometry.solids import Solid, box
 from scenewright.stages.library.design import LACQUER, STEEL, WOOD, Design, Moving, Paint, bar_handle, painted
 
 GAP = 0.002
-"""Between a front and the carcass, and between neighbouring fronts [m]."""
+"""Gap between a front and the carcass, and between neighbouring fronts [m]; by eye."""
 HANDLE_RADIUS = 0.008
+"""Radius of a handle bar [m]; by eye."""
 STANDOFF = 0.05
-"""From the front's surface to the middle of the handle bar: a Panda finger (2 cm deep) fits behind it [m]."""
+"""Distance of the middle of the handle bar from the front [m]: a Panda finger (2 cm deep) fits behind it."""
 
 
 @dataclass(frozen=True)

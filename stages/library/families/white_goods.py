@@ -22,15 +22,17 @@ from scenewright.stages.library.families.appliances import WHITE, lined_chamber
 from scenewright.stages.library.families.parts import DEPTH_FROM_HEIGHT, GAP, Span, flap, knob, slide_out
 
 GLASS_CERAMIC = Paint((24, 26, 30), 2300.0)
+"""Glass ceramic of a hob: density [kg/m^3]; by eye."""
 SIDES = 16
+"""Sides of a drum or a round door."""
 
 
 def _hot_plates(x: Span, y: Span, top: float, paint: Paint) -> list[Piece]:
     """Four thin round plates on a hob."""
     plates = []
     for column, share in ((0, 0.25), (1, 0.75)):
-        for row, place in ((0, 0.28), (1, 0.74)):
-            at = (x[0] + share * (x[1] - x[0]), y[0] + place * (y[1] - y[0]))
+        for row, depth_share in ((0, 0.28), (1, 0.74)):
+            at = (x[0] + share * (x[1] - x[0]), y[0] + depth_share * (y[1] - y[0]))
             radius = (0.085, 0.105)[(row + column) % 2]
             plates += painted(paint, cylinder(radius, (top, top + 0.002), at, count=20))
     return plates
@@ -48,6 +50,7 @@ def _oven_door(x: Span, z: Span, paint: Paint, metal: Paint) -> Moving:
 
 
 SCREEN_GLASS = Paint(SCREEN.colors[0], 1400.0)
+"""Glass of an oven door: density [kg/m^3]; by eye."""
 
 
 def oven(random: np.random.Generator, style: int) -> Design:
@@ -235,9 +238,9 @@ def _drum(middle: tuple[float, float], radius: float, y: Span, paint: Paint) -> 
         [(wide, collar + 0.02), (wide, deep)], [(wide + 0.006, collar + 0.02), (wide + 0.006, deep)], count=SIDES
     )
     wedges.append(cylinder(wide + 0.006, (deep, deep + 0.008), count=SIDES))
-    place = DEPTH_FROM_HEIGHT.copy()
-    place[:3, 3] = (middle[0], y[0], middle[1])
-    pieces = painted(paint, [solid.moved(place) for solid in wedges])
+    pose = DEPTH_FROM_HEIGHT.copy()
+    pose[:3, 3] = (middle[0], y[0], middle[1])
+    pieces = painted(paint, [solid.moved(pose) for solid in wedges])
     low = middle[1] - wide * np.cos(np.pi / SIDES)
     strip = 0.5 * wide
     return pieces + painted(
@@ -250,9 +253,9 @@ def _round_door(middle: tuple[float, float], radius: float, paint: Paint, dark: 
     rim, thick, standoff = 1.22 * radius, 0.03, 0.045
     back = -GAP
     ring = shell([(0.82 * radius, 0.0), (0.82 * radius, thick)], [(rim, 0.0), (rim, thick)], count=SIDES)
-    place = DEPTH_FROM_HEIGHT.copy()
-    place[:3, 3] = (middle[0], back - thick, middle[1])
-    pieces = painted(paint.darker(0.93), [solid.moved(place) for solid in ring])
+    pose = DEPTH_FROM_HEIGHT.copy()
+    pose[:3, 3] = (middle[0], back - thick, middle[1])
+    pieces = painted(paint.darker(0.93), [solid.moved(pose) for solid in ring])
     pane = np.array([middle[0], back - 0.6 * thick, middle[1]])
     pieces += painted(Paint(dark.color, 1200.0), bar(pane, pane + [0, 0.012, 0], 0.84 * radius, count=SIDES))
     handle = np.array([middle[0] + 0.5 * (rim + 0.84 * radius), back - thick - standoff, middle[1]])

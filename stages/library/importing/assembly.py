@@ -41,17 +41,18 @@ CONTAINERS = {
 WIDEST_GRASP = 0.08
 """Opening of a two-finger gripper [m]."""
 LARGEST_MASS = 1000.0
-"""[kg]; larger ones are questioned, and none is assumed to be larger."""
+"""Largest usual mass [kg]: larger ones are questioned, and none is assumed to be larger."""
 HEAVIEST_MODEL = 1e9
-"""[kg]; nothing is taken that says it is heavier."""
+"""Mass [kg] from which on a model is refused."""
 LIGHTEST, HEAVIEST = 5.0, 12000.0
 """Mean density over the collision pieces [kg/m^3]."""
 MOST_STATES_OF = 12
 """Joints that get states of their own."""
 MOST_PIECES = 1500
-"""Collision pieces of all parts."""
+"""Most collision pieces of all parts of a model."""
 MOST_SECTIONS, MOST_SECTIONS_CLOSED = 100_000, 30_000
-"""Of pieces with planes, in all states and in the closed one. An oven of 48 pieces and 20 states takes 20,000."""
+"""Most sections of pieces with planes, in all states and in the closed one. An oven of 48 pieces and 20 states takes
+20,000."""
 
 
 @dataclass(frozen=True)
@@ -137,26 +138,26 @@ def _rounded(joint: Joint) -> Joint:
 
 
 def _unique_names(joints: Sequence[Joint]) -> list[Joint]:
-    found: dict[str, Joint] = {}
+    by_name: dict[str, Joint] = {}
     for joint in joints:
         name, number = joint.name, 1
-        while name in found:
+        while name in by_name:
             number += 1
             name = f"{joint.name}_{number}"
-        found[name] = joint.model_copy(update={"name": name})
-    return list(found.values())
+        by_name[name] = joint.model_copy(update={"name": name})
+    return list(by_name.values())
 
 
 def _geometries(parts: Sequence[Part], density: float, findings: list[str]) -> list[PartGeometry]:
     volumes = [sum(volume(piece) for piece in part.pieces) for part in parts]
-    given = [part.mass for part in parts]
-    if any(mass is not None for mass in given):
-        known = sum(mass for mass in given if mass is not None)
-        covered = sum(v for v, mass in zip(volumes, given, strict=True) if mass is not None)
-        if not 0 < known < HEAVIEST_MODEL:
-            raise BadInput(f"mass of {known:.3g} kg")
-        mean = known / covered
-        masses = [mean * v if mass is None else mass for v, mass in zip(volumes, given, strict=True)]
+    stated_masses = [part.mass for part in parts]
+    if any(mass is not None for mass in stated_masses):
+        stated_mass = sum(mass for mass in stated_masses if mass is not None)
+        covered = sum(v for v, mass in zip(volumes, stated_masses, strict=True) if mass is not None)
+        if not 0 < stated_mass < HEAVIEST_MODEL:
+            raise BadInput(f"mass of {stated_mass:.3g} kg")
+        mean = stated_mass / covered
+        masses = [mean * v if mass is None else mass for v, mass in zip(volumes, stated_masses, strict=True)]
     else:
         density = min(density, LARGEST_MASS / sum(volumes))
         masses = [density * v for v in volumes]
@@ -165,19 +166,21 @@ def _geometries(parts: Sequence[Part], density: float, findings: list[str]) -> l
     if sum(masses) > LARGEST_MASS or not LIGHTEST <= mean_density <= HEAVIEST:
         findings.append(f"mass of {sum(masses):.3g} kg ({mean_density:.2g} kg/m3) is unusual")
     result = []
-    for part, mass, whole in zip(parts, masses, volumes, strict=True):
+    for part, mass, part_volume in zip(parts, masses, volumes, strict=True):
         origin = np.zeros(3) if part.joint is None else np.asarray(part.joint.origin)
         pieces = [piece.shifted(*(-origin)) for piece in part.pieces]
-        properties = mass_properties(pieces, [mass / whole] * len(pieces))
+        properties = mass_properties(pieces, [mass / part_volume] * len(pieces))
         patches, colors = painted(part.surfaces, origin)
         plain = [colors[0]] * len(pieces)
         result.append(PartGeometry(part.name, pieces, plain, properties, patches, colors))
     return result
 
 
-def _state(parts: Sequence[Part], joints: Sequence[Joint], values: dict[str, float], sections: Sections) -> ModelState:
-    solids, points = list(parts[0].pieces), [surface.vertices for surface in parts[0].surfaces]
-    for part, joint in zip(parts[1:], joints, strict=True):
+def _state(
+    geometry: Sequence[Part], joints: Sequence[Joint], values: dict[str, float], sections: Sections
+) -> ModelState:
+    solids, points = list(geometry[0].pieces), [surface.vertices for surface in geometry[0].surfaces]
+    for part, joint in zip(geometry[1:], joints, strict=True):
         moved = motion(joint, values[joint.name])
         solids += [piece.moved(moved) for piece in part.pieces]
         points += [apply(moved, surface.vertices) for surface in part.surfaces]

@@ -15,9 +15,11 @@ from scenewright.schemas.vocabulary import load_vocabulary
 DATA = Path(__file__).resolve().parents[3] / "data"
 TABLE_FILE, WORDS_FILE = "imported_models.toml", "labels/words.toml"
 LONGEST_PHRASE = 4
+"""Most words of a phrase that names a class."""
 LONGEST_NAME = 400
 """Characters of a name that are looked at: its end, where English puts the thing."""
 SHORTEST_ENDING = 3
+"""Fewest letters of a class name that is recognised as the ending of a word; by eye."""
 FILLERS = re.compile(r"(?:root|body|link|main|model|mesh|base)$")
 SPLIT = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
@@ -54,20 +56,24 @@ def import_table() -> ImportTable:
 @cache
 def phrases() -> dict[str, str]:
     """Return phrase (lower case, blanks between words) -> class of the vocabulary; things only."""
-    things = [entry for entry in load_vocabulary().classes if entry.kind == "thing"]
-    names = {entry.name for entry in things}
-    found: dict[str, str] = {}
+    thing_classes = [entry for entry in load_vocabulary().classes if entry.kind == "thing"]
+    names = {entry.name for entry in thing_classes}
+    class_of_phrase: dict[str, str] = {}
     for row in tomllib.loads((DATA / WORDS_FILE).read_text(encoding="utf-8"))["labels"]:
         if row["class"] in names:
-            found.update(dict.fromkeys((row["name"], *row.get("also", ())), row["class"]))
+            class_of_phrase.update(dict.fromkeys((row["name"], *row.get("also", ())), row["class"]))
     for source in ("ade20k", "coco", "nyu40", "scannet"):
-        for entry in things:
-            found.update(dict.fromkeys(getattr(entry, source), entry.name))
+        for entry in thing_classes:
+            class_of_phrase.update(dict.fromkeys(getattr(entry, source), entry.name))
     for class_name, words in import_table().words.items():
-        found.update(dict.fromkeys(words, class_name))
-    found.update({entry.name.replace("_", " "): entry.name for entry in things if entry.name != "object"})
-    found.pop("object", None)
-    return {" ".join(words_of(phrase)): class_name for phrase, class_name in found.items() if words_of(phrase)}
+        class_of_phrase.update(dict.fromkeys(words, class_name))
+    class_of_phrase.update(
+        {entry.name.replace("_", " "): entry.name for entry in thing_classes if entry.name != "object"}
+    )
+    class_of_phrase.pop("object", None)
+    return {
+        " ".join(words_of(phrase)): class_name for phrase, class_name in class_of_phrase.items() if words_of(phrase)
+    }
 
 
 def words_of(name: str) -> list[str]:
@@ -81,23 +87,25 @@ def class_of(names: tuple[str, ...]) -> str | None:
     The longest known phrase wins, then the later one, as English puts the thing last (a TV cabinet is a cabinet). When
     no word is known, the ending of one counts (`hingecabinet`).
     """
-    known = phrases()
+    class_of_phrase = phrases()
     names = tuple(name[-LONGEST_NAME:] for name in names)
     for name in names:
         words = words_of(name)
         for length in range(min(LONGEST_PHRASE, len(words)), 0, -1):
             for start in range(len(words) - length, -1, -1):
                 phrase = " ".join(words[start : start + length])
-                found = known.get(phrase) or known.get(phrase.removesuffix("s"))
-                if found:
-                    return found
-    endings = sorted((p for p in known if " " not in p and len(p) >= SHORTEST_ENDING), key=lambda p: (-len(p), p))
+                class_name = class_of_phrase.get(phrase) or class_of_phrase.get(phrase.removesuffix("s"))
+                if class_name:
+                    return class_name
+    endings = sorted(
+        (p for p in class_of_phrase if " " not in p and len(p) >= SHORTEST_ENDING), key=lambda p: (-len(p), p)
+    )
     for name in names:
         for word in reversed(words_of(name)):
             bare = FILLERS.sub("", word)
             for ending in endings:
                 if bare.endswith(ending):
-                    return known[ending]
+                    return class_of_phrase[ending]
     return None
 
 

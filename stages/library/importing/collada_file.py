@@ -19,11 +19,15 @@ from scenewright.stages.library.importing.source_folder import long_row
 from scipy.spatial.transform import Rotation
 
 MOST_INDICES = 30_000_000
+"""Most numbers of a list in a file; a bound against damaged files."""
 MOST_INSTANCES = 20_000
+"""Most instances of geometries in a scene; a bound against damaged files."""
 MOST_STEPS = 2_000_000
 """Elements that are looked at, those of an instance each time that it is instanced."""
 DEEPEST_NODES = 60
+"""Deepest nesting of nodes; a bound against damaged files."""
 UP_AXES = {"X_UP": (1.0, 0.0, 0.0), "Y_UP": (0.0, 1.0, 0.0), "Z_UP": (0.0, 0.0, 1.0)}
+"""Up directions by the names that COLLADA gives them."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +98,8 @@ class _Reader:
                 raise BadInput(f"{self.where}: unit of {metres:g} m")
         patches: list[ColladaPatch] = []
         scenes = self.root.findall("library_visual_scenes/visual_scene")
-        shown = self._target(self.root.find("scene/instance_visual_scene"), "visual_scene")
-        for scene in [shown] if shown is not None else scenes[:1]:
+        visual_scene = self._target(self.root.find("scene/instance_visual_scene"), "visual_scene")
+        for scene in [visual_scene] if visual_scene is not None else scenes[:1]:
             for node in scene.findall("node"):
                 patches += self._node(node, np.eye(4), 0)
         if not scenes:
@@ -109,13 +113,13 @@ class _Reader:
         url = instance.get("url", "")
         return self.by_id.get((tag, url[1:])) if url.startswith("#") else None
 
-    def _numbers(self, text: str | None, what: str) -> np.ndarray:
+    def _numbers(self, text: str | None, subject: str) -> np.ndarray:
         try:
-            values = long_row(text or "", np.float64, MOST_INDICES, f"{self.where}: {what}")
+            values = long_row(text or "", np.float64, MOST_INDICES, f"{self.where}: {subject}")
         except ValueError:
-            raise BadInput(f"{self.where}: {what} holds what is no number") from None
+            raise BadInput(f"{self.where}: {subject} holds what is no number") from None
         if values.size == 0:
-            raise BadInput(f"{self.where}: {what} is empty")
+            raise BadInput(f"{self.where}: {subject} is empty")
         return values
 
     def _step(self, count: int) -> None:
@@ -131,7 +135,7 @@ class _Reader:
     def _transform(self, node: ElementTree.Element) -> np.ndarray:
         if id(node) in self.transforms:
             return self.transforms[id(node)]
-        whole = np.eye(4)
+        world_from_node = np.eye(4)
         for element in node:
             step = np.eye(4)
             if element.tag == "matrix":
@@ -153,9 +157,9 @@ class _Reader:
                     step[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
             elif element.tag in ("lookat", "skew"):
                 self.left_out.add(element.tag)
-            whole = whole @ step
-        self.transforms[id(node)] = whole
-        return whole
+            world_from_node = world_from_node @ step
+        self.transforms[id(node)] = world_from_node
+        return world_from_node
 
     def _node(self, node: ElementTree.Element, outer: np.ndarray, depth: int) -> Iterator[ColladaPatch]:
         self.instances += 1

@@ -29,6 +29,7 @@ SHELVES = {"meshes", "mesh", "visual", "collision", "textured_objs", "materials"
 """Folders that hold parts of models."""
 PART_OF_A_MODEL = re.compile(r"collision|vhacd|coacd|convex", re.IGNORECASE)
 MOST_MODELS = 20_000
+"""Most models of a folder; a bound, by eye."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
             if path.suffix.lower() in (*MESH_SUFFIXES, *DESCRIPTIONS):
                 yield Unread(folder.relative(path), "its name is no UTF-8 (rename it)")
             continue
-        for model in _described(folder, path, claimed):
+        for model in _read_claimed(folder, path, claimed):
             count += 1
             if count > MOST_MODELS:
                 raise BadInput(f"{folder.root}: more than {MOST_MODELS} models", hint="import its parts one by one")
@@ -69,7 +70,7 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
         count += 1
         if count > MOST_MODELS:
             raise BadInput(f"{folder.root}: more than {MOST_MODELS} models", hint="import its parts one by one")
-        yield _tried(folder, path, partial(read_loose_model, folder, path))
+        yield _try_to_read(folder, path, partial(read_loose_model, folder, path))
 
 
 @dataclass(frozen=True)
@@ -88,13 +89,13 @@ def _is_text(path: Path) -> bool:
     return True
 
 
-def _described(folder: SourceFolder, path: Path, claimed: _Claimed) -> Iterator[SourceModel | Unread]:
+def _read_claimed(folder: SourceFolder, path: Path, claimed: _Claimed) -> Iterator[SourceModel | Unread]:
     suffix = path.suffix.lower()
     if path.name == PARTNET_FILE:
         claimed.folders.add(path.parent)
-        yield _tried(folder, path, lambda: read_partnet_model(folder, path))
+        yield _try_to_read(folder, path, lambda: read_partnet_model(folder, path))
     elif suffix == ".urdf":
-        yield _tried(folder, path, lambda: read_urdf_model(folder, path))
+        yield _try_to_read(folder, path, lambda: read_urdf_model(folder, path))
     elif suffix in (".sdf", ".world"):
         yield from _several(folder, path, lambda: read_sdf_models(folder, path))
     elif suffix in (".xml", ".mjcf"):
@@ -110,7 +111,7 @@ def _described(folder: SourceFolder, path: Path, claimed: _Claimed) -> Iterator[
             return
         claimed.files.update(mesh for mesh, _ in rows)
         for mesh, row in rows:
-            yield _tried(folder, mesh, partial(read_shapenet_model, folder, mesh, row))
+            yield _try_to_read(folder, mesh, partial(read_shapenet_model, folder, mesh, row))
 
 
 def _whole_mjcf(folder: SourceFolder, path: Path) -> bool:
@@ -123,22 +124,22 @@ def _whole_mjcf(folder: SourceFolder, path: Path) -> bool:
         return False
 
 
-def _tried(folder: SourceFolder, path: Path, read: Callable[[], SourceModel]) -> SourceModel | Unread:
+def _try_to_read(folder: SourceFolder, path: Path, read_models: Callable[[], SourceModel]) -> SourceModel | Unread:
     try:
         with told_refusals(folder.relative(path)):
-            return read()
+            return read_models()
     except BadInput as error:
         return Unread(folder.relative(path), str(error))
 
 
 def _several(
-    folder: SourceFolder, path: Path, read: Callable[[], Iterator[SourceModel]]
+    folder: SourceFolder, path: Path, read_models: Callable[[], Iterator[SourceModel]]
 ) -> Iterator[SourceModel | Unread]:
     models: Iterator[SourceModel] | None = None
     while True:
         try:
             with told_refusals(folder.relative(path)):
-                models = read() if models is None else models
+                models = read_models() if models is None else models
                 model = next(models, None)
         except BadInput as error:
             yield Unread(folder.relative(path), str(error))

@@ -9,6 +9,7 @@ from scenewright.stages.library.importing.classes import UsualSize
 from scenewright.stages.library.importing.source_model import Declared, Direction
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
+"""Metres a unit."""
 LIKELY_UNITS = ("m", "cm", "mm", "inch")
 AXES: dict[str, Direction] = {
     "+x": (1.0, 0.0, 0.0),
@@ -18,6 +19,7 @@ AXES: dict[str, Direction] = {
     "+z": (0.0, 0.0, 1.0),
     "-z": (0.0, 0.0, -1.0),
 }
+"""Unit directions by the names that options give them."""
 SMALLEST_THING, LARGEST_THING = 0.01, 10.0
 """Largest extent of things of any class [m]."""
 Y_UP, Z_UP = AXES["+y"], AXES["+z"]
@@ -57,8 +59,8 @@ def choose(unit: Declared, up: Declared, points: np.ndarray, usual: UsualSize | 
             unit_origin = "guessed" if fitting[0][0] != taken_unit else unit_origin
             up_origin = "guessed" if fitting[0][1] != taken_up else up_origin
             taken_unit, taken_up = fitting[0]
-            taken = f"{unit_name(taken_unit)}, {axis_name(taken_up)} up"
-            findings.append(f"nothing declares its {_what(unit, up)}: {taken} make its size usual")
+            choice_words = f"{unit_name(taken_unit)}, {axis_name(taken_up)} up"
+            findings.append(f"nothing declares its {_what(unit, up)}: {choice_words} make its size usual")
     size = size_under(points, taken_unit, taken_up)
     if usual is None and not SMALLEST_THING <= float(size.max()) <= LARGEST_THING:
         findings.append(f"size {size_text(size)} is unusual for anything in a room (--unit)")
@@ -79,9 +81,9 @@ def _better(points: np.ndarray, unit: float, up: Direction, usual: UsualSize) ->
     for name in LIKELY_UNITS:
         if UNITS[name] != unit and usual.fits(size_under(points, UNITS[name], up)):
             return f"; in {name} it would be usual (--unit {name})"
-    for other in (Z_UP, Y_UP):
-        if other != up and usual.fits(size_under(points, unit, other)):
-            return f"; with {axis_name(other)} up it would be usual (--up {axis_name(other)})"
+    for other_up in (Z_UP, Y_UP):
+        if other_up != up and usual.fits(size_under(points, unit, other_up)):
+            return f"; with {axis_name(other_up)} up it would be usual (--up {axis_name(other_up)})"
     return ""
 
 
@@ -115,8 +117,8 @@ def model_rotation(up: Direction, front: Direction | None) -> np.ndarray:
 
 def _clean(rotation: np.ndarray) -> np.ndarray:
     """Return the rotation with entries next to -1, 0 and 1 made exact: most models lie along their axes."""
-    whole = np.round(rotation)
-    return np.where(np.abs(rotation - whole) < 1e-9, whole, rotation) + 0.0
+    rounded = np.round(rotation)
+    return np.where(np.abs(rotation - rounded) < 1e-9, rounded, rotation) + 0.0
 
 
 def unit_name(unit: float) -> str:

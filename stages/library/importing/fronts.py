@@ -25,30 +25,30 @@ def told_front(parts: Sequence[Part], class_name: str) -> tuple[Direction, str] 
     middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9)
     total = np.zeros(2)
     for part in parts[1:]:
-        own = np.concatenate([surface.vertices for surface in part.surfaces])
-        least, most = own.min(axis=0), own.max(axis=0)
+        vertices = np.concatenate([surface.vertices for surface in part.surfaces])
+        least, most = vertices.min(axis=0), vertices.max(axis=0)
         weight = float(np.linalg.norm(most - least))
-        out = _drawn_out(part, most - least)
+        out = _drawer_direction(part, most - least)
         total += weight * (((0.5 * (least + most) - middle) / half)[:2] if out is None else out)
     weights = sum(
         float(np.linalg.norm(np.ptp(np.concatenate([s.vertices for s in p.surfaces]), axis=0))) for p in parts[1:]
     )
     if weights > 0:
-        found = _dominant(total / weights)
-        if found is not None:
-            return found, "joints"
+        front = _dominant(total / weights)
+        if front is not None:
+            return front, "joints"
     if class_name in BACKED:
         centers, areas = _face_centers(parts)
         upper = centers[:, 2] > low[2] + 0.7 * (high[2] - low[2])
         if areas[upper].sum() > 0:
             back = np.average(centers[upper], axis=0, weights=areas[upper])
-            found = _dominant(-((back - middle) / half)[:2])
-            if found is not None:
-                return found, "back rest"
+            front = _dominant(-((back - middle) / half)[:2])
+            if front is not None:
+                return front, "back rest"
     return None
 
 
-def _drawn_out(part: Part, size: np.ndarray) -> np.ndarray | None:
+def _drawer_direction(part: Part, size: np.ndarray) -> np.ndarray | None:
     """Return the horizontal direction (2,) in which a drawer of this size (3,) comes out; None for other parts.
 
     A sliding door slides too, but it is thin across its way.
@@ -56,8 +56,8 @@ def _drawn_out(part: Part, size: np.ndarray) -> np.ndarray | None:
     joint = part.joint
     if joint is None or joint.type != "prismatic" or abs(joint.axis[2]) > DRAWER_LEVEL:
         return None
-    way = np.abs(np.asarray(joint.axis[:2]))
-    along, across = float(size[:2] @ way), float(size[:2] @ way[::-1])
+    direction = np.abs(np.asarray(joint.axis[:2]))
+    along, across = float(size[:2] @ direction), float(size[:2] @ direction[::-1])
     return np.asarray(joint.axis[:2]) if across > DRAWER_WIDTH * along else None
 
 

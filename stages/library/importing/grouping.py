@@ -52,22 +52,22 @@ def grouped(source: SourceModel) -> tuple[list[Group], list[str]]:
     members: dict[str, list[tuple[SourceLink, np.ndarray]]] = {roots[0]: [(links[roots[0]], np.eye(4))]}
     heads: dict[str, tuple[SourceJoint, np.ndarray]] = {}
     waiting = [(roots[0], roots[0], np.eye(4))]
-    seen = {roots[0]}
+    reached = {roots[0]}
     while waiting:
         name, head, root_from_link = waiting.pop(0)
         for joint in children.get(name, []):
             pose = root_from_link @ joint.parent_from_child
-            own = _kept(joint, findings)
-            if own is not None and head != roots[0]:
+            own_joint = _moving_joint(joint, findings)
+            if own_joint is not None and head != roots[0]:
                 findings.append(f"joint {joint.name!r:.40} moves on a part that moves: held fast")
-                own = None
-            group = head if own is None else joint.child
-            if own is not None:
-                heads[group] = (own, pose)
+                own_joint = None
+            group = head if own_joint is None else joint.child
+            if own_joint is not None:
+                heads[group] = (own_joint, pose)
             members.setdefault(group, []).append((links[joint.child], pose))
-            seen.add(joint.child)
+            reached.add(joint.child)
             waiting.append((joint.child, group, pose))
-    if len(seen) < len(links):
+    if len(reached) < len(links):
         raise BadInput(f"{where}: joints lead in a circle")
     groups = [Group(BODY, tuple(members[roots[0]]))]
     for head, (joint, pose) in heads.items():
@@ -75,7 +75,7 @@ def grouped(source: SourceModel) -> tuple[list[Group], list[str]]:
     return groups, findings
 
 
-def _kept(joint: SourceJoint, findings: list[str]) -> SourceJoint | None:
+def _moving_joint(joint: SourceJoint, findings: list[str]) -> SourceJoint | None:
     """Return the joint as one that moves, or None for one that does not."""
     if joint.kind in ("fixed", "floating"):
         return None

@@ -18,13 +18,13 @@ HANDLE = re.compile(r"handle|grip|knob|pull", re.IGNORECASE)
 def with_handle(joint: Joint, group: Group, visual: Sequence[Surface], model_from_root: np.ndarray) -> Joint:
     """Return the joint with the place where its part is grasped, when a shape, a link or a mark is called so."""
     points: np.ndarray | None = None
-    named = [surface.vertices for surface in visual if HANDLE.search(surface.name)]
+    named_surfaces = [surface.vertices for surface in visual if HANDLE.search(surface.name)]
     for link, pose in group.links:
         if link is not group.links[0][0] and HANDLE.search(f"{link.name} {link.role}"):
-            named += [apply(model_from_root @ pose, s.vertices) for s in link.visual or link.collision]
+            named_surfaces += [apply(model_from_root @ pose, s.vertices) for s in link.visual or link.collision]
     middle = None
-    if named:
-        points = np.concatenate(named)
+    if named_surfaces:
+        points = np.concatenate(named_surfaces)
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     else:
         marks = [
@@ -32,8 +32,8 @@ def with_handle(joint: Joint, group: Group, visual: Sequence[Surface], model_fro
         ]
         if marks:
             middle = next((at for name, at in marks if HANDLE.search(name)), marks[0][1])
-            near = [s.vertices for s in visual if _reaches(s.vertices, middle, 0.01)]
-            points = min(near, key=lambda v: float(np.prod(np.ptp(v, axis=0)))) if near else None
+            near_surfaces = [s.vertices for s in visual if _reaches(s.vertices, middle, 0.01)]
+            points = min(near_surfaces, key=lambda v: float(np.prod(np.ptp(v, axis=0)))) if near_surfaces else None
     if middle is None:
         return joint
     direction = None

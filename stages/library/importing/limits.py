@@ -20,16 +20,17 @@ from scipy.spatial import QhullError
 from shapely.errors import ShapelyError
 
 MOST_TRIANGLES = 1_000_000
-"""Of a model, repeated meshes counted each time, and of a mesh file."""
+"""Most triangles of a model, repeated meshes counted each time, and of a mesh file."""
 MOST_VERTICES = 3 * MOST_TRIANGLES
+"""Most vertices of a model: as many as triangles without shared corners have."""
 MOST_SHAPES = 20_000
 """Boxes, meshes and groups of meshes of a model."""
 MOST_TRIANGLES_OF_A_FILE = 5 * MOST_TRIANGLES
-"""Of all models that one description holds."""
+"""Most triangles of all models that one description holds."""
 MOST_FINDINGS = 40
-"""What is said of one model."""
+"""Most findings that are kept of one model."""
 LONGEST_TEXT = 300
-"""Characters of a name or a finding."""
+"""Longest name or finding [characters]."""
 SIMPLIFY = f"simplify it to at most {MOST_TRIANGLES} triangles and {MOST_SHAPES} shapes, or split it"
 REFUSALS = (
     *(ArithmeticError, RecursionError, ValueError, QhullError, ShapelyError),
@@ -62,7 +63,7 @@ class Allowance:
         self, where: str, *, triangles: int = MOST_TRIANGLES, vertices: int = MOST_VERTICES, shapes: int = MOST_SHAPES
     ) -> None:
         self._where, self._bounds = where, (triangles, vertices, shapes)
-        self._left = list(self._bounds)
+        self._remaining = list(self._bounds)
 
     def take(self, surfaces: Sequence[Surface]) -> None:
         """Count surfaces. Raises BadInput."""
@@ -72,10 +73,10 @@ class Allowance:
     def take_counts(self, triangles: int, vertices: int, shapes: int = 1) -> None:
         """Count triangles and vertices of shapes before they are made. Raises BadInput."""
         for k, count in enumerate((triangles, vertices, shapes)):
-            self._left[k] -= count
-            if self._left[k] < 0:
-                what = ("triangles", "vertices", "shapes")[k]
-                raise BadInput(f"{self._where}: more than {self._bounds[k]} {what} in all", hint=SIMPLIFY)
+            self._remaining[k] -= count
+            if self._remaining[k] < 0:
+                counted = ("triangles", "vertices", "shapes")[k]
+                raise BadInput(f"{self._where}: more than {self._bounds[k]} {counted} in all", hint=SIMPLIFY)
 
 
 def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:

@@ -15,10 +15,13 @@ from scenewright.stages.library.importing.source_folder import SourceFolder, num
 from scenewright.stages.library.importing.source_model import Declared, Direction, SourceLink, SourceModel
 
 LARGEST_TABLE = 64 * 2**20
+"""Largest metadata.csv [bytes]; a bound, by eye."""
 LARGEST_HEADER = 64 * 2**10
+"""Bytes of a table that are read to find its header; by eye."""
 SHAPENET_COLUMNS = {"fullId", "category", "up", "front", "unit"}
 SHAPENET_READ = SHAPENET_COLUMNS | {"name", "isContainerLike"}
 SHAPENET_UP: Direction = (0.0, 0.0, 1.0)
+"""Up direction of ShapeNetSem where a cell is empty (its README)."""
 SHAPENET_FRONT: Direction = (0.0, -1.0, 0.0)
 """What an empty cell of metadata.csv means (ShapeNetSem's README)."""
 BODY = "body"
@@ -27,9 +30,9 @@ BODY = "body"
 def read_loose_model(folder: SourceFolder, path: Path) -> SourceModel:
     """Return a single mesh file as a rigid model. Raises BadInput."""
     content = read_mesh_file(folder, path)
-    place = [path.stem]
+    words = [path.stem]
     if path.parent != folder.root:
-        place.append(path.parent.name)
+        words.append(path.parent.name)
     return SourceModel(
         name=path.stem,
         source=folder.relative(path),
@@ -37,7 +40,7 @@ def read_loose_model(folder: SourceFolder, path: Path) -> SourceModel:
         links=(SourceLink(BODY, content.surfaces),),
         unit=content.unit,
         up=content.up,
-        words=tuple(place),
+        words=tuple(words),
         findings=content.findings,
     )
 
@@ -64,20 +67,20 @@ def shapenet_rows(folder: SourceFolder, table: Path) -> list[tuple[Path, dict[st
     Raises BadInput.
     """
     rows = []
-    seen: set[str] = set()
+    identities: set[str] = set()
     try:
         lines = _table(folder.read(table, LARGEST_TABLE))
         names = next(lines, [])
         for cells in lines:
             row = {key: value for key, value in zip(names, cells, strict=False) if key in SHAPENET_READ}
             identity = row.get("fullId", "").rpartition(".")[2]
-            if identity in seen:
+            if identity in identities:
                 continue
-            seen.add(identity)
+            identities.add(identity)
             for name in (f"models/{identity}.obj", f"models-OBJ/models/{identity}.obj", f"{identity}.obj"):
                 path = table.parent / name
-                if identity and path.is_file() and (found := folder.find(name, table.parent)) is not None:
-                    rows.append((found, row))
+                if identity and path.is_file() and (file := folder.find(name, table.parent)) is not None:
+                    rows.append((file, row))
                     break
     except csv.Error as error:
         raise BadInput(f"{table}: no table: {error}") from None

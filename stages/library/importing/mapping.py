@@ -17,6 +17,7 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.library.importing.source_model import SourceModel
 
 LARGEST_FILE = 4 * 2**20
+"""Largest mapping file [bytes]; a bound, by eye."""
 MOST_PATTERNS = 1000
 """Each of them is held against each model; names without * and ? may be many."""
 LONGEST_NAME = 1000
@@ -53,13 +54,13 @@ class Mapping(Model):
     def entry(self, source: SourceModel) -> Entry:
         """Return what is said about a model."""
         of_model = (source.name[:LONGEST_NAME], source.source[:LONGEST_NAME])
-        found = min((self._names[name] for name in of_model if name in self._names), default=len(self.models))
-        for place, pattern in self.patterns:
-            if place >= found:
+        best = min((self._names[name] for name in of_model if name in self._names), default=len(self.models))
+        for position, pattern in self.patterns:
+            if position >= best:
                 break
             if any(fnmatchcase(name, pattern) for name in of_model):
-                found = place
-        entry = next(itertools.islice(self.models.values(), found, None), "")
+                best = position
+        entry = next(itertools.islice(self.models.values(), best, None), "")
         return Entry(class_name=entry) if isinstance(entry, str) else entry
 
 

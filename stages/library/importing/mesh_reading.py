@@ -25,12 +25,17 @@ from scenewright.stages.library.importing.source_model import Declared, Surface,
 
 MESH_SUFFIXES = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
 LARGEST_MATERIALS = 16 * 2**20
+"""Most bytes of all material files of a mesh; a bound, by eye."""
 MOST_MATERIAL_FILES = 100
+"""Most material files of a mesh that are looked at; a bound, by eye."""
 MOST_KEPT_FILES = 1000
+"""Most mesh files that are kept in memory; by eye."""
 MOST_LINES = 20_000_000
+"""Most lines of an OBJ file; a bound, by eye."""
 LONGEST_LINE = 1 << 20
 """Characters of a line of an OBJ file."""
 Y_UP = (0.0, 1.0, 0.0)
+"""Up direction of mesh formats that have y upwards, as the specification of glTF says."""
 HINT = "export it again"
 
 
@@ -54,19 +59,19 @@ def read_mesh_file(folder: SourceFolder, path: Path) -> MeshContent:
 
     The last files are kept, as descriptions name the same file again and again.
     """
-    kept = folder.kept_meshes
-    if path not in kept:
+    cache = folder.kept_meshes
+    if path not in cache:
         try:
-            found: MeshContent | BadInput = _read_mesh_file(folder, path)
+            content_or_error: MeshContent | BadInput = _read_mesh_file(folder, path)
         except BadInput as error:
-            found = error
-        size = 0 if isinstance(found, BadInput) else found.triangles
-        while kept and size + sum(c.triangles for c in kept.values() if isinstance(c, MeshContent)) > MOST_TRIANGLES:
-            del kept[next(iter(kept))]
-        if len(kept) > MOST_KEPT_FILES:
-            kept.clear()
-        kept[path] = found
-    content = kept[path]
+            content_or_error = error
+        size = 0 if isinstance(content_or_error, BadInput) else content_or_error.triangles
+        while cache and size + sum(c.triangles for c in cache.values() if isinstance(c, MeshContent)) > MOST_TRIANGLES:
+            del cache[next(iter(cache))]
+        if len(cache) > MOST_KEPT_FILES:
+            cache.clear()
+        cache[path] = content_or_error
+    content = cache[path]
     if isinstance(content, BadInput):
         raise BadInput(content.message, hint=content.hint)
     assert isinstance(content, MeshContent)
@@ -165,15 +170,15 @@ def _read_obj(folder: SourceFolder, path: Path) -> MeshContent:
     triangle_count = 0
     try:
         for line in _lines(data, path):
-            word, _, rest = line.strip().partition(" ")
+            word, _, arguments = line.strip().partition(" ")
             if word == "v":
-                x, y, z = (float(number) for number in rest.split()[:3])
+                x, y, z = (float(number) for number in arguments.split()[:3])
                 vertices.extend((x, y, z))
             elif word == "vt":
-                u, v = (float(number) for number in (rest.split() + ["0"])[:2])
+                u, v = (float(number) for number in (arguments.split() + ["0"])[:2])
                 texture.extend((u, v))
             elif word == "f":
-                corners = [part.split("/") for part in rest.split()]
+                corners = [part.split("/") for part in arguments.split()]
                 at = [_index(corner[0], len(vertices) // 3) for corner in corners]
                 mapped = [_index(c[1], len(texture) // 2) if len(c) > 1 and c[1] else -1 for c in corners]
                 block = blocks.setdefault((material, group), _Block(array("q"), array("q")))
@@ -185,11 +190,11 @@ def _read_obj(folder: SourceFolder, path: Path) -> MeshContent:
                     most = f"{MOST_TRIANGLES} triangles or {MOST_SHAPES} groups"
                     raise BadInput(f"{path}: more than {most}", hint=SIMPLIFY)
             elif word == "usemtl":
-                material = rest.strip()
+                material = arguments.strip()
             elif word in ("g", "o"):
-                group = rest.strip()
+                group = arguments.strip()
             elif word == "mtllib":
-                libraries[rest.strip()] = None
+                libraries[arguments.strip()] = None
             if len(vertices) > 3 * MOST_VERTICES or len(texture) > 2 * MOST_VERTICES:
                 raise BadInput(f"{path}: more than {MOST_VERTICES} vertices", hint=SIMPLIFY)
     except (ValueError, IndexError) as error:
@@ -232,27 +237,27 @@ def _read_materials(
     """Return material -> (diffuse colour, name of its picture) of the MTL files that can be found."""
     materials: dict[str, tuple[tuple[float, float, float] | None, str | None]] = {}
     found_files = dict.fromkeys(folder.find(name, path.parent) for name in libraries[:MOST_MATERIAL_FILES])
-    left = LARGEST_MATERIALS
-    for found in found_files:
-        if found is None:
+    remaining_bytes = LARGEST_MATERIALS
+    for file in found_files:
+        if file is None:
             continue
         current = ""
-        data = folder.read(found, left)
-        left -= len(data)
-        for line in _lines(data, found):
-            word, _, rest = line.strip().partition(" ")
+        data = folder.read(file, remaining_bytes)
+        remaining_bytes -= len(data)
+        for line in _lines(data, file):
+            word, _, arguments = line.strip().partition(" ")
             if word == "newmtl":
-                current = rest.strip()
+                current = arguments.strip()
                 materials.setdefault(current, (None, None))
             elif word == "Kd" and current:
                 try:
-                    red, green, blue = (float(x) for x in rest.split()[:3])
+                    red, green, blue = (float(x) for x in arguments.split()[:3])
                 except ValueError:
                     continue
                 if np.isfinite([red, green, blue]).all():
                     materials[current] = ((red, green, blue), materials[current][1])
-            elif word == "map_Kd" and current and rest.strip():
-                materials[current] = (materials[current][0], rest.split()[-1])
+            elif word == "map_Kd" and current and arguments.strip():
+                materials[current] = (materials[current][0], arguments.split()[-1])
     return materials
 
 
@@ -261,7 +266,7 @@ def _read_gltf(folder: SourceFolder, path: Path) -> MeshContent:
     data = folder.read(path)
     findings: list[str] = []
     if path.suffix.lower() == ".gltf":
-        data, findings = _packed(folder, path, data)
+        data, findings = _pack(folder, path, data)
     elif gltf_pixels(data, str(path), hint=HINT) > MOST_PIXELS:
         data = _without_pictures(data)
         findings.append(f"{path.name}: its pictures are too large, colours are those of the materials")
@@ -270,16 +275,16 @@ def _read_gltf(folder: SourceFolder, path: Path) -> MeshContent:
     return MeshContent(surfaces, Declared(1.0, "format"), Declared(Y_UP, "format"), tuple(findings))
 
 
-def _packed(folder: SourceFolder, path: Path, data: bytes) -> tuple[bytes, list[str]]:
+def _pack(folder: SourceFolder, path: Path, data: bytes) -> tuple[bytes, list[str]]:
     """Return a .gltf with its buffers as one GLB, pictures left out, and what has to be said about it."""
     findings: list[str] = []
     try:
         tree = gltf_tree(data)
-        parts, starts, length = [], [], 0
+        chunks, starts, length = [], [], 0
         for buffer in tree.get("buffers", []):
             starts.append(length)
             part = _buffer(folder, path, str(buffer["uri"]))[: whole_number(buffer["byteLength"])]
-            parts += [part, b"\0" * (-len(part) % 4)]
+            chunks += [part, b"\0" * (-len(part) % 4)]
             length += len(part) + -len(part) % 4
             if length > LARGEST_FILE:
                 raise BadInput(f"{path}: buffers of more than {LARGEST_FILE} bytes", hint=SIMPLIFY)
@@ -291,7 +296,7 @@ def _packed(folder: SourceFolder, path: Path, data: bytes) -> tuple[bytes, list[
             findings.append(f"{path.name}: pictures are left out, colours are those of the materials")
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
         raise BadInput(f"{path}: glTF description is broken: {type(error).__name__}: {error}"[:200]) from None
-    return _glb(tree, parts), findings
+    return _glb(tree, chunks), findings
 
 
 def _drop_pictures(tree: dict[str, Any]) -> bool:
@@ -313,12 +318,12 @@ def _without_pictures(data: bytes) -> bytes:
     return _glb(tree, [data[28 + length :]])
 
 
-def _glb(tree: dict[str, Any], parts: list[bytes]) -> bytes:
+def _glb(tree: dict[str, Any], chunks: list[bytes]) -> bytes:
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
-    binary = sum(len(part) for part in parts)
+    binary = sum(len(part) for part in chunks)
     head = struct.pack("<4sIII4s", b"glTF", 2, 12 + 8 + len(text) + 8 + binary, len(text), b"JSON")
-    return b"".join([head, text, struct.pack("<I4s", binary, b"BIN\0"), *parts])
+    return b"".join([head, text, struct.pack("<I4s", binary, b"BIN\0"), *chunks])
 
 
 def _buffer(folder: SourceFolder, path: Path, name: str) -> bytes:
@@ -327,7 +332,7 @@ def _buffer(folder: SourceFolder, path: Path, name: str) -> bytes:
             return base64.b64decode(name.partition(",")[2], validate=True)
         except ValueError:  # binascii.Error, or letters that are none of ASCII
             raise BadInput(f"{path}: a buffer is no base64") from None
-    found = folder.find(name, path.parent)
-    if found is None:
+    file = folder.find(name, path.parent)
+    if file is None:
         raise BadInput(f"{path}: buffer {name!r:.60} is not in the folder")
-    return folder.read(found)
+    return folder.read(file)

@@ -32,15 +32,19 @@ from scenewright.stages.library.importing.source_model import (
 from scipy.spatial.transform import Rotation
 
 DEEPEST_INCLUDES = 10
+"""Deepest nesting of included files; a bound against circles."""
 MOST_INCLUDES = 2000
+"""Most included files of a model; a bound, by eye."""
 MOST_ELEMENTS = 500_000
-"""Of a model, those of a file each time that it is included."""
+"""Most elements of a model, those of a file counted each time that it is included."""
 DEEPEST_ELEMENTS = 300
+"""Deepest nesting of elements; a bound against damaged files."""
 MOST_DEFAULTS = 200_000
 """Attributes of all default classes, those that a class inherits counted again."""
 MOST_ATTRIBUTES = 200
 """Attributes that a default class gives one kind of element."""
 DEEPEST_BODIES = 60
+"""Deepest nesting of bodies; a bound against damaged files."""
 LAST_VISIBLE_GROUP = 2
 """Geoms of groups 0 to 2 are drawn by default, those of 3 and up are not."""
 MAIN = "main"
@@ -81,7 +85,7 @@ class _Reader:
         root = folder.read_xml(path)
         if root.tag != "mujoco":
             raise BadInput(f"{path}: root element is <{root.tag}>, expected <mujoco>")
-        self.root = self._expanded(root, path, 0, 0)
+        self.root = self._expand(root, path, 0, 0)
         self.compiler: Attributes = {}
         for element in self.root.iter("compiler"):
             self.compiler.update(element.attrib)
@@ -99,7 +103,7 @@ class _Reader:
     def _asset_name(self, element: ElementTree.Element) -> str:
         return element.get("name") or Path(element.get("file", "").replace("\\", "/")).stem
 
-    def _expanded(self, element: ElementTree.Element, path: Path, depth: int, level: int) -> ElementTree.Element:
+    def _expand(self, element: ElementTree.Element, path: Path, depth: int, level: int) -> ElementTree.Element:
         """Return the element, `level` elements and `depth` files down, with what its <include>s name in their place."""
         self.elements += 1
         if self.elements > MOST_ELEMENTS or level > DEEPEST_ELEMENTS:
@@ -111,23 +115,23 @@ class _Reader:
         children: list[ElementTree.Element] = []
         for child in element:
             if child.tag != "include":
-                children.append(self._expanded(child, path, depth, level + 1))
+                children.append(self._expand(child, path, depth, level + 1))
                 continue
             self.included += 1
             name = child.get("file", "")
-            found = self.folder.find(name, self.path.parent, path.parent)
-            if found is None:
+            file = self.folder.find(name, self.path.parent, path.parent)
+            if file is None:
                 raise BadInput(f"{path}: includes {name!r:.100}, which is not in the folder", hint="copy it there")
             if depth >= DEEPEST_INCLUDES or self.included > MOST_INCLUDES:
                 raise BadInput(f"{path}: includes are nested too deeply, or in a circle")
             if ".." in Path(name).parts:
                 self.findings.append("files are named elsewhere; those of the same path in the folder were taken")
-            children.extend(self._expanded(self._included(found), found, depth + 1, level))
+            children.extend(self._expand(self._parse_included(file), file, depth + 1, level))
         copy = ElementTree.Element(element.tag, dict(element.attrib))
         copy.extend(children)
         return copy
 
-    def _included(self, path: Path) -> ElementTree.Element:
+    def _parse_included(self, path: Path) -> ElementTree.Element:
         if path not in self.parsed:
             self.parsed[path] = self.folder.read_xml(path)
             if sum(1 for root in self.parsed.values() for _ in root.iter()) > 2 * MOST_ELEMENTS:
@@ -135,20 +139,20 @@ class _Reader:
         return self.parsed[path]
 
     def _gather_defaults(self, element: ElementTree.Element, name: str, inherited: dict[str, Attributes]) -> None:
-        own = {tag: dict(values) for tag, values in inherited.items()}
+        own_defaults = {tag: dict(values) for tag, values in inherited.items()}
         for child in element:
             if child.tag != "default":
-                own[child.tag] = {**own.get(child.tag, {}), **child.attrib}
-        counts = [len(values) for values in own.values()]
+                own_defaults[child.tag] = {**own_defaults.get(child.tag, {}), **child.attrib}
+        counts = [len(values) for values in own_defaults.values()]
         self.default_attributes += sum(counts) + len(counts)
         if self.default_attributes > MOST_DEFAULTS or max(counts, default=0) > MOST_ATTRIBUTES:
             raise BadInput(
                 f"{self.path}: default classes of more than {MOST_DEFAULTS} attributes in all, or ones of"
                 f" more than {MOST_ATTRIBUTES}"
             )
-        self.defaults[name] = own
+        self.defaults[name] = own_defaults
         for child in element.findall("default"):
-            self._gather_defaults(child, child.get("class", MAIN), own)
+            self._gather_defaults(child, child.get("class", MAIN), own_defaults)
 
     def _attributes(self, element: ElementTree.Element, child_class: str) -> Attributes:
         name = element.get("class", child_class)
@@ -165,14 +169,14 @@ class _Reader:
         if any(_moves(body) for body in bodies):
             yield self._model(bodies, self.path.stem, (self.path.stem, self.root.get("model", "")))
             return
-        things = [thing for body in bodies for thing in _things(body)]
-        if len(things) == 1:
-            names = (self.path.stem, self.root.get("model", ""), *_body_names(things[0]))
-            yield self._model(things, self.path.stem, names)
+        elements = [element for body in bodies for element in _things(body)]
+        if len(elements) == 1:
+            names = (self.path.stem, self.root.get("model", ""), *_body_names(elements[0]))
+            yield self._model(elements, self.path.stem, names)
             return
-        for number, thing in enumerate(things):
-            names = tuple(_body_names(thing)) or (f"{self.path.stem}_{number}",)
-            yield self._model([thing], f"{self.path.stem}_{names[0]}", names)
+        for number, element in enumerate(elements):
+            names = tuple(_body_names(element)) or (f"{self.path.stem}_{number}",)
+            yield self._model([element], f"{self.path.stem}_{names[0]}", names)
 
     def _model(self, bodies: list[ElementTree.Element], name: str, words: tuple[str, ...]) -> SourceModel:
         tree, self.names = _Tree(), {"model": 1}
@@ -223,13 +227,13 @@ class _Reader:
             self._body(tree, child, name, np.eye(4), child_class, depth + 1)
 
     def _unique(self, name: str) -> str:
-        found, number = name, self.names.get(name, 0)
-        while found in self.names:
+        unique, number = name, self.names.get(name, 0)
+        while unique in self.names:
             number += 1
-            found = f"{name}_{number}"
-        self.names[found] = 1
+            unique = f"{name}_{number}"
+        self.names[unique] = 1
         self.names[name] = max(number, 1)
-        return found
+        return unique
 
     def _joint(
         self,
@@ -349,9 +353,9 @@ class _Reader:
         attributes = self._attributes(element, MAIN)
         file = attributes.get("file", "")
         shelf = self.compiler.get("meshdir") or self.compiler.get("assetdir") or ""
-        found = self.folder.find(f"{shelf}/{file}" if shelf else file, self.path.parent)
-        found = found or self.folder.find(file, self.path.parent)
-        if found is None:
+        mesh_path = self.folder.find(f"{shelf}/{file}" if shelf else file, self.path.parent)
+        mesh_path = mesh_path or self.folder.find(file, self.path.parent)
+        if mesh_path is None:
             raise BadInput(f"{self.path}: mesh {file!r:.100} is not in the folder", hint="copy it there")
         scale = np.diag([*numbers(attributes.get("scale", "1 1 1"), 3, f"{where}: mesh scale"), 1.0])
         shift = np.eye(4)
@@ -362,13 +366,13 @@ class _Reader:
             )
             shift = np.linalg.inv(reference)
         moved = []
-        content = read_mesh_file(self.folder, found)
+        content = read_mesh_file(self.folder, mesh_path)
         self.allowance.take(content.surfaces)
         self.of_file.take(content.surfaces)
         for surface in content.surfaces:
             colors = surface.colors if color is None else painted_faces(len(surface.faces), color)
-            named = Surface(surface.vertices, surface.faces, colors, f"{label} {name} {surface.name}".strip())
-            moved.append(named.moved(pose @ shift @ scale))
+            labelled = Surface(surface.vertices, surface.faces, colors, f"{label} {name} {surface.name}".strip())
+            moved.append(labelled.moved(pose @ shift @ scale))
         return moved
 
 

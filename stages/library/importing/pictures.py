@@ -11,12 +11,13 @@ from scenewright.stages.kit.formats.image_headers import image_size, may_be_deco
 from scenewright.stages.library.importing.source_folder import SourceFolder
 
 LARGEST_PICTURE = 64 * 2**20
+"""Largest picture file [bytes]; a bound, by eye."""
 MOST_PIXELS = 400_000_000
-"""Of all pictures of a mesh file, those that are decoded again counted again: two dozen of 4096 x 4096."""
+"""Most pixels of all pictures of a mesh file, those that are decoded again counted again: two dozen of 4096 x 4096."""
 MOST_HELD = 400 * 2**20
-"""Bytes of decoded pictures."""
+"""Most bytes of decoded pictures that are held."""
 SAMPLES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=float)
-"""Where a triangle's colour is looked up: its centre and three points towards its corners (barycentric)."""
+"""Places in a triangle where its colour is looked up (barycentric): its centre and three points towards its corners."""
 PALETTE = 8
 """Colours of a part: the URDF names one mesh file for each."""
 
@@ -26,37 +27,37 @@ class Pictures:
 
     def __init__(self, folder: SourceFolder, path: Path, findings: list[str]) -> None:
         self._folder, self._path, self._findings = folder, path, findings
-        self._held: dict[str, np.ndarray | None] = {}
-        self._left = MOST_PIXELS
+        self._decoded: dict[str, np.ndarray | None] = {}
+        self._remaining_pixels = MOST_PIXELS
 
     def picture(self, name: str) -> np.ndarray | None:
         """Return a picture (H, W, 3) uint8 RGB, or None when it is not there, or none, or there are too many."""
-        if name not in self._held:
+        if name not in self._decoded:
             picture = self._read(name)
-            while picture is not None and self._held and picture.size + self._held_bytes() > MOST_HELD:
-                del self._held[next(iter(self._held))]
-            self._held[name] = picture
-        return self._held[name]
+            while picture is not None and self._decoded and picture.size + self._decoded_bytes() > MOST_HELD:
+                del self._decoded[next(iter(self._decoded))]
+            self._decoded[name] = picture
+        return self._decoded[name]
 
-    def _held_bytes(self) -> int:
-        return sum(picture.size for picture in self._held.values() if picture is not None)
+    def _decoded_bytes(self) -> int:
+        return sum(picture.size for picture in self._decoded.values() if picture is not None)
 
     def _read(self, name: str) -> np.ndarray | None:
-        shown = f"{self._path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60}"
-        found = self._folder.find(name, self._path.parent)
+        label = f"{self._path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60}"
+        file = self._folder.find(name, self._path.parent)
         picture = None
-        if found is not None and found.stat().st_size <= LARGEST_PICTURE:
-            data = self._folder.read(found, LARGEST_PICTURE)
+        if file is not None and file.stat().st_size <= LARGEST_PICTURE:
+            data = self._folder.read(file, LARGEST_PICTURE)
             size = image_size(data)
             if size is not None and may_be_decoded(data):
-                self._left -= size[0] * size[1]
-                if self._left < 0:
-                    self._findings.append(f"{shown} is left out: more than {MOST_PIXELS} pixels in all")
+                self._remaining_pixels -= size[0] * size[1]
+                if self._remaining_pixels < 0:
+                    self._findings.append(f"{label} is left out: more than {MOST_PIXELS} pixels in all")
                     return None
                 with suppress(cv2.error):  # a decoder that gives up
                     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         if picture is None:
-            self._findings.append(f"{shown} is not there")
+            self._findings.append(f"{label} is not there")
             return None
         return np.ascontiguousarray(picture[:, :, ::-1])
 
@@ -82,11 +83,11 @@ def few_colors(colors: np.ndarray, areas: np.ndarray, count: int = PALETTE) -> n
     cells, member = np.unique(colors >> 3, axis=0, return_inverse=True)
     member = member.reshape(-1)
     weight = np.bincount(member, weights=areas + 1e-12, minlength=len(cells))
-    kept = np.lexsort((np.arange(len(cells)), -weight))[:count]
-    gaps = ((cells[:, None].astype(int) - cells[None, kept].astype(int)) ** 2).sum(axis=2)
+    chosen = np.lexsort((np.arange(len(cells)), -weight))[:count]
+    gaps = ((cells[:, None].astype(int) - cells[None, chosen].astype(int)) ** 2).sum(axis=2)
     group = np.argmin(gaps, axis=1)[member]
     result = np.empty_like(colors)
-    for number in range(len(kept)):
+    for number in range(len(chosen)):
         inside = group == number
         if inside.any():
             mean = np.average(colors[inside].astype(float), axis=0, weights=areas[inside] + 1e-12)

@@ -42,7 +42,7 @@ WELD = 1e-5
 MOST_CORNERS = 64
 """Corners of one convex piece; rounder ones are drawn by their extremes in this many directions, twice over."""
 MOST_PIECES = 48
-"""Pieces of one part."""
+"""Most collision pieces of one part."""
 MOST_COMPONENTS = 1000
 """Connected components and solids of one part of which pieces are made: the largest."""
 MOST_DECOMPOSED = 24
@@ -86,9 +86,9 @@ def convex_pieces(surfaces: Sequence[Surface], *, decompose: bool) -> tuple[list
     if filled:
         why = "small, or many" if cut == MOST_DECOMPOSED else "small" if decompose else "coacd is not used"
         findings.append(f"{filled} hollow pieces are filled by their hulls ({why})")
-    pieces, more = _without_covered(pieces)
-    if more:
-        findings.append(f"the {MOST_PIECES} largest of {len(pieces) + more} collision pieces are kept")
+    pieces, dropped = _without_covered(pieces)
+    if dropped:
+        findings.append(f"the {MOST_PIECES} largest of {len(pieces) + dropped} collision pieces are kept")
     return pieces, findings
 
 
@@ -96,10 +96,10 @@ def _largest(solids: list[Solid], components: list[Mesh]) -> tuple[list[Solid], 
     """Return the MOST_COMPONENTS of both with the longest diagonals, in their order."""
     every = [*(solid.vertices for solid in solids), *(mesh[0] for mesh in components)]
     lengths = np.array([np.linalg.norm(np.ptp(vertices, axis=0)) for vertices in every])
-    kept = np.zeros(len(every), dtype=bool)
-    kept[np.lexsort((np.arange(len(every)), -lengths))[:MOST_COMPONENTS]] = True
-    shown = [solid for solid, keep in zip(solids, kept[: len(solids)], strict=True) if keep]
-    return shown, [mesh for mesh, keep in zip(components, kept[len(solids) :], strict=True) if keep]
+    is_kept = np.zeros(len(every), dtype=bool)
+    is_kept[np.lexsort((np.arange(len(every)), -lengths))[:MOST_COMPONENTS]] = True
+    kept_solids = [solid for solid, keep in zip(solids, is_kept[: len(solids)], strict=True) if keep]
+    return kept_solids, [mesh for mesh, keep in zip(components, is_kept[len(solids) :], strict=True) if keep]
 
 
 def _with_volume(solid: Solid) -> Solid | None:
@@ -130,8 +130,8 @@ def thinned(points: np.ndarray) -> np.ndarray:
     longest = away[rows, axis]
     scale = np.where(longest == 0, 1.0, np.abs(longest))
     first, second = (away[rows, (axis + k) % 3] / scale for k in (1, 2))
-    place = [np.minimum((0.5 * (side + 1) * cells).astype(np.int64), cells - 1) for side in (first, second)]
-    cell = ((2 * axis + (longest > 0)) * cells + place[0]) * cells + place[1]
+    face_cells = [np.minimum((0.5 * (side + 1) * cells).astype(np.int64), cells - 1) for side in (first, second)]
+    cell = ((2 * axis + (longest > 0)) * cells + face_cells[0]) * cells + face_cells[1]
     order = np.lexsort((-reach, cell))
     outermost = order[np.flatnonzero(np.diff(cell[order], prepend=-1))]
     ends = [int(end) for k in range(3) for end in (np.argmin(points[:, k]), np.argmax(points[:, k]))]
@@ -140,7 +140,7 @@ def thinned(points: np.ndarray) -> np.ndarray:
 
 def _components(meshes: Sequence[Mesh]) -> list[Mesh]:
     """Return the connected components of meshes, corners that lie together welded, each mesh by itself."""
-    found: list[Mesh] = []
+    components: list[Mesh] = []
     for vertices, faces in meshes:
         _, first, number = np.unique(
             np.round(vertices / WELD).astype(np.int64), axis=0, return_index=True, return_inverse=True
@@ -161,8 +161,8 @@ def _components(meshes: Sequence[Mesh]) -> list[Mesh]:
         borders = np.flatnonzero(np.diff(of_face[order])) + 1
         for members in np.split(order, borders):
             used, inner = np.unique(triangles[members], return_inverse=True)
-            found.append((points[used], inner.reshape(-1, 3)))
-    return found
+            components.append((points[used], inner.reshape(-1, 3)))
+    return components
 
 
 def is_concave(mesh: Mesh) -> bool:
@@ -186,8 +186,8 @@ def is_concave(mesh: Mesh) -> bool:
 def _depth(points: np.ndarray, planes: np.ndarray) -> np.ndarray:
     """Return (N,): how far inside the planes (F, 4) points (N, 3) lie, block by block."""
     block = max(1, 2_000_000 // len(planes))
-    parts = [points[k : k + block] for k in range(0, len(points), block)]
-    return np.concatenate([-(part @ planes[:, :3].T + planes[:, 3]).max(axis=1) for part in parts])
+    depths_of_blocks = [points[k : k + block] for k in range(0, len(points), block)]
+    return np.concatenate([-(part @ planes[:, :3].T + planes[:, 3]).max(axis=1) for part in depths_of_blocks])
 
 
 def convex_piece(points: np.ndarray) -> Solid | None:
@@ -234,14 +234,14 @@ def _with_curves(solid: Solid) -> Solid:
     bent: list[tuple[int, int]] = []
     for k, face in enumerate(solid.faces.tolist()):
         for a, b in ((face[0], face[1]), (face[1], face[2]), (face[2], face[0])):
-            other = owner.setdefault((min(a, b), max(a, b)), k)
-            if other == k:
+            first_owner = owner.setdefault((min(a, b), max(a, b)), k)
+            if first_owner == k:
                 continue
-            angle = float(np.arccos(np.clip(normals[k] @ normals[other], -1, 1)))
+            angle = float(np.arccos(np.clip(normals[k] @ normals[first_owner], -1, 1)))
             if angle < np.radians(0.6):
-                flat.append((k, other))
+                flat.append((k, first_owner))
             elif angle < ROUND_ANGLE:
-                bent.append((k, other))
+                bent.append((k, first_owner))
     rows, columns = np.array(flat).T
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(solid.faces),) * 2)
     _, group = connected_components(graph, directed=False)
@@ -252,22 +252,22 @@ def _with_curves(solid: Solid) -> Solid:
 
 def _without_covered(pieces: list[Solid]) -> tuple[list[Solid], int]:
     """Return the MOST_PIECES largest pieces, without those that lie wholly inside one of them, and how many more."""
-    kept: list[Solid] = []
+    kept_pieces: list[Solid] = []
     planes: list[np.ndarray] = []
-    more = 0
+    dropped = 0
     for piece in sorted(
         pieces, key=lambda solid: (-round(volume(solid), 12), *np.round(solid.vertices.min(axis=0), 9))
     ):
         if any((piece.vertices @ p[:, :3].T + p[:, 3] <= 1e-6).all() for p in planes):
             continue
-        if len(kept) == MOST_PIECES:
-            more += 1
+        if len(kept_pieces) == MOST_PIECES:
+            dropped += 1
             continue
-        found = _hull(piece.vertices)
-        if found is not None:
-            kept.append(piece)
-            planes.append(found.equations)
-    return kept, more
+        solid_hull = _hull(piece.vertices)
+        if solid_hull is not None:
+            kept_pieces.append(piece)
+            planes.append(solid_hull.equations)
+    return kept_pieces, dropped
 
 
 def decomposed(mesh: Mesh) -> list[np.ndarray]:
@@ -277,15 +277,15 @@ def decomposed(mesh: Mesh) -> list[np.ndarray]:
     settings = repr((sorted(COACD_SETTINGS.items()), coacd_version(), vertices.shape, faces.shape)).encode()
     key = hashlib.sha256(settings + vertices.tobytes() + faces.tobytes()).hexdigest()
     path = cache_folder() / f"{key}.npz"
-    parts = _cached(path)
-    if parts is None:
+    hulls = _read_cached(path)
+    if hulls is None:
         import coacd
 
         coacd.set_log_level("error")
-        found = coacd.run_coacd(coacd.Mesh(vertices, faces), **COACD_SETTINGS)
-        parts = [np.asarray(points, dtype=np.float64) for points, _ in found]
-        _keep(path, parts)
-    return parts
+        decomposition = coacd.run_coacd(coacd.Mesh(vertices, faces), **COACD_SETTINGS)
+        hulls = [np.asarray(points, dtype=np.float64) for points, _ in decomposition]
+        _write_cached(path, hulls)
+    return hulls
 
 
 def cache_folder() -> Path:
@@ -293,7 +293,7 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "scenewright" / "decompositions"
 
 
-def _cached(path: Path) -> list[np.ndarray] | None:
+def _read_cached(path: Path) -> list[np.ndarray] | None:
     if not path.is_file():
         return None
     with suppress(BadInput):  # a damaged file of the cache is made again
@@ -303,9 +303,9 @@ def _cached(path: Path) -> list[np.ndarray] | None:
     return None
 
 
-def _keep(path: Path, parts: list[np.ndarray]) -> None:
+def _write_cached(path: Path, hulls: list[np.ndarray]) -> None:
     buffer = io.BytesIO()
-    np.savez(buffer, points=np.concatenate(parts), sizes=np.array([len(part) for part in parts]))
+    np.savez(buffer, points=np.concatenate(hulls), sizes=np.array([len(part) for part in hulls]))
     partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     with suppress(OSError):  # without a cache it only takes longer
         path.parent.mkdir(parents=True, exist_ok=True)

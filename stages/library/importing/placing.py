@@ -25,11 +25,11 @@ from scenewright.stages.library.modelling import BODY
 from scipy.spatial.transform import Rotation
 
 MOST_PARTS = 500
-"""Parts of a model that move."""
+"""Most parts of a model that move."""
 FARTHEST = 1e5
-"""[m] from the origin of the model."""
+"""Farthest from the origin of a model that anything may lie [m]; a bound, by eye."""
 LONGEST_SLIDE = 1e4
-"""[m]."""
+"""Longest way of a sliding joint [m]; a bound, by eye."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ def placed_parts(
     Raises BadInput for parts without shape.
     """
     findings: list[str] = []
-    parts: list[Part] = []
+    placed: list[Part] = []
     if len(groups) > MOST_PARTS:
         raise BadInput(f"{source.source}: {len(groups)} moving parts, more than {MOST_PARTS}", hint="split it")
-    whole = np.eye(4)
-    whole[:3, :3] = unit * rotation
+    model_from_root = np.eye(4)
+    model_from_root[:3, :3] = unit * rotation
     names = {BODY}
     for group in groups:
         joint, root_from_closed = None, np.eye(4)
@@ -69,33 +69,33 @@ def placed_parts(
             joint, root_from_closed = _library_joint(group, rotation, unit, names)
             names.add(joint.part)
         visual: list[Surface] = []
-        given: list[Surface] = []
+        collision_surfaces: list[Surface] = []
         for link, pose in group.links:
-            place = whole @ root_from_closed @ pose
-            shown = link.visual or link.collision
-            visual += [surface.moved(place) for surface in shown]
-            given += [surface.moved(place) for surface in (link.collision or link.visual)]
+            pose_in_model = model_from_root @ root_from_closed @ pose
+            drawn_surfaces = link.visual or link.collision
+            visual += [surface.moved(pose_in_model) for surface in drawn_surfaces]
+            collision_surfaces += [surface.moved(pose_in_model) for surface in (link.collision or link.visual)]
         if not visual:
             if group.joint is None and len(groups) > 1:
                 raise BadInput(f"{source.source}: the root link has no shape")
             findings.append(f"part {group.name!r:.40} has no shape: left out")
             continue
-        _check_reach(source, given)
-        pieces, said = convex_pieces(given if collision_given else visual, decompose=decompose)
+        _check_reach(source, collision_surfaces)
+        pieces, piece_findings = convex_pieces(collision_surfaces if collision_given else visual, decompose=decompose)
         if not pieces:
-            pieces, said = convex_pieces(visual, decompose=decompose)
-        findings += said
+            pieces, piece_findings = convex_pieces(visual, decompose=decompose)
+        findings += piece_findings
         if not pieces:
             findings.append(f"part {group.name!r:.40} is a line or a point: left out")
             continue
         masses = [link.mass for link, _ in group.links if link.mass is not None]
         if joint is not None:
-            joint = with_handle(joint, group, visual, whole @ root_from_closed)
+            joint = with_handle(joint, group, visual, model_from_root @ root_from_closed)
         part_name = BODY if joint is None else joint.part
-        parts.append(Part(part_name, tuple(visual), tuple(pieces), sum(masses) if masses else None, joint))
-    if not parts or parts[0].name != BODY:
+        placed.append(Part(part_name, tuple(visual), tuple(pieces), sum(masses) if masses else None, joint))
+    if not placed or placed[0].name != BODY:
         raise BadInput(f"{source.source}: no body with a shape")
-    return parts, findings
+    return placed, findings
 
 
 def _check_reach(source: SourceModel, surfaces: Sequence[Surface]) -> None:
@@ -117,7 +117,7 @@ def normal_limits(axis: np.ndarray, lower: float, upper: float) -> tuple[float, 
     return closed, axis, lower, upper
 
 
-def _library_joint(group: Group, rotation: np.ndarray, unit: float, taken: set[str]) -> tuple[Joint, np.ndarray]:
+def _library_joint(group: Group, rotation: np.ndarray, unit: float, used_names: set[str]) -> tuple[Joint, np.ndarray]:
     """Return the joint in the model frame [m], and the motion (4, 4) in the root frame that closes the part."""
     source, root_from_child = group.joint, group.root_from_child
     assert source is not None and root_from_child is not None
@@ -136,7 +136,7 @@ def _library_joint(group: Group, rotation: np.ndarray, unit: float, taken: set[s
     if source.kind == "prismatic" and upper * length > LONGEST_SLIDE:
         raise BadInput(f"joint {source.name!r:.60} slides by {upper * length:.3g} m, more than {LONGEST_SLIDE:g} m")
     part = plain_name(group.name) or "part"
-    while part in taken:
+    while part in used_names:
         part += "_"
     return (
         Joint(

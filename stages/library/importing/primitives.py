@@ -6,6 +6,7 @@ import numpy as np
 from scenewright.stages.kit.geometry.solids import Solid, hull
 
 RINGS, SIDES = 6, 16
+"""Steps from pole to pole of a sphere, and points around it; by eye."""
 
 
 def ball(radii: np.ndarray) -> Solid:

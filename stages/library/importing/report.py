@@ -9,6 +9,7 @@ from scenewright.stages.library.importing.frames import unit_name
 
 HEADER = ("model", "class", "size [m]", "joints", "unit", "up", "front", "good for", "findings")
 LONGEST_NAME = 44
+"""Longest name of a model in the table [characters]; the beginning of longer ones is left out."""
 
 
 def table_lines(records: Sequence[ImportedModel]) -> list[str]:

@@ -69,7 +69,7 @@ class _Reader:
         if self.element.find("model") is not None or self.element.find("include") is not None:
             self.findings.append("models inside the model are left out")
         for link in self.element.findall("link"):
-            self.poses[link.get("name", "")] = self._placed(link)
+            self.poses[link.get("name", "")] = self._pose_of_link(link)
         links = tuple(self._link(link) for link in self.element.findall("link"))
         if not links:
             raise BadInput(f"{self.path}: model {name!r:.60} has no links")
@@ -77,14 +77,14 @@ class _Reader:
         joints = [joint for joint in joints if joint.parent != "world" and joint.child != "world"]
         children = {joint.child for joint in joints}
         loose = [link.name for link in links if link.name not in children]
-        for other in loose[1:]:  # links without a joint between them: Gazebo lets them fall apart
-            self.findings.append(f"link {other!r:.40} hangs on nothing: taken as fixed")
-            between = inverse(self.poses[loose[0]]) @ self.poses[other]
-            joints.append(SourceJoint(f"{other}_fixed", "fixed", loose[0], other, between))
+        for loose_link in loose[1:]:  # links without a joint between them: Gazebo lets them fall apart
+            self.findings.append(f"link {loose_link!r:.40} hangs on nothing: taken as fixed")
+            between = inverse(self.poses[loose[0]]) @ self.poses[loose_link]
+            joints.append(SourceJoint(f"{loose_link}_fixed", "fixed", loose[0], loose_link, between))
         folder_name = self.path.parent.name if self.path.parent != self.folder.root else ""
-        shown = name or self.path.stem
+        model_name = name or self.path.stem
         return SourceModel(
-            name=shown if self.alone and shown != "model" else f"{folder_name}_{shown}",
+            name=model_name if self.alone and model_name != "model" else f"{folder_name}_{model_name}",
             source=self.folder.relative(self.path),
             format="SDF",
             links=links,
@@ -102,7 +102,7 @@ class _Reader:
         angles = np.radians(values[3:]) if pose.get("degrees") == "true" else values[3:]
         return transform_from(Rotation.from_euler("xyz", angles).as_matrix(), values[:3])
 
-    def _placed(self, link: ElementTree.Element) -> np.ndarray:
+    def _pose_of_link(self, link: ElementTree.Element) -> np.ndarray:
         where = f"{self.path}: link {link.get('name', '')!r:.60}"
         pose, element = self._pose(link, where), link.find("pose")
         base = "" if element is None else element.get("relative_to", "")
@@ -135,8 +135,8 @@ class _Reader:
         if mesh is not None:
             scale = np.diag([*numbers(mesh.findtext("scale") or "1 1 1", 3, f"{where}: scale"), 1.0])
             uri = (mesh.findtext("uri") or "").strip()
-            named = Naming(self.folder, self.path, self.findings, self.units, self.allowance)
-            return mesh_surfaces(named, uri, pose @ scale, color, name)
+            naming = Naming(self.folder, self.path, self.findings, self.units, self.allowance)
+            return mesh_surfaces(naming, uri, pose @ scale, color, name)
         solid = _primitive(geometry, where)
         if solid is None:
             self.findings.append(f"a shape of link {name!r:.40} is of a kind that is left out")

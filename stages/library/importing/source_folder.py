@@ -15,18 +15,23 @@ from scenewright.schemas.outside import file_content
 from scenewright.stages.kit.formats.xml_files import parse_xml
 
 LARGEST_FILE = 256 * 2**20
-"""Bytes of a mesh or a picture."""
+"""Largest mesh or picture [bytes]."""
 LARGEST_TEXT = 128 * 2**20
 """Bytes of a mesh that is text, which takes several times as much while it is read."""
 LARGEST_XML = 64 * 2**20
+"""Largest XML file [bytes]; a bound, by eye."""
 MOST_FILES = 200_000
+"""Most files of a folder with models; a bound, by eye."""
 MOST_FOLDERS = 200_000
+"""Most folders in a folder with models; a bound, by eye."""
 MOST_NAME_PARTS = 40
 """Folders in the name of a file: its end is looked for in many places."""
 MOST_KEPT_NAMES = 20_000
+"""Most names whose files are remembered; by eye."""
 PIECE = 1 << 20
+"""Characters of a text that are parsed at a time; by eye."""
 LONGEST_NUMBER = 4096
-"""Characters."""
+"""Longest number in a text [characters]."""
 LONGEST_ROW = 100_000
 """Characters of a row that is a size or a pose; what comes after them makes it the wrong number of numbers anyway."""
 BLANK = re.compile(r"\s")
@@ -40,16 +45,16 @@ class SourceFolder:
         self.root = Path(root).resolve()
         self.kept_meshes: dict[Path, Any] = {}
         """What mesh_reading.py keeps of files that are named again and again."""
-        self._found: dict[tuple[str, tuple[Path, ...]], Path | None] = {}
+        self._file_of: dict[tuple[str, tuple[Path, ...]], Path | None] = {}
         self.read_bytes_of: set[Path] = set()
         """Files that were read; what no description names may be a model by itself."""
 
     def files(self) -> list[Path]:
         """Return the files, sorted by path; hidden ones and links out of the folder are left out. Raises BadInput."""
-        found = [path for path in self._listed() if path.is_file() and self._inside(path)]
-        return sorted(found, key=lambda p: p.relative_to(self.root).as_posix())
+        real_files = [path for path in self._walk() if path.is_file() and self._inside(path)]
+        return sorted(real_files, key=lambda p: p.relative_to(self.root).as_posix())
 
-    def _listed(self) -> Iterator[Path]:
+    def _walk(self) -> Iterator[Path]:
         waiting, folders, files = [str(self.root)], 0, 0
         while waiting:
             try:
@@ -95,25 +100,28 @@ class SourceFolder:
         """
         if len(name) > 1000 or "\0" in name:
             return None
-        if len(self._found) > MOST_KEPT_NAMES:
-            self._found.clear()
-        if (name, bases) not in self._found:
-            self._found[name, bases] = self._searched(name, bases)
-        return self._found[name, bases]
+        if len(self._file_of) > MOST_KEPT_NAMES:
+            self._file_of.clear()
+        if (name, bases) not in self._file_of:
+            self._file_of[name, bases] = self._search(name, bases)
+        return self._file_of[name, bases]
 
-    def _searched(self, name: str, bases: tuple[Path, ...]) -> Path | None:
+    def _search(self, name: str, bases: tuple[Path, ...]) -> Path | None:
         plain = SCHEME.sub("", name.strip().replace("\\", "/"))
         if not plain:
             return None
-        parts = [part for part in PurePosixPath(plain).parts if part not in ("/", ".", "..")]
-        if not 0 < len(parts) <= MOST_NAME_PARTS:
+        names = [part for part in PurePosixPath(plain).parts if part not in ("/", ".", "..")]
+        if not 0 < len(names) <= MOST_NAME_PARTS:
             return None
         places: list[Path] = []
         for base in bases:
             places += [base, *(above for above in base.parents if above.is_relative_to(self.root))]
         places = list(dict.fromkeys(places))
         exact = [base / plain for base in bases] if not PurePosixPath(plain).is_absolute() else []
-        for candidate in [*exact, *(place.joinpath(*parts[k:]) for k in range(len(parts)) for place in places)]:
+        for candidate in [
+            *exact,
+            *(place_of_search.joinpath(*names[k:]) for k in range(len(names)) for place_of_search in places),
+        ]:
             if candidate.is_file() and self._inside(candidate):
                 return candidate.resolve()
         return None

@@ -104,7 +104,7 @@ class SourceModel:
 
 
 PLAIN_COLOR = (178, 178, 178)
-"""The colour of what has none."""
+"""Colour of what has none (sRGB, of 255)."""
 
 
 def painted_faces(count: int, color: tuple[float, float, float] | None) -> np.ndarray:

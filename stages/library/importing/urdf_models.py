@@ -38,6 +38,7 @@ KINDS: dict[str, JointKind] = {
 PARTNET_FRONT = (-1.0, 0.0, 0.0)
 """Doors and drawers of PartNet-Mobility models look along -x of mobility.urdf's root frame, z is up."""
 LARGEST_TEXT = 2**20
+"""Largest text file of a PartNet model [bytes]; a bound, by eye."""
 
 
 def read_urdf_model(folder: SourceFolder, path: Path) -> SourceModel:
@@ -62,9 +63,9 @@ def read_partnet_model(folder: SourceFolder, path: Path) -> SourceModel:
     semantics = path.parent / "semantics.txt"
     if semantics.is_file():
         for line in folder.read(semantics, LARGEST_TEXT).decode("utf-8", "replace").splitlines():
-            parts = line.split()
-            if len(parts) >= 3:
-                roles[parts[0]] = parts[2]
+            columns = line.split()
+            if len(columns) >= 3:
+                roles[columns[0]] = columns[2]
     links = tuple(
         SourceLink(link.name, link.visual, link.collision, link.mass, link.marks, roles.get(link.name, ""))
         for link in model.links
@@ -160,8 +161,8 @@ class _Reader:
             return []
         scale = np.diag([*numbers(mesh.get("scale", "1 1 1"), 3, f"{where}: scale"), 1.0])
         file = mesh.get("filename", "")
-        named = Naming(self.folder, self.path, self.findings, self.units, self.allowance)
-        return mesh_surfaces(named, file, pose @ scale, color, name)
+        naming = Naming(self.folder, self.path, self.findings, self.units, self.allowance)
+        return mesh_surfaces(naming, file, pose @ scale, color, name)
 
     def _joint(self, element: ElementTree.Element) -> SourceJoint:
         name = element.get("name", "")
@@ -204,29 +205,31 @@ def mesh_surfaces(
     file, and for more than the description's allowance.
     """
     folder, path = by.folder, by.path
-    found = folder.find(name, path.parent)
-    if found is None:
+    file = folder.find(name, path.parent)
+    if file is None:
         raise BadInput(f"{path}: mesh {name!r:.100} is not in the folder", hint="copy it beside the description")
-    if not found.is_relative_to(path.parent) or ".." in Path(name).parts:
+    if not file.is_relative_to(path.parent) or ".." in Path(name).parts:
         by.findings.append("meshes are named elsewhere; files of the same path were found in the folder")
-    content = read_mesh_file(folder, found)
+    content = read_mesh_file(folder, file)
     unit = 1.0
     if isinstance(content.unit.value, float) and content.unit.origin == "file":
         unit = content.unit.value
         by.units.add(unit)
     by.findings.extend(content.findings)
     by.allowance.take(content.surfaces)
-    whole = link_from_mesh @ np.diag([unit, unit, unit, 1.0])
+    scaled_pose = link_from_mesh @ np.diag([unit, unit, unit, 1.0])
     moved = []
     for surface in content.surfaces:
         if (
             color is not None
-            and found.suffix.lower() in (".stl", ".obj")
+            and file.suffix.lower() in (".stl", ".obj")
             and len(np.unique(surface.colors, axis=0)) == 1
         ):
             surface = Surface(surface.vertices, surface.faces, painted_faces(len(surface.faces), color), surface.name)
-        named = Surface(surface.vertices, surface.faces, surface.colors, f"{label} {found.stem} {surface.name}".strip())
-        moved.append(named.moved(whole))
+        labelled = Surface(
+            surface.vertices, surface.faces, surface.colors, f"{label} {file.stem} {surface.name}".strip()
+        )
+        moved.append(labelled.moved(scaled_pose))
     return moved
 
 

@@ -22,9 +22,11 @@ from scenewright.stages.kit.geometry.transforms import quaternion_of
 from scenewright.stages.urdf.exports import SceneExporter
 
 FLOAT, UNSIGNED_INT, UNSIGNED_SHORT = 5126, 5125, 5123
+"""Component types of accessors (glTF 2.0, 3.6.2.2)."""
 VERTICES, INDICES = 34962, 34963
+"""Targets of buffer views, ARRAY_BUFFER and ELEMENT_ARRAY_BUFFER (glTF 2.0)."""
 Y_UP_FROM_Z_UP = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
-"""Quaternion (x, y, z, w)."""
+"""Turn from z up to y up, a quaternion (x, y, z, w)."""
 
 
 def write_scene_glb(
@@ -45,11 +47,11 @@ def write_scene_glb(
         children.setdefault(joint.parent, []).append(joint)
     numbers = {link.name: k for k, link in enumerate(urdf.links)}
     nodes: list[dict[str, Any]] = []
-    own = {joint.child: joint for joint in urdf.joints}
+    joint_of_child = {joint.child: joint for joint in urdf.joints}
     for link in urdf.links:
         node: dict[str, Any] = {"name": link.name}
-        if link.name in own:
-            joint = own[link.name]
+        if link.name in joint_of_child:
+            joint = joint_of_child[link.name]
             value = values.get(joint.name, 0.0)
             pose = joint.parent_from_child @ joint_motion(joint, value)
             node["translation"] = _rounded(pose[:3, 3])

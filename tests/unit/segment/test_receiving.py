@@ -165,13 +165,13 @@ def test_bodies_that_are_held_are_counted(monkeypatch: pytest.MonkeyPatch) -> No
         with socket.create_connection(address, timeout=5) as slow:
             slow.sendall(POST + b"Content-Length: 2500000\r\n\r\n" + b"x" * 2_400_000)
             deadline = time.monotonic() + 5
-            while opened._held < 2_000_000 and time.monotonic() < deadline:
+            while opened._held_bytes < 2_000_000 and time.monotonic() < deadline:
                 time.sleep(0.01)
             assert status(address, POST + b"Content-Length: 2500000\r\n\r\n" + b"x" * 2_500_000) == 503
         deadline = time.monotonic() + 5
-        while opened._held and time.monotonic() < deadline:
+        while opened._held_bytes and time.monotonic() < deadline:
             time.sleep(0.01)
-        assert opened._held == 0
+        assert opened._held_bytes == 0
         assert status(address, POST + b"Content-Length: 2500000\r\n\r\n" + b"x" * 2_500_000) == 400
 
 

@@ -62,8 +62,10 @@ def write(job: ExportJob) -> None:
     }
     classes = load_vocabulary().classes
     _write(root / "panoptic.json", shared | {"annotations": panoptic, "categories": _categories(classes, True)})
-    things = [entry for entry in classes if entry.kind == "thing"]
-    _write(root / "instances.json", shared | {"annotations": instances, "categories": _categories(things, False)})
+    thing_classes = [entry for entry in classes if entry.kind == "thing"]
+    _write(
+        root / "instances.json", shared | {"annotations": instances, "categories": _categories(thing_classes, False)}
+    )
 
 
 def _rows(masks: FrameMasks, image_id: int, first_id: int) -> list[tuple[dict[str, Any], dict[str, Any] | None]]:

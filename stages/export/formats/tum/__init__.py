@@ -8,7 +8,7 @@ from __future__ import annotations
 from scenewright.stages.export.registry import SequenceFormat
 
 UNITS_PER_MILLIMETRE = 5
-"""5000 depth units per metre."""
+"""Depth units per millimetre: TUM has 5000 per metre."""
 LARGEST_MILLIMETRES = 65534 // UNITS_PER_MILLIMETRE
 """13.106 m: 65535 units say invalid to many readers."""
 

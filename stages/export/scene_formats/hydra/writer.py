@@ -13,6 +13,7 @@ from scenewright.stages.export.scene_registry import Written
 from scipy.spatial.transform import Rotation
 
 ROOM = spark_dsg.NodeSymbol("R", 0)
+"""The one room of the scene graph."""
 
 
 def write(folder: Path, scene: SceneToExport) -> Written:

@@ -38,11 +38,11 @@ def write(folder: Path, scene: SceneToExport) -> Written:
     (folder / "scene.sdf").write_bytes(text)
     _copy_meshes(scene, folder)
     values = scene.written.joint_values
-    named = {body.name for body in scene.bodies}
+    names = {body.name for body in scene.bodies}
     for body in scene.bodies:
-        named |= {link.name for link in body.links} | {joint.name for joint in body.joints}
+        names |= {link.name for link in body.links} | {joint.name for joint in body.joints}
     return Written(
-        names={allowed(name): name for name in sorted(named) if allowed(name) != name},
+        names={allowed(name): name for name in sorted(names) if allowed(name) != name},
         joint_zero={name: value for name, value in sorted(values.items()) if value},
     )
 

@@ -21,6 +21,7 @@ from scenewright.stages.kit.rendering.surfaces import srgb_to_linear
 from scipy.spatial.transform import Rotation
 
 GRAVITY = 9.81
+"""Acceleration of free fall that the scene states [m/s^2]."""
 WORLD = "/World"
 
 
@@ -50,7 +51,7 @@ class _Writer:
         self.scene = scene
         self.renamed: dict[str, str] = {}
         self._paths: dict[str, str] = {}
-        self._taken: set[str] = set()
+        self._used_names: set[str] = set()
         self._surface_materials: dict[float, UsdShade.Material] = {}
 
     def add_body(self, body: BodyToExport) -> None:
@@ -73,10 +74,10 @@ class _Writer:
     def _path(self, parent: str, name: str) -> str:
         plain = Tf.MakeValidIdentifier(name)
         number, candidate = 1, plain
-        while f"{parent}/{candidate}" in self._taken:
+        while f"{parent}/{candidate}" in self._used_names:
             number += 1
             candidate = f"{plain}_{number}"
-        self._taken.add(f"{parent}/{candidate}")
+        self._used_names.add(f"{parent}/{candidate}")
         if candidate != name:
             self.renamed[candidate] = name
         return f"{parent}/{candidate}"
@@ -164,11 +165,11 @@ def _connect(
     if parent is not None:
         joint.CreateBody0Rel().SetTargets([parent])
     joint.CreateBody1Rel().SetTargets([child])
-    own = np.eye(4) if child_from_joint is None else child_from_joint
+    joint_pose = np.eye(4) if child_from_joint is None else child_from_joint
     joint.CreateLocalPos0Attr(Gf.Vec3f(*parent_from_joint[:3, 3].tolist()))
     joint.CreateLocalRot0Attr(_quaternion(parent_from_joint))
-    joint.CreateLocalPos1Attr(Gf.Vec3f(*own[:3, 3].tolist()))
-    joint.CreateLocalRot1Attr(_quaternion(own))
+    joint.CreateLocalPos1Attr(Gf.Vec3f(*joint_pose[:3, 3].tolist()))
+    joint.CreateLocalRot1Attr(_quaternion(joint_pose))
 
 
 def _quaternion(pose: np.ndarray) -> Gf.Quatf:

@@ -41,9 +41,11 @@ PARAMETERS = dict(MODELS.values())
 LARGEST_FILE = 4_000_000_000
 """Bytes of images.bin that are walked over; most of them are observations, which are skipped."""
 LONGEST_NAME = 4096
+"""Longest name of an image that is looked for [bytes]; a bound against damaged files."""
 LARGEST_SIZE = 100_000
+"""Largest width or height of a camera [px]; a bound against damaged files."""
 OBSERVATION = 24
-"""Bytes of x, y and the point's id."""
+"""Bytes of an observation in images.bin: x, y and the point's id."""
 
 
 @dataclass(frozen=True)
@@ -126,9 +128,9 @@ class _Reader:
     def count(self, smallest: int, what: str) -> int:
         """Return a declared number of records of at least `smallest` bytes."""
         number = self.take("Q")[0]
-        left = len(self.data) - self.place
-        if number * smallest > left:
-            raise BadInput(f"{self.path}: declares {number} {what}, but only {left} bytes follow")
+        remaining = len(self.data) - self.place
+        if number * smallest > remaining:
+            raise BadInput(f"{self.path}: declares {number} {what}, but only {remaining} bytes follow")
         return number
 
     def _bytes(self, count: int) -> bytes:

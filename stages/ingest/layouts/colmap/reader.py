@@ -36,7 +36,7 @@ from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, Sour
 IMAGE_FOLDERS = ("images", "image", "rgb", "color")
 DENSE_MAPS = "stereo/depth_maps"
 DENSE_ENDINGS = (".geometric.bin", ".photometric.bin")
-"""In the order in which they are preferred: geometric ones were checked against other views."""
+"""Endings of depth maps in the order in which they are preferred: geometric ones were checked against other views."""
 
 ONE_FOCAL_LENGTH = (
     "SIMPLE_PINHOLE",
@@ -57,8 +57,8 @@ def matches(root: Path) -> str | None:
     folders = _model_folders(root)
     if not folders:
         return None
-    place = folders[0].relative_to(root).as_posix()
-    return f"folder with cameras and images files in {'it' if place == '.' else place + '/'}: COLMAP sparse model"
+    folder = folders[0].relative_to(root).as_posix()
+    return f"folder with cameras and images files in {'it' if folder == '.' else folder + '/'}: COLMAP sparse model"
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
@@ -74,9 +74,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     refuse_exr((path.name for path in depths if path), str(root))
     has_depth = depth_words is not None
     has_color = not has_depth or any(path.is_file() for path in colors)
-    recorded, given = _recorded(model, images, colors, depths, parameters)
+    recorded, notes_of_options = _recorded_cameras(model, images, colors, depths, parameters)
     groups, group_notes = grouped(recorded, [str(image.camera) for image in images])
-    unregistered = _unregistered(image_folder, colors)
+    unregistered = _unregistered_images(image_folder, colors)
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(root))
     units, unit_note = depth_units(parameters, 1.0 if depth_words == DENSE_MAPS else 1000.0)
@@ -84,8 +84,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     entries = []
     ordered: list[tuple[str, int | None]] = [(image.name, index) for index, image in enumerate(images)]
     ordered += [(path.relative_to(image_folder).as_posix(), None) for path in unregistered]
-    for place, (name, index) in enumerate(sorted(ordered, key=lambda item: natural_key(item[0]))):
-        time = place / parameters.frame_rate
+    for order, (name, index) in enumerate(sorted(ordered, key=lambda item: natural_key(item[0]))):
+        time = order / parameters.frame_rate
         if index is None:
             entries.append(Entry(name, time, None, _never, "missing_pose", chosen[0]))
         elif group_of[index].name in chosen:
@@ -94,10 +94,10 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             pose = images[index].world_from_camera
             problem = "non_rigid_pose" if pose is None else None
             entries.append(Entry(name, time, pose, load, problem, group_of[index].name))
-    lenses = [one.lens.words for one in dict.fromkeys(recorded) if not one.lens.is_pinhole]
+    lenses = [camera.lens.words for camera in dict.fromkeys(recorded) if not camera.lens.is_pinhole]
     notes = (
         *model_notes,
-        *given,
+        *notes_of_options,
         *group_notes,
         *(
             (f"lens distortion undone ({lenses[0] if len(lenses) == 1 else f'{len(lenses)} lenses'})",)
@@ -158,8 +158,10 @@ def _largest_model(root: Path, parameters: IngestParameters) -> tuple[SparseMode
             if parameters.damage == "refuse" or len(damage) == len(folders):
                 raise
     largest = max(models, key=lambda model: len(model.images))
-    place = largest.folder.relative_to(root).as_posix()
-    notes = [f"poses and intrinsics from {'the folder' if place == '.' else place}: {len(largest.images)} images"]
+    folder_name = largest.folder.relative_to(root).as_posix()
+    notes = [
+        f"poses and intrinsics from {'the folder' if folder_name == '.' else folder_name}: {len(largest.images)} images"
+    ]
     if len(models) > 1:
         listed = ", ".join(f"{model.folder.relative_to(root).as_posix()} {len(model.images)}" for model in models)
         notes.append(f"largest of {len(models)} models taken ({listed}); they do not share a world")
@@ -169,7 +171,7 @@ def _largest_model(root: Path, parameters: IngestParameters) -> tuple[SparseMode
 def _depths(root: Path, images: list[ModelImage]) -> tuple[list[Path | None], str | None]:
     """Return the depth of each image, and the folder it is from (None: there is none)."""
     if (root / "depth").is_dir():
-        paths = [_named_like(root / "depth", image.name, root) for image in images]
+        paths = [_find_file_like(root / "depth", image.name, root) for image in images]
         return paths, "depth" if any(paths) else None
     dense_maps: list[Path | None] = []
     for image in images:
@@ -178,14 +180,14 @@ def _depths(root: Path, images: list[ModelImage]) -> tuple[list[Path | None], st
     return dense_maps, DENSE_MAPS if any(dense_maps) else None
 
 
-def _named_like(folder: Path, name: str, root: Path) -> Path | None:
+def _find_file_like(folder: Path, name: str, root: Path) -> Path | None:
     stem = name.rsplit(".", 1)[0] if "." in Path(name).name else name
     endings = (*DEPTH_SUFFIXES, ".npy", ".exr")
     candidates = (named_file(folder, stem + ending, str(root)) for ending in endings)
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _recorded(
+def _recorded_cameras(
     model: SparseModel,
     images: list[ModelImage],
     colors: list[Path],
@@ -196,10 +198,10 @@ def _recorded(
     cameras: dict[int, RecordedCamera] = {}
     notes: tuple[str, ...] = ()
     for number in dict.fromkeys(image.camera for image in images):
-        own = [index for index, image in enumerate(images) if image.camera == number]
+        of_camera = [index for index, image in enumerate(images) if image.camera == number]
         where = f"{model.folder}: camera {number}"
-        size = depth_image_size(path for index in own if (path := depths[index]) is not None)
-        size = size or color_image_size(colors[index] for index in own)
+        size = depth_image_size(path for index in of_camera if (path := depths[index]) is not None)
+        size = size or color_image_size(colors[index] for index in of_camera)
         camera = _camera(model.cameras[number], where).at(size, where)
         cameras[number], notes = overridden_recording(camera, parameters)
     return [cameras[image.camera] for image in images], notes
@@ -224,7 +226,7 @@ def _camera(camera: ModelCamera, where: str) -> RecordedCamera:
     return RecordedCamera(pinhole(numbers, camera.size, where), PINHOLE if lens.is_pinhole else lens)
 
 
-def _unregistered(folder: Path, registered: list[Path]) -> list[Path]:
+def _unregistered_images(folder: Path, registered: list[Path]) -> list[Path]:
     in_model = set(registered)
     images = (path for path in folder.rglob("*") if path.suffix.lower() in COLOR_SUFFIXES and path.is_file())
     return [path for path in images if path not in in_model] if folder.name in IMAGE_FOLDERS else []

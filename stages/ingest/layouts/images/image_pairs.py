@@ -77,7 +77,7 @@ def find_images(root: Path) -> FolderImages | None:
         depths = images_by_stem(root / depth, DEPTH_ENDINGS)
         blank: tuple[None, ...] = (None,) * len(depths)
         return FolderImages(tuple(depths), blank, tuple(depths.values()), blank, 0, {"depth": depth})
-    marked = _marked(root)
+    marked = _images_by_role(root)
     if marked is not None:
         return marked
     videos = files_of(root, VIDEO_SUFFIXES)
@@ -158,7 +158,7 @@ def _by_number(images: dict[str, Path]) -> dict[str, Path] | None:
     return keyed if len(keyed) == len(images) else None
 
 
-def _marked(root: Path) -> FolderImages | None:
+def _images_by_role(root: Path) -> FolderImages | None:
     """Return the images of a folder whose names say what they are."""
     roles: dict[str, dict[str, Path]] = {"color": {}, "depth": {}, "right": {}, "disparity": {}}
     plain: dict[str, Path] = {}
@@ -200,9 +200,9 @@ def stamps_of(names: tuple[str, ...]) -> np.ndarray | None:
     digits), microseconds (16) or seconds with decimals."""
     stamps = []
     for name in names:
-        whole = re.fullmatch(r"[0-9]{16}|[0-9]{19}", name)
+        digits = re.fullmatch(r"[0-9]{16}|[0-9]{19}", name)
         seconds = re.fullmatch(r"([0-9]{9,10})\.([0-9]{1,9})", name)
-        if whole:
+        if digits:
             stamps.append(int(name) if len(name) == 19 else int(name) * 1000)
         elif seconds:
             stamps.append(int(seconds[1]) * 10**9 + int(seconds[2].ljust(9, "0")))

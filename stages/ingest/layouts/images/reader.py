@@ -121,7 +121,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
 
 def _calibration(root: Path, images: FolderImages, parameters: IngestParameters) -> FolderCalibration:
     """Return the calibration of the folder, or what the options say."""
-    given = [name for name in OPTIONS if getattr(parameters, name) is not None]
+    options = [name for name in OPTIONS if getattr(parameters, name) is not None]
     if all_intrinsics_given(parameters) and not any(images.rights):
         camera = camera_from_options(None, parameters, str(root))
         return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option",))
@@ -129,13 +129,13 @@ def _calibration(root: Path, images: FolderImages, parameters: IngestParameters)
     if calibration is None:
         camera_from_options(None, parameters, f"{root}: there is no calibration file")
         raise BadInput(f"{root}: there is no calibration file for left and right images", hint=PAIR_HINT)
-    if given and calibration.right is not None:
-        raise UsageError(f"--{given[0]} cannot describe a stereo pair", hint="change the calibration file instead")
-    if given:
+    if options and calibration.right is not None:
+        raise UsageError(f"--{options[0]} cannot describe a stereo pair", hint="change the calibration file instead")
+    if options:
         matrix = list(calibration.left.K)
-        for name, place in zip(OPTIONS, (0, 4, 2, 5), strict=True):
-            matrix[place] = matrix[place] if getattr(parameters, name) is None else getattr(parameters, name)
-        listed = ", ".join(f"{name} {getattr(parameters, name):g}" for name in given)
+        for name, index in zip(OPTIONS, (0, 4, 2, 5), strict=True):
+            matrix[index] = matrix[index] if getattr(parameters, name) is None else getattr(parameters, name)
+        listed = ", ".join(f"{name} {getattr(parameters, name):g}" for name in options)
         notes = (*calibration.notes, f"intrinsics given by option: {listed}")
         calibration = replace(
             calibration, left=replace(calibration.left, K=tuple(matrix), P=()), rectified=False, notes=notes
@@ -167,7 +167,7 @@ def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_righ
         matrix = calibration.left.K
         fx, _, cx, _, fy, cy, *_ = matrix
         return _Eyes(Lens(Camera.of_outside(root, width=0, height=0, fx=fx, fy=fy, cx=cx, cy=cy), (0, 0)))
-    sized = [_sized(one, width, height) for one in (calibration.left, calibration.right) if one is not None]
+    sized = [_with_size(each, width, height) for each in (calibration.left, calibration.right) if each is not None]
     if has_right and len(sized) < 2:
         raise BadInput(f"{root}: the calibration is of one camera, the images are pairs", hint=PAIR_HINT)
     if not (has_right or side_by_side):
@@ -195,7 +195,7 @@ def _is_double(record: CalibrationRecord, width: int, height: int) -> bool:
     return bool(record.K[2] < 0.4 * width and width > 1.9 * height)
 
 
-def _sized(record: CalibrationRecord, width: int, height: int) -> CalibrationRecord:
+def _with_size(record: CalibrationRecord, width: int, height: int) -> CalibrationRecord:
     """Return a calibration that states its size; one that does not is taken to be of the images."""
     return record if record.width else replace(record, width=width, height=height)
 
@@ -210,7 +210,7 @@ def _loader(
 
     def load() -> LoadedFrame:
         if eyes.side_by_side:
-            left, second = _halves(_decoded(color, "color"), eyes)
+            left, second = _halves(_decode(color, "color"), eyes)
             return LoadedFrame(left, _depth() if has_depth else None, right=second)
         return LoadedFrame(
             _picture(color, eyes.left, "color") if any(images.colors) else None,
@@ -250,13 +250,13 @@ def _halves(image: np.ndarray, eyes: _Eyes) -> tuple[np.ndarray, np.ndarray]:
 def _picture(path: Path | None, lens: Lens, stream_name: str) -> np.ndarray | bytes:
     """Return a file's picture without distortion; its own bytes where these can be kept."""
     if lens.maps is not None:
-        return lens.picture(_decoded(path, stream_name))
+        return lens.picture(_decode(path, stream_name))
     if path is None:
         raise Unusable(f"missing_{stream_name}")
     return usable_color(file_bytes(path, stream_name), lens.camera)
 
 
-def _decoded(path: Path | None, stream_name: str) -> np.ndarray:
+def _decode(path: Path | None, stream_name: str) -> np.ndarray:
     if path is None:
         raise Unusable(f"missing_{stream_name}")
     image = decode_color(file_bytes(path, stream_name))
@@ -309,17 +309,17 @@ def _poses(
     path = pose_file(root)
     if path is None:
         return [(None, None)] * len(names), ()
-    found = read_pose_list(path, list(names))
+    poses = read_pose_list(path, list(names))
     notes: tuple[str, ...] = (f"poses from {path.name}, assumed to be world_from_camera",)
-    if isinstance(found, StampedPoses):
-        notes = (*notes, *found.notes)
-        found = [(found.at(int(stamp), parameters), None) for stamp in times]
+    if isinstance(poses, StampedPoses):
+        notes = (*notes, *poses.notes)
+        poses = [(poses.at(int(stamp), parameters), None) for stamp in times]
     offset = calibration.posed_from_left
     if offset is not None and np.abs(offset - np.eye(4)).max() > 0:
         notes = (*notes, f"poses moved by {offset[0, 3]:.4g} m along x: KITTI states those of camera 0")
         with np.errstate(invalid="ignore"):  # poses that are not finite are counted later
-            found = [(None if pose is None else pose @ offset, problem) for pose, problem in found]
-    return found, notes
+            poses = [(None if pose is None else pose @ offset, problem) for pose, problem in poses]
+    return poses, notes
 
 
 def _streams(
@@ -330,9 +330,9 @@ def _streams(
         return (StreamInfo(images.video.name, "color", "video", times if recorded else times[:0], len(names)),)
     streams = []
     for role, paths in (("color", images.colors), ("depth", images.depths), ("right", images.rights)):
-        there = np.array([path is not None for path in paths], dtype=bool)
+        present = np.array([path is not None for path in paths], dtype=bool)
         if role in images.places:
-            stamps = times[there] if recorded else None
+            stamps = times[present] if recorded else None
             streams.append(stream(images.places[role], role, [path for path in paths if path], stamps))  # type: ignore[arg-type]
     if posed:
         streams.append(text_stream("poses", "pose", posed))

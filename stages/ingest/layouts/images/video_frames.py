@@ -12,6 +12,7 @@ from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE
 
 SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".webm")
 MOST_FRAMES = 10_000_000
+"""Most frames that are counted in a video; a bound against files that never end."""
 
 
 class VideoFrames:
@@ -28,7 +29,7 @@ class VideoFrames:
         """(width, height) of the frames."""
         if not 0 < width * height <= LARGEST_IMAGE:
             raise BadInput(f"{path}: declares frames of {width:g}x{height:g} pixels")
-        self.count = self._counted()
+        self.count = self._count_frames()
 
     def frame(self, index: int) -> np.ndarray:
         """Return frame `index` as (H, W, 3) uint8 RGB. Raises Unusable when it cannot be decoded."""
@@ -57,7 +58,7 @@ class VideoFrames:
             raise BadInput(f"{self.path}: is no video that can be read", hint="export its frames as images")
         return capture
 
-    def _counted(self) -> int:
+    def _count_frames(self) -> int:
         """Return the number of frames that can be decoded: what the file declares is often wrong."""
         count = 0
         while count < MOST_FRAMES and self._capture.grab():

@@ -41,10 +41,12 @@ from scenewright.stages.kit.geometry.transforms import inverse, is_rigid
 
 NAMES = ("transforms.json", "transforms_train.json")
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+"""Turns the camera axes of OpenCV into those of OpenGL: y and z change sign."""
 DEFAULT_UNIT = 0.001
 """Metres per unit of depth when the file does not say: millimetres."""
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL")
 LARGEST_SIZE = 100_000
+"""Largest width or height of a camera [px]; a bound against damaged files."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if not default_unit > 0:
         raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
     units, unit_note = depth_units(parameters, 1 / default_unit)
-    recorded, given = _recorded(frames, has_depth, parameters)
+    recorded, notes_of_options = _recorded_cameras(frames, has_depth, parameters)
     groups, group_notes = grouped(recorded, _labels(frames, recorded))
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(file)) if counts else ()
@@ -122,10 +124,10 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     cameras = [SourceCamera(group.name, group.camera) for group in groups if group.name in chosen]
     if not cameras:
         raise BadInput(f"{file}: has no frames")
-    lenses = sorted({one.lens.words for one in recorded if not one.lens.is_pinhole})
+    lenses = sorted({recording.lens.words for recording in recorded if not recording.lens.is_pinhole})
     notes = (
         f"intrinsics read from {file.name}",
-        *given,
+        *notes_of_options,
         *group_notes,
         *(
             (f"lens distortion undone ({lenses[0] if len(lenses) == 1 else f'{len(lenses)} lenses'})",)
@@ -169,13 +171,13 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
         if not isinstance(fields, dict):
             raise BadInput(f"{where}: is no object")
         depth = fields.get("depth_file_path")
-        named = fields.get("file_path")
-        color = None if named is None and depth is not None else _with_suffix(named_file(root, named, where))
+        named_path = fields.get("file_path")
+        color = None if named_path is None and depth is not None else _with_suffix(named_file(root, named_path, where))
         pose, problem = _pose(fields.get("transform_matrix"))
         frames.append(
             _Frame(
                 where,
-                str(depth if named is None else named),
+                str(depth if named_path is None else named_path),
                 color,
                 None if depth is None else named_file(root, depth, where),
                 pose,
@@ -212,30 +214,32 @@ def _number(fields: dict[str, Any], name: str, where: str, default: float | None
     return float(value)
 
 
-def _recorded(
+def _recorded_cameras(
     frames: list[_Frame], has_depth: bool, parameters: IngestParameters
 ) -> tuple[list[RecordedCamera], tuple[str, ...]]:
     """Return each frame's camera at the size of its images. Sizes are looked up once for each kind of intrinsics."""
     alike: dict[_Stated, list[_Frame]] = {}
-    stated = [_stated(frame) for frame in frames]
-    for one, frame in zip(stated, frames, strict=True):
-        alike.setdefault(one, []).append(frame)
-    known: dict[_Stated, RecordedCamera] = {}
+    stated = [_read_stated(frame) for frame in frames]
+    for stated_camera, frame in zip(stated, frames, strict=True):
+        alike.setdefault(stated_camera, []).append(frame)
+    recorded: dict[_Stated, RecordedCamera] = {}
     notes: tuple[str, ...] = ()
-    for one, same in alike.items():
+    for stated_camera, same in alike.items():
         where = same[0].where
         color_size = (
             color_image_size(frame.color for frame in same if frame.color)
-            if one.size is None or not has_depth
+            if stated_camera.size is None or not has_depth
             else None
         )
         depth_size = depth_image_size(frame.depth for frame in same if frame.depth is not None) if has_depth else None
-        camera = _camera(one, one.size or color_size or depth_size, all_intrinsics_given(parameters), where)
-        known[one], notes = overridden_recording(camera.at(depth_size or color_size, where), parameters)
-    return [known[one] for one in stated], notes
+        camera = _camera(
+            stated_camera, stated_camera.size or color_size or depth_size, all_intrinsics_given(parameters), where
+        )
+        recorded[stated_camera], notes = overridden_recording(camera.at(depth_size or color_size, where), parameters)
+    return [recorded[stated_camera] for stated_camera in stated], notes
 
 
-def _stated(frame: _Frame) -> _Stated:
+def _read_stated(frame: _Frame) -> _Stated:
     fields, where = frame.fields, frame.where
 
     def optional(name: str) -> float | None:
@@ -289,9 +293,9 @@ def _labels(frames: list[_Frame], recorded: list[RecordedCamera]) -> list[str]:
     """Return the name of each frame's camera: `camera_name`, else the number of its kind in order of appearance."""
     numbers: dict[RecordedCamera, int] = {}
     labels = []
-    for frame, one in zip(frames, recorded, strict=True):
+    for frame, recording in zip(frames, recorded, strict=True):
         name = frame.fields.get("camera_name")
-        number = numbers.setdefault(one, len(numbers) + 1)
+        number = numbers.setdefault(recording, len(numbers) + 1)
         labels.append(name if isinstance(name, str) and name else str(number))
     return labels
 

@@ -26,6 +26,7 @@ from scenewright.stages.kit.formats.trajectories import number_rows
 
 TRAJECTORY, RESULTS, CAMERA = "traj.txt", "results", "cam_params.json"
 UNITS_PER_METRE = 6553.5
+"""Stored depth per metre where the file does not say; Replica's own camera parameters."""
 RENDERED = ((1200, 680), (600.0, 600.0, 599.5, 339.5))
 """Size and intrinsics of these renderings, for folders from which cam_params.json was left out."""
 
@@ -34,8 +35,8 @@ def matches(root: Path) -> str | None:
     """Return the rule that matched, or None."""
     if not (root / TRAJECTORY).is_file():
         return None
-    seen = next((name for name in ("frame", "depth") if any(root.glob(f"{RESULTS}/{name}*"))), None)
-    return f"folder with {TRAJECTORY} and {RESULTS}/{seen}*: Replica" if seen else None
+    frame_kind = next((name for name in ("frame", "depth") if any(root.glob(f"{RESULTS}/{name}*"))), None)
+    return f"folder with {TRAJECTORY} and {RESULTS}/{frame_kind}*: Replica" if frame_kind else None
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
@@ -54,7 +55,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         camera, source = pinhole(RENDERED[1], size, str(root)), "intrinsics assumed: Replica, 600 600 599.5 339.5"
     else:
         camera, source = camera_from_options(size, parameters, f"{root}: there is no {CAMERA}"), "no cam_params.json"
-    camera, given = overridden(camera, parameters)
+    camera, notes_of_options = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, default_units)
     entries = tuple(
         Entry(
@@ -67,7 +68,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     )
     notes = (
         source,
-        *given,
+        *notes_of_options,
         unit_note,
         f"poses assumed: line n of {TRAJECTORY} belongs to image n, counted from 0",
         f"times assumed: frame number / {parameters.frame_rate:g} per second",

@@ -29,7 +29,7 @@ COLOR_FOLDERS = ("image", "color", "rgb")
 TRAJECTORY = "trajectory.log"
 INTRINSICS = ("camera_intrinsic.json", "intrinsic.json")
 PRIMESENSE = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5}
-"""open3d.camera.PinholeCameraIntrinsicParameters.PrimeSenseDefault, 640x480."""
+"""Open3D's `PinholeCameraIntrinsicParameters.PrimeSenseDefault` for 640 x 480 [px]."""
 
 
 def matches(root: Path) -> str | None:
@@ -47,7 +47,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     depths = list(images_by_stem(root / "depth", DEPTH_SUFFIXES).values())
     poses = read_open3d_log(root / TRAJECTORY)
     camera, notes = _camera(root, depth_image_size(depths))
-    camera, given = overridden(camera, parameters)
+    camera, notes_of_options = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, 1000.0)
     if colors and len(colors) != len(depths):
         raise BadInput(
@@ -66,7 +66,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         )
         for index, (color, depth) in enumerate(zip(paired, depths, strict=True))
     )
-    notes = (*notes, *given, unit_note, f"times assumed: {parameters.frame_rate:g} frames per second")
+    notes = (*notes, *notes_of_options, unit_note, f"times assumed: {parameters.frame_rate:g} frames per second")
     streams = (
         *((stream(color_folder.name, "color", colors),) if color_folder else ()),
         stream("depth", "depth", depths),

@@ -56,8 +56,8 @@ def matches(path: Path) -> str | None:
     if all((path / name).is_dir() for name in ("depth", "pose")):
         intrinsics = next((name for name in (*INTRINSIC_FILES, INFO) if (path / name).is_file()), None)
         if intrinsics or (path / "intrinsic").is_dir():
-            seen = "color/, " if (path / "color").is_dir() else ""
-            return f"folder with {seen}depth/, pose/ and {intrinsics or 'intrinsic/'}: ScanNet export"
+            color_folder = "color/, " if (path / "color").is_dir() else ""
+            return f"folder with {color_folder}depth/, pose/ and {intrinsics or 'intrinsic/'}: ScanNet export"
     if any(path.glob("*.sens")) and not (path / "depth").is_dir():
         return "folder with a .sens file: ScanNet container"
     return None
@@ -74,7 +74,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     depths = images_by_number(path / "depth", DEPTH_SUFFIXES)
     poses = images_by_number(path / "pose", (".txt",))
     calibration = _calibration(path, depth_image_size(depths.values()), color_image_size(colors.values()))
-    camera, given = overridden(calibration.depth, parameters)
+    camera, notes_of_options = overridden(calibration.depth, parameters)
     units, unit_note = depth_units(parameters, calibration.units_per_metre)
     entries = []
     for number in sorted(colors.keys() | depths.keys()):
@@ -87,7 +87,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     stray = len(poses.keys() - colors.keys() - depths.keys())
     notes = (
         *calibration.notes,
-        *given,
+        *notes_of_options,
         unit_note,
         f"times assumed: frame number / {parameters.frame_rate:g} per second",
         *((f"{stray} poses belong to no image",) if stray else ()),

@@ -39,6 +39,7 @@ INTRINSICS = ("asus.ini", "kinect2.ini", "intrinsic/asus.ini", "intrinsic/kinect
 ASUS = (544.47329, 544.47329, 320.0, 240.0)
 """The Asus Xtion of the data set at 640x480, as programs for it state it in agreement."""
 LATEST_MICROSECONDS = 9 * 10**15
+"""Latest time that is believed [microseconds]; larger ones would overflow 64-bit nanoseconds."""
 
 
 def matches(root: Path) -> str | None:
@@ -49,8 +50,8 @@ def matches(root: Path) -> str | None:
     sign = next((name for name in (TIMES, *INTRINSICS) if (root / name).is_file()), None)
     if sign is None and any(root.glob("depth/depth[0-9]*.png")):
         sign = "depth/depth<number>.png"
-    seen = f"{color.name}/, " if color else ""
-    return f"folder with {seen}depth/, {TRAJECTORY} and {sign}: SceneNN" if sign else None
+    color_folder = f"{color.name}/, " if color else ""
+    return f"folder with {color_folder}depth/, {TRAJECTORY} and {sign}: SceneNN" if sign else None
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
@@ -121,13 +122,13 @@ def _camera(root: Path, size: tuple[int, int] | None, parameters: IngestParamete
     path = next((root / name for name in INTRINSICS if (root / name).is_file()), None)
     if path is not None:
         camera = resized_camera(_read_ini(path), size, str(path))
-        camera, given = overridden(camera, parameters)
-        return camera, (f"intrinsics read from {path.name}", *given)
+        camera, notes_of_options = overridden(camera, parameters)
+        return camera, (f"intrinsics read from {path.name}", *notes_of_options)
     if all_intrinsics_given(parameters) or size not in (None, (640, 480)):
         why = f"{root}: there is no {INTRINSICS[0]}"
         return camera_from_options(size, parameters, why), ("intrinsics given by option",)
-    camera, given = overridden(pinhole(ASUS, size or (640, 480), str(root)), parameters)
-    return camera, ("intrinsics assumed: Asus Xtion of SceneNN, 544.47329 544.47329 320 240", *given)
+    camera, notes_of_options = overridden(pinhole(ASUS, size or (640, 480), str(root)), parameters)
+    return camera, ("intrinsics assumed: Asus Xtion of SceneNN, 544.47329 544.47329 320 240", *notes_of_options)
 
 
 def _read_ini(path: Path) -> Camera:

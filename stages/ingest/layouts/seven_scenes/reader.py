@@ -19,6 +19,7 @@ FILE = re.compile(r"frame-(\d+)\.(color|depth|pose)\.(jpg|jpeg|png|txt)$")
 DEFAULT_FOCAL_LENGTH, DEFAULT_CENTER = 585.0, (320.0, 240.0)
 """What the data set's page states for its Kinect at 640x480."""
 COLOR_CAMERA = Camera(width=640, height=480, fx=527.0, fy=527.0, cx=322.4, cy=240.0)
+"""Colour camera of the 7-Scenes Kinect for 640 x 480 [px]; fitted, as is where it stands."""
 COLOR_FROM_DEPTH = transform_from(np.eye(3), np.array([-0.0307, 0.0, 0.0]))
 """The colour camera beside the depth camera. The data set does not state them: fitted on 15 frames of the red kitchen
 so that depth jumps fall on colour edges (focal length, principal point and baseline left free); the mean normalised
@@ -45,7 +46,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             files.setdefault(int(match[1]), {})[match[2]] = path
     size = depth_image_size([images["depth"] for _, images in sorted(files.items()) if "depth" in images])
     camera, notes = _camera(root, size)
-    camera, given = overridden(camera, parameters)
+    camera, notes_of_options = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, 1000.0)
     theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
     register = parameters.register_color and theirs
@@ -68,7 +69,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         )
     notes = (
         *notes,
-        *given,
+        *notes_of_options,
         unit_note,
         f"times assumed: frame number / {parameters.frame_rate:g} per second",
         REGISTERED_NOTE if register else UNREGISTERED_NOTE if theirs else OTHER_CAMERA_NOTE,

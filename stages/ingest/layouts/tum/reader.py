@@ -38,6 +38,7 @@ COLOR_LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
 ASSOCIATIONS = ("associated.txt", "associations.txt", "association.txt", "associate.txt")
 CALIBRATIONS = ("calibration.txt", "camera.txt", "intrinsics.txt")
 UNITS_PER_METRE = 5000.0
+"""Stored depth per metre in TUM's and ICL-NUIM's folders, as both data sets state it."""
 FREIBURG = {
     "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),
     "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
@@ -46,8 +47,10 @@ FREIBURG = {
 """Colour cameras of the data set at 640x480 as its page states them: fx fy cx cy; k1 k2 p1 p2 k3."""
 FREIBURG_NAME = re.compile(r"(?:freiburg|(?<![a-z])fr)([123])(?!\d)")
 ICL_NUIM = (481.2, 480.0, 319.5, 239.5)
+"""Intrinsics fx, fy, cx, cy [px] of ICL-NUIM for 640 x 480, as the data set states them."""
 ICL_NUIM_NAME = re.compile(r"icl[-_ ]?nuim|(?:living_?room|office)_?traj\d|(?<![a-z])(?:lr|of)_?kt\d")
 MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
+"""Mirrors y, before and after a pose: ICL-NUIM's camera has its y axis the other way round."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,8 @@ def matches(root: Path) -> str | None:
     if not root.is_dir():
         return None
     if (root / COLOR_LIST).is_file():
-        more = f" and {DEPTH_LIST}" if (root / DEPTH_LIST).is_file() else ", no depth"
-        return f"folder with {COLOR_LIST}{more}: TUM RGB-D"
+        depth_words = f" and {DEPTH_LIST}" if (root / DEPTH_LIST).is_file() else ", no depth"
+        return f"folder with {COLOR_LIST}{depth_words}: TUM RGB-D"
     pairs = next((name for name in ASSOCIATIONS if (root / name).is_file()), None)
     if pairs is None and (root / DEPTH_LIST).is_file():
         return f"folder with {DEPTH_LIST}, no colour: TUM RGB-D"
@@ -82,14 +85,14 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     poses = _poses(root, unit)
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
     recorded, notes = _camera(root, size, parameters, icl_nuim)
-    recorded, given = overridden_recording(recorded, parameters)
+    recorded, notes_of_options = overridden_recording(recorded, parameters)
     units, unit_note = depth_units(parameters, UNITS_PER_METRE)
     form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), units)
     tolerance = round(parameters.maximum_time_difference * 1e9)
-    seen = colors if colors.paths else depths
-    partners = mutual_nearest(seen.stamps, depths.stamps, tolerance)
+    main_list = colors if colors.paths else depths
+    partners = mutual_nearest(main_list.stamps, depths.stamps, tolerance)
     entries = []
-    for stamp, path, partner in zip(seen.stamps, seen.paths, partners, strict=True):
+    for stamp, path, partner in zip(main_list.stamps, main_list.paths, partners, strict=True):
         missing = bool(depths.paths) and partner < 0
         depth = depths.paths[partner] if partner >= 0 else None
         # The shape of the scene comes from the depth image, so its time is that of the frame.
@@ -103,7 +106,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unpaired = len(depths.paths) - int((partners >= 0).sum())
     notes = (
         *notes,
-        *given,
+        *notes_of_options,
         *((unit_note,) if depths.paths else ()),
         *(poses.notes if poses else ()),
         *((f"{unpaired} depth images are paired with no colour image",) if unpaired else ()),
@@ -123,7 +126,7 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
     path = next((root / name for name in ASSOCIATIONS if (root / name).is_file()), None)
     if path is None or (root / COLOR_LIST).is_file():
         colors, depths = (
-            _read_list(root, name, unit) if (root / name).is_file() else _sorted([], [])
+            _read_list(root, name, unit) if (root / name).is_file() else _sort_by_time([], [])
             for name in (COLOR_LIST, DEPTH_LIST)
         )
         return colors, depths
@@ -137,7 +140,7 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
         for (stamps, paths), (stamp, name) in zip(columns, pairs, strict=True):
             stamps.append(round(exact_stamp(stamp, where) * unit))
             paths.append(named_file(root, name, where))
-    return _sorted(*columns[0]), _sorted(*columns[1])
+    return _sort_by_time(*columns[0]), _sort_by_time(*columns[1])
 
 
 def _read_list(root: Path, name: str, unit: float) -> _Stamped:
@@ -147,7 +150,7 @@ def _read_list(root: Path, name: str, unit: float) -> _Stamped:
             raise BadInput(f"{where}: expected a time stamp and a file name")
         stamps.append(round(exact_stamp(fields[0], where) * unit))
         paths.append(named_file(root, fields[1].strip(), where))
-    return _sorted(stamps, paths)
+    return _sort_by_time(stamps, paths)
 
 
 def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
@@ -160,7 +163,7 @@ def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
     ]
 
 
-def _sorted(stamps: list[int], paths: list[Path]) -> _Stamped:
+def _sort_by_time(stamps: list[int], paths: list[Path]) -> _Stamped:
     order = sorted(range(len(stamps)), key=lambda index: stamps[index])
     return _Stamped(np.array([stamps[i] for i in order], np.int64), tuple(paths[i] for i in order))
 

@@ -18,6 +18,7 @@ SMALLEST_ALPHA = np.float32(rasterizer.SMALLEST_ALPHA)
 LARGEST_ALPHA = np.float32(rasterizer.LARGEST_ALPHA)
 LEAST_TRANSMITTANCE = np.float32(rasterizer.LEAST_TRANSMITTANCE)
 ONE, HALF = np.float32(1.0), np.float32(0.5)
+"""Numbers of single precision, so that nothing is computed in double."""
 
 
 @numba.njit(cache=True)
@@ -55,7 +56,7 @@ def blend(starts, members, flat, reach, values, background, width, height):  # t
     channels = values.shape[1]
     columns, rows = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
     image = np.zeros((height, width, channels), np.float32)
-    left = np.ones((height, width), np.float32)
+    transmittance = np.ones((height, width), np.float32)
     looked = np.zeros((height, width), np.int32)
     for tile in numba.prange(columns * rows):
         x0, y0 = (tile % columns) * TILE, (tile // columns) * TILE
@@ -81,7 +82,7 @@ def blend(starts, members, flat, reach, values, background, width, height):  # t
                     alpha = min(LARGEST_ALPHA, opacity * np.float32(math.exp(-power)))
                     if alpha < SMALLEST_ALPHA:
                         continue
-                    before = left[y, x]
+                    before = transmittance[y, x]
                     after = before * (ONE - alpha)
                     if after <= LEAST_TRANSMITTANCE:
                         looked[y, x] = k - starts[tile]
@@ -90,12 +91,12 @@ def blend(starts, members, flat, reach, values, background, width, height):  # t
                     weight = alpha * before
                     for channel in range(channels):
                         image[y, x, channel] += weight * values[n, channel]
-                    left[y, x] = after
+                    transmittance[y, x] = after
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
                 for channel in range(channels):
-                    image[y, x, channel] += left[y, x] * background[channel]
-    return image, left, looked
+                    image[y, x, channel] += transmittance[y, x] * background[channel]
+    return image, transmittance, looked
 
 
 @numba.njit(cache=True, parallel=True, fastmath=True)
@@ -118,7 +119,7 @@ def blend_back(starts, members, flat, reach, values, left, looked, image_gradien
         for k in range(starts[tile] + deepest - 1, starts[tile] - 1, -1):
             n = members[k]
             u, v, a, b, c, opacity = flat[n, 0], flat[n, 1], flat[n, 2], flat[n, 3], flat[n, 4], flat[n, 5]
-            own = gradients[k]
+            row = gradients[k]
             for y in range(max(y0, reach[n, 2]), min(y1, reach[n, 3]) + 1):
                 dy = np.float32(y) - v
                 for x in range(max(x0, reach[n, 0]), min(x1, reach[n, 1]) + 1):
@@ -134,22 +135,22 @@ def blend_back(starts, members, flat, reach, values, left, looked, image_gradien
                         continue
                     before = left[y, x] / (ONE - alpha)
                     weight = alpha * before
-                    seen = np.float32(0.0)
+                    color_gradient = np.float32(0.0)
                     for channel in range(channels):
                         gradient = image_gradients[y, x, channel]
-                        seen += gradient * values[n, channel]
-                        own[6 + channel] += weight * gradient
-                    by_alpha = before * seen - behind[y, x] / (ONE - alpha)
-                    behind[y, x] += weight * seen
+                        color_gradient += gradient * values[n, channel]
+                        row[6 + channel] += weight * gradient
+                    by_alpha = before * color_gradient - behind[y, x] / (ONE - alpha)
+                    behind[y, x] += weight * color_gradient
                     left[y, x] = before
                     if opacity * strength < LARGEST_ALPHA:
                         by_power = -alpha * by_alpha
-                        own[0] -= by_power * (a * dx + b * dy)
-                        own[1] -= by_power * (b * dx + c * dy)
-                        own[2] += by_power * HALF * dx * dx
-                        own[3] += by_power * dx * dy
-                        own[4] += by_power * HALF * dy * dy
-                        own[5] += by_alpha * strength
+                        row[0] -= by_power * (a * dx + b * dy)
+                        row[1] -= by_power * (b * dx + c * dy)
+                        row[2] += by_power * HALF * dx * dx
+                        row[3] += by_power * dx * dy
+                        row[4] += by_power * HALF * dy * dy
+                        row[5] += by_alpha * strength
     return gradients
 
 

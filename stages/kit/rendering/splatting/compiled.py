@@ -47,21 +47,21 @@ class CompiledDrawn:
         order = np.argsort(depths, kind="stable")
         columns, rows = -(-camera.width // TILE), -(-camera.height // TILE)
         self._starts, self._members = list_tiles(order, self._reach, columns, rows)
-        image, self._left, self._looked = blend(
+        image, self._transmittance, self._looked = blend(
             *(self._starts, self._members, self._flat, self._reach, self._values, self._background),
             *(camera.width, camera.height),
         )
-        self.picture = Picture(image[..., :3], image[..., 3], 1.0 - self._left, image[..., 4:])
+        self.picture = Picture(image[..., :3], image[..., 3], 1.0 - self._transmittance, image[..., 4:])
 
     def backward(self, gradients: Picture) -> GaussianGradients:
         """Return the derivatives of a loss by the Gaussians and the camera, given those by the picture."""
         g = self._gaussians
-        parts = (gradients.color, gradients.depth[..., None], gradients.features)
-        image_gradients = np.concatenate(parts, axis=-1).astype(np.float32, copy=False)
-        behind = self._left * (image_gradients @ self._background - gradients.alpha).astype(np.float32)
+        channels = (gradients.color, gradients.depth[..., None], gradients.features)
+        image_gradients = np.concatenate(channels, axis=-1).astype(np.float32, copy=False)
+        behind = self._transmittance * (image_gradients @ self._background - gradients.alpha).astype(np.float32)
         by_entry = blend_back(
             *(self._starts, self._members, self._flat, self._reach, self._values),
-            *(self._left.copy(), self._looked, image_gradients, behind),
+            *(self._transmittance.copy(), self._looked, image_gradients, behind),
         )
         sums = gathered(self._members, by_entry, len(g))
         by_mean, by_quaternion, by_scale, by_logit, twist = project_back(

@@ -40,13 +40,13 @@ class GpuRasterizer:
         twist = torch.zeros(6, device="cuda", requires_grad=True)
         camera = view.camera
         basis = view_basis(gaussians.means, view.camera_from_world, gaussians.harmonics.shape[1])
-        given = torch.tensor(basis, dtype=torch.float32, device="cuda")
-        colors = torch.clamp(torch.einsum("nk,nkc->nc", given, leaves["harmonics"]) + 0.5, min=0.0)
+        harmonic_basis = torch.tensor(basis, dtype=torch.float32, device="cuda")
+        colors = torch.clamp(torch.einsum("nk,nkc->nc", harmonic_basis, leaves["harmonics"]) + 0.5, min=0.0)
         values = torch.cat([colors, leaves["features"]], dim=1)
         matrix = [[camera.fx, 0.0, camera.cx + 0.5], [0.0, camera.fy, camera.cy + 0.5], [0.0, 0.0, 1.0]]
         background = torch.zeros(1, values.shape[1], device="cuda")
         background[0, :3] = torch.tensor(view.background)
-        image, alpha, told = self._draw(
+        image, alpha, details = self._draw(
             leaves["means"],
             leaves["quaternions"],
             torch.exp(leaves["log_scales"]),
@@ -62,8 +62,8 @@ class GpuRasterizer:
             backgrounds=background,
             render_mode="RGB+D",
         )
-        told["means2d"].retain_grad()
-        return GpuDrawn(leaves, twist, image[0], alpha[0, ..., 0], told)
+        details["means2d"].retain_grad()
+        return GpuDrawn(leaves, twist, image[0], alpha[0, ..., 0], details)
 
 
 class GpuDrawn:
@@ -72,7 +72,7 @@ class GpuDrawn:
     def __init__(
         self, leaves: dict[str, torch.Tensor], twist: torch.Tensor, image: torch.Tensor, alpha: torch.Tensor, told: Any
     ) -> None:
-        self._leaves, self._twist, self._image, self._alpha, self._told = leaves, twist, image, alpha, told
+        self._leaves, self._twist, self._image, self._alpha, self._details = leaves, twist, image, alpha, told
         pixels = image.detach().cpu().numpy()
         self.visible = (told["radii"][0] > 0).reshape(len(leaves["means"]), -1).all(dim=1).cpu().numpy()
         self.picture = Picture(pixels[..., :3], pixels[..., -1], alpha.detach().cpu().numpy(), pixels[..., 3:-1])
@@ -89,6 +89,6 @@ class GpuDrawn:
 
         return GaussianGradients(
             **{name: of(leaf) for name, leaf in self._leaves.items()},
-            centers=of(self._told["means2d"])[0],
+            centers=of(self._details["means2d"])[0],
             twist=of(self._twist),
         )

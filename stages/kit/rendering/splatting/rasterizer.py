@@ -20,8 +20,11 @@ from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradien
 DILATION = 0.3
 """Added to both variances in the picture [px^2]."""
 SMALLEST_ALPHA = 1.0 / 255.0
+"""Opacity below which a Gaussian is not drawn on a pixel (gsplat)."""
 LARGEST_ALPHA = 0.999
+"""Largest opacity of a Gaussian on a pixel (gsplat)."""
 LEAST_TRANSMITTANCE = 1e-4
+"""Transmittance below which a pixel is done (gsplat)."""
 NEAR = 0.05
 """What is nearer to the camera's plane is not drawn [m]."""
 MARGIN = 0.15

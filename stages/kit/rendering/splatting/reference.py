@@ -61,11 +61,11 @@ def rotations(quaternions: torch.Tensor) -> torch.Tensor:
 
 def moved(camera_from_world: np.ndarray, twist: torch.Tensor) -> torch.Tensor:
     """Return the pose (4, 4) after a motion (6,), translation and rotation, that is small: to first order."""
-    given = torch.tensor(camera_from_world, dtype=twist.dtype, device=twist.device)
+    pose = torch.tensor(camera_from_world, dtype=twist.dtype, device=twist.device)
     zero = torch.zeros((), dtype=twist.dtype, device=twist.device)
     (x, y, z), (a, b, c) = twist[:3], twist[3:]
     rows = ((zero, -c, b, x), (c, zero, -a, y), (-b, a, zero, z), (zero, zero, zero, zero))
-    return given + torch.stack([torch.stack(row) for row in rows]) @ given
+    return pose + torch.stack([torch.stack(row) for row in rows]) @ pose
 
 
 def project(leaves: dict[str, torch.Tensor], twist: torch.Tensor, view: View) -> Flat:
@@ -103,10 +103,10 @@ def blend(flat: Flat, values: torch.Tensor, view: View) -> tuple[torch.Tensor, t
         reach = torch.sqrt(power[:, None] * torch.diagonal(flat.covariances, dim1=1, dim2=2))
         first, last = torch.ceil(flat.centers - reach), torch.floor(flat.centers + reach)
         edge = torch.tensor([camera.width - 1, camera.height - 1])
-        there = (flat.depths > rasterizer.NEAR) & (power > 0)
-        there &= ((first <= last) & (last >= 0) & (first <= edge)).all(dim=1)
+        is_drawn = (flat.depths > rasterizer.NEAR) & (power > 0)
+        is_drawn &= ((first <= last) & (last >= 0) & (first <= edge)).all(dim=1)
         order = torch.argsort(flat.depths, stable=True)
-        order = order[there[order]]
+        order = order[is_drawn[order]]
     conics = torch.linalg.inv(flat.covariances)
     background = torch.zeros(values.shape[1], dtype=torch.float64)
     background[:3] = torch.tensor(view.background, dtype=torch.float64)
@@ -116,15 +116,15 @@ def blend(flat: Flat, values: torch.Tensor, view: View) -> tuple[torch.Tensor, t
         for left in range(0, camera.width, TILE):
             low = torch.tensor([left, top])
             high = torch.tensor([min(left + TILE, camera.width) - 1, min(top + TILE, camera.height) - 1])
-            near = order[((last[order] >= low) & (first[order] <= high)).all(dim=1)]
+            in_tile = order[((last[order] >= low) & (first[order] <= high)).all(dim=1)]
             grid = torch.meshgrid(
                 torch.arange(top, int(high[1]) + 1), torch.arange(left, int(high[0]) + 1), indexing="ij"
             )
             pixels = torch.stack([grid[1], grid[0]], dim=-1).double()
-            tiles.append(_tile(pixels, flat, conics, values, near, background))
+            tiles.append(_tile(pixels, flat, conics, values, in_tile, background))
         rows.append(torch.cat(tiles, dim=1))
     image = torch.cat(rows, dim=0)
-    return image[..., :-1], image[..., -1], there
+    return image[..., :-1], image[..., -1], is_drawn
 
 
 def _tile(
@@ -132,21 +132,21 @@ def _tile(
     flat: Flat,
     conics: torch.Tensor,
     values: torch.Tensor,
-    near: torch.Tensor,
+    in_tile: torch.Tensor,
     background: torch.Tensor,
 ) -> torch.Tensor:
-    """Return channels and alpha (h, w, C + 1) of pixels (h, w, 2), Gaussians `near` given from front to back."""
-    offset = pixels[:, :, None, :] - flat.centers[near]
-    distance = torch.einsum("hwni,nij,hwnj->hwn", offset, conics[near], offset)
-    alpha = torch.clamp(flat.opacities[near] * torch.exp(-0.5 * distance), max=rasterizer.LARGEST_ALPHA)
+    """Return channels and alpha (h, w, C + 1) of pixels (h, w, 2), Gaussians `in_tile` given from front to back."""
+    offset = pixels[:, :, None, :] - flat.centers[in_tile]
+    distance = torch.einsum("hwni,nij,hwnj->hwn", offset, conics[in_tile], offset)
+    alpha = torch.clamp(flat.opacities[in_tile] * torch.exp(-0.5 * distance), max=rasterizer.LARGEST_ALPHA)
     alpha = torch.where(alpha >= rasterizer.SMALLEST_ALPHA, alpha, torch.zeros_like(alpha))
     after = torch.cumprod(1.0 - alpha, dim=2)
     alpha = torch.where(after > rasterizer.LEAST_TRANSMITTANCE, alpha, torch.zeros_like(alpha))
     after = torch.cumprod(1.0 - alpha, dim=2)
     before = torch.cat([torch.ones_like(after[..., :1]), after[..., :-1]], dim=2)
-    left = after[..., -1:] if len(near) else torch.ones_like(pixels[..., :1])
-    image = (alpha * before[..., : len(near)]) @ values[near] + left * background
-    return torch.cat([image, 1.0 - left], dim=2)
+    transmittance = after[..., -1:] if len(in_tile) else torch.ones_like(pixels[..., :1])
+    image = (alpha * before[..., : len(in_tile)]) @ values[in_tile] + transmittance * background
+    return torch.cat([image, 1.0 - transmittance], dim=2)
 
 
 class ReferenceDrawn:

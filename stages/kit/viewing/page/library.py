@@ -16,9 +16,9 @@ END = 'Object.defineProperty(t,"__esModule",{value:!0})}));'
 
 def three_js() -> str:
     """Return the text of three.js, which defines `THREE`. Raises MissingDependency when trimesh no longer ships it."""
-    place = files("trimesh").joinpath(*TEMPLATE)
+    template = files("trimesh").joinpath(*TEMPLATE)
     try:
-        with place.open("rb") as file, zipfile.ZipFile(file) as archive:
+        with template.open("rb") as file, zipfile.ZipFile(file) as archive:
             text = archive.read(PAGE).decode("utf-8")
     except (OSError, KeyError, zipfile.BadZipFile) as error:
         raise MissingDependency(f"trimesh ships no viewer: {error}", hint="install requirements.lock") from None

@@ -11,14 +11,14 @@ import numpy as np
 from scenewright.stages.kit.geometry.cells import cell_keys
 
 STEPS = 65_535
-"""Of a coordinate, between the least and the largest of its mesh: 0.15 mm over 10 m."""
+"""Steps of a coordinate between the least and the largest of its mesh: 0.15 mm over 10 m."""
 
 
 @dataclass
 class Block:
     """Bytes of arrays, each at a multiple of 4. Equal arrays are held once."""
 
-    _parts: list[bytes] = field(default_factory=list)
+    _chunks: list[bytes] = field(default_factory=list)
     _size: int = 0
     _places: dict[bytes, list[int]] = field(default_factory=dict)
 
@@ -29,7 +29,7 @@ class Block:
         if key not in self._places:
             self._places[key] = [self._size, array.size]
             padding = bytes(-len(data) % 4)
-            self._parts += [data, padding]
+            self._chunks += [data, padding]
             self._size += len(data) + len(padding)
         return self._places[key]
 
@@ -43,7 +43,7 @@ class Block:
 
     def text(self) -> str:
         """Return everything, compressed, in base 64; the same arrays give the same text."""
-        return base64.b64encode(gzip.compress(b"".join(self._parts), 6, mtime=0)).decode("ascii")
+        return base64.b64encode(gzip.compress(b"".join(self._chunks), 6, mtime=0)).decode("ascii")
 
 
 def thinned_mesh(vertices: np.ndarray, faces: np.ndarray, edge: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -27,17 +27,17 @@ from scenewright.stages.kit.viewing.page.packing import STEPS, Block, thinned_me
 
 FOLDER = Path(__file__).resolve().parent
 LARGEST_PAGE = 15_000_000
-"""Bytes."""
+"""Largest page [bytes]."""
 MOST_VERTICES = 240_000
-"""Of all meshes together; more are thinned."""
+"""Most vertices of all meshes together; more are thinned."""
 EDGES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.5, 1.0, 5.0)
 """Cubes that hold one vertex, the least that suffice [m]."""
 SMALL = 500
 """Vertices of meshes that are never thinned."""
 MOST_POINTS = 60_000
-"""Of a cloud."""
+"""Most points of a cloud; more are thinned."""
 MOST_PICTURE_BYTES = 4_000_000
-"""Of all pictures together; of more, every second one, every third one and so on is kept."""
+"""Most bytes of all pictures together; of more, every second one, every third one and so on is kept."""
 MARGIN = 0.15
 """Around what is kept in sight where no viewer said what that is, of its size."""
 
@@ -74,7 +74,7 @@ class PageCanvas:
         self._meshes: list[_Mesh] = []
         self._pictures: list[tuple[str, float | None, bytes]] = []
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
-        self._said: dict[str, list[Any]] = {
+        self._entries: dict[str, list[Any]] = {
             kind: [] for kind in ("lines", "points", "boxes", "transforms", "documents", "views", "joints", "moments")
         }
         self._graph: dict[str, Any] | None = None
@@ -104,7 +104,7 @@ class PageCanvas:
 
     def view(self, name: str, *hidden: str) -> None:
         """See Canvas."""
-        self._said["views"].append({"name": name, "hidden": list(hidden)})
+        self._entries["views"].append({"name": name, "hidden": list(hidden)})
 
     def mesh(
         self,
@@ -132,7 +132,7 @@ class PageCanvas:
         entry = {**self._entry(path), **self._block.positions(points[::every]), "radius": float(radius)}
         if colors is not None and np.asarray(colors).ndim == 2:
             entry["colors"] = self._block.put(np.asarray(colors)[::every, :3].astype(np.uint8))
-        self._said["points"].append(entry)
+        self._entries["points"].append(entry)
 
     def line(
         self,
@@ -146,7 +146,7 @@ class PageCanvas:
         arrays = [np.asarray(strip, dtype=float).reshape(-1, 3) for strip in strips]
         if not sum(map(len, arrays)):
             return
-        self._said["lines"].append(
+        self._entries["lines"].append(
             {
                 **self._entry(path),
                 **self._block.positions(np.concatenate(arrays)),
@@ -163,18 +163,18 @@ class PageCanvas:
         if boxes:
             corners = np.concatenate([box_corners(box) for box in boxes])
             rows = {"labels": labels, "colors": [bytes_of(color) for color in colors]}
-            self._said["boxes"].append({**self._entry(path), **self._block.positions(corners), **rows})
+            self._entries["boxes"].append({**self._entry(path), **self._block.positions(corners), **rows})
 
     def transform(self, path: str, parent_from_child: np.ndarray, scale: float = 1.0) -> None:
         """See Canvas."""
         matrix = np.asarray(parent_from_child, dtype=float).copy()
         matrix[:3, :3] *= scale
         rows = [round(float(value), 6) for value in matrix[:3].ravel()]
-        self._said["transforms"].append({**self._entry(path), "rows": rows})
+        self._entries["transforms"].append({**self._entry(path), "rows": rows})
 
     def joints(self, links: Sequence[JointedLink]) -> None:
         """See Canvas."""
-        self._said["joints"] += [
+        self._entries["joints"] += [
             {**vars(link), "parent_from_link": np.asarray(link.parent_from_link)[:3].ravel().tolist()} for link in links
         ]
 
@@ -211,17 +211,17 @@ class PageCanvas:
     def trust(self, rows: Mapping[str, Trust]) -> None:
         """See Canvas."""
         for name, trust in rows.items():
-            said = [cleaned(reason) for reason in trust.reasons]
+            reasons = [cleaned(reason) for reason in trust.reasons]
             color = bytes_of(trust_color(trust.share))
-            self._trust[name] = {"share": round(trust.share, 3), "reasons": said, "color": color}
+            self._trust[name] = {"share": round(trust.share, 3), "reasons": reasons, "color": color}
 
     def moment(self, seconds: float, text: str, *, bad: bool = False) -> None:
         """See Canvas."""
-        self._said["moments"].append({"time": float(seconds), "text": cleaned(text), "bad": bad})
+        self._entries["moments"].append({"time": float(seconds), "text": cleaned(text), "bad": bad})
 
     def document(self, path: str, markdown: str) -> None:
         """See Canvas."""
-        self._said["documents"].append({**self._entry(path), "text": cleaned(markdown)})
+        self._entries["documents"].append({**self._entry(path), "text": cleaned(markdown)})
 
     def _entry(self, path: str) -> dict[str, Any]:
         return {"path": path, "time": self._time}
@@ -253,12 +253,12 @@ class PageCanvas:
         every = max(1, -(-total // MOST_PICTURE_BYTES))
         if every > 1:
             self._left_out.add(f"all but each {every}th picture")
-        kept = []
+        pictures = []
         for path, moment, data in self._pictures[::every]:
             kind = "image/png" if data.startswith(PNG_START) else "image/jpeg"
             address = f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
-            kept.append({"path": path, "time": moment, "address": address})
-        return kept
+            pictures.append({"path": path, "time": moment, "address": address})
+        return pictures
 
     def _document(self) -> dict[str, Any]:
         meshes = self._drawn_meshes()
@@ -273,23 +273,23 @@ class PageCanvas:
             "graph": self._graph,
             "trust": self._trust,
             "left_out": sorted(self._left_out),
-            **self._said,
+            **self._entries,
         }
 
     def _enclose_everything(self) -> None:
         """Keep all in sight where it is first placed, but for what cameras see."""
         bounds = [(mesh.path, mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) for mesh in self._meshes]
-        for entry in (entry for kind in ("points", "lines", "boxes") for entry in self._said[kind]):
+        for entry in (entry for kind in ("points", "lines", "boxes") for entry in self._entries[kind]):
             if entry["at"][1] and entry["path"] not in self._pyramids:
                 low = np.array(entry["low"])
                 bounds.append((entry["path"], low, low + STEPS * np.array(entry["step"])))
         placed: dict[str, np.ndarray] = {}
-        for entry in self._said["transforms"]:
+        for entry in self._entries["transforms"]:
             placed.setdefault(entry["path"], np.array([*entry["rows"], 0, 0, 0, 1]).reshape(4, 4))
         for path, low, high in bounds:
-            parts, world = path.split("/"), np.eye(4)
-            for k in range(len(parts)):
-                world = world @ placed.get("/".join(parts[: k + 1]), np.eye(4))
+            names, world = path.split("/"), np.eye(4)
+            for k in range(len(names)):
+                world = world @ placed.get("/".join(names[: k + 1]), np.eye(4))
             corners = apply(world, trimesh.bounds.corners([low, high]))
             self.enclose(corners.min(axis=0), corners.max(axis=0))
         margin = MARGIN * (self._high - self._low)

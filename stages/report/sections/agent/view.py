@@ -9,6 +9,7 @@ from scenewright.stages.report.images import animation, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH, MOST_ROWS = 1100, 80
+"""Width of pictures [px], and most turns that are listed."""
 
 
 def turn_row(number: int, turn: EpisodeTurn) -> dict[str, Any]:

@@ -83,12 +83,12 @@ def _replacement_row(replacement: Replacement) -> dict[str, str]:
     chosen = replacement.chosen
     rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(replacement.rejected.items()))
     others = ", ".join(dict.fromkeys(c.model_id for c in replacement.alternatives[:4]))
-    what = chosen.model_id if chosen is not None and replacement.decision == "cad" else replacement.decision
+    decision = chosen.model_id if chosen is not None and replacement.decision == "cad" else replacement.decision
     if replacement.reason:
-        what += f" ({replacement.reason})"
+        decision += f" ({replacement.reason})"
     return {
         "node": replacement.node,
-        "what": what,
+        "what": decision,
         "scale": f"{chosen.scale:.3f}" if chosen else "",
         "matching": f"{chosen.matching_error:.3f}" if chosen else "",
         "alignment": f"{1000 * chosen.alignment_error:.0f} mm" if chosen else "",

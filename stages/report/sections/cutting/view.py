@@ -11,7 +11,7 @@ from scenewright.stages.report.images import Picture, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 
 
 def view(page: Page) -> dict[str, Any] | None:

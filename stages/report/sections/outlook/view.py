@@ -10,12 +10,12 @@ from scenewright.stages.report.page import Page
 
 def view(page: Page) -> dict[str, Any] | None:
     """Return the groups of sentences; None when there is nothing to say."""
-    found = outlook({role: Facts(artifact.outcome, artifact.summary) for role, artifact in page.artifacts.items()})
+    verdict = outlook({role: Facts(artifact.outcome, artifact.summary) for role, artifact in page.artifacts.items()})
     groups = [
-        ("To rely on", found.sound),
-        ("Not to rely on", found.doubtful),
-        ("Not seen", found.missing),
-        ("What to do next", found.advice),
+        ("To rely on", verdict.sound),
+        ("Not to rely on", verdict.doubtful),
+        ("Not seen", verdict.missing),
+        ("What to do next", verdict.advice),
     ]
-    shown = [(title, texts) for title, texts in groups if texts]
-    return {"groups": shown} if shown else None
+    groups_with_texts = [(title, texts) for title, texts in groups if texts]
+    return {"groups": groups_with_texts} if groups_with_texts else None

@@ -10,8 +10,9 @@ from scenewright.stages.report.images import Picture, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 MOST_ROWS = 60
+"""Most plans that are listed."""
 PICTURES = {
     "layout": "The basket from above after the last plan; red: placements that were refused",
     "scene": "After the last action that was carried out",

@@ -9,6 +9,7 @@ from scenewright.stages.report.acting import plan_view
 from scenewright.stages.report.page import Page
 
 WIDTH = 640
+"""Width of pictures [px]."""
 
 
 def view(page: Page) -> dict[str, Any] | None:

@@ -20,12 +20,12 @@ def view(page: Page) -> dict[str, Any] | None:
     movable = sum(body.movable for body in scene.bodies)
     joints = sum(len(body.joints) for body in scene.bodies)
     rows = body_rows(interactive_scene)
-    shown = [row for row in rows if row.joints or row.movable] or rows
-    if not shown:
+    listed = [row for row in rows if row.joints or row.movable] or rows
+    if not listed:
         return None
     return {
-        "bodies": shown,
-        "fixed_bodies": [row for row in rows if row not in shown],
+        "bodies": listed,
+        "fixed_bodies": [row for row in rows if row not in listed],
         "scene_text": f"{len(scene.bodies)} bodies, {movable} of them free to move, {joints} joints. "
         f"{scene.combined_file} is the whole kinematic tree; {scene.static_file} and one file per free body are for "
         "engines without floating joints." + _verdict(interactive_scene),

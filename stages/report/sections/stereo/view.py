@@ -15,6 +15,7 @@ from scenewright.stages.report.images import Picture, jpeg
 from scenewright.stages.report.page import Page
 
 MOST_FRAMES = 3
+"""Most frames that are shown."""
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,14 @@ from scenewright.stages.report.images import Picture, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 MOST_PICTURES = 6
+"""Most pictures that are shown of an artifact."""
 MOST_RUNS = 60
+"""Most runs that are listed."""
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
 THROWS = 6
+"""Sutures that close the wound of the simulator."""
 CAPTIONS = {
     "sutures": "Figure 4.1: share of trials by sutures to failure",
     "needle": "Errors of the poses; the box is the grasp tolerance (1 mm, 10 degrees)",
@@ -133,12 +136,12 @@ def _run_row(run: SutureRun) -> RunRow:
     return RunRow(run.arm, run.seed, run.sutures, f"{run.seconds:.0f}", run.errors or "none", ended, closed)
 
 
-def _pictures(artifact: Artifact | None, what: str, width: int) -> tuple[tuple[Picture, str], ...]:
+def _pictures(artifact: Artifact | None, subject: str, width: int) -> tuple[tuple[Picture, str], ...]:
     if artifact is None:
         return ()
     paths = sorted(artifact.path("pictures").glob("*.png"))[:MOST_PICTURES]
     return tuple(
-        (from_file(path, f"{what}, frame {int(path.stem)}", width), f"frame {int(path.stem)}") for path in paths
+        (from_file(path, f"{subject}, frame {int(path.stem)}", width), f"frame {int(path.stem)}") for path in paths
     )
 
 
@@ -168,11 +171,11 @@ def tables_of(markdown: str) -> tuple[tuple[str, tuple[tuple[str, ...], ...]], .
 
 def view(page: Page) -> dict[str, Any]:
     """Return what there is of suturing: needle, thread, trial, figures."""
-    shown = suture_view(
+    values = suture_view(
         page.given("suture_needle", SutureNeedle),
         page.given("suture_thread", SutureThread),
         page.given("suture_trial", SutureTrial),
         page.given("suture_evaluation", SutureEvaluation),
         WIDTH,
     )
-    return {"suture": shown}
+    return {"suture": values}

@@ -13,7 +13,7 @@ from scenewright.stages.report.images import Picture, animation, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 CAPTIONS = {
     "overlay": "What was seen, and how sure that is",
     "detections": "What was seen, and how sure that is",
@@ -135,11 +135,11 @@ def _rows(trial: TablewareTrial | None) -> tuple[TablewareRow, ...]:
 
 def view(page: Page) -> dict[str, Any]:
     """Return what there is of a table: what was seen, planned, tried, compared."""
-    shown = tableware_view(
+    values = tableware_view(
         page.given("tableware_detections", TablewareDetections),
         page.given("tableware_plan", TablewarePlan),
         page.given("tableware_trial", TablewareTrial),
         page.given("tableware_evaluation", TablewareEvaluation),
         WIDTH,
     )
-    return {"tableware": shown}
+    return {"tableware": values}

@@ -26,11 +26,11 @@ def view(page: Page) -> dict[str, Any] | None:
     scene, graph = page.given("interactive_scene", InteractiveScene), page.given("contact_graph", ContactGraph)
     if scene is not None and not scene.path(scene.info.combined_file).is_file():
         scene = None
-    shown = panoptic_map is not None and panoptic_map.path("mesh.ply").is_file()
-    if not shown and scene is None:
+    has_mesh = panoptic_map is not None and panoptic_map.path("mesh.ply").is_file()
+    if not has_mesh and scene is None:
         return None
     canvas = PageCanvas("The room")
-    if panoptic_map is not None and shown:
+    if panoptic_map is not None and has_mesh:
         of_scene = (SCENE, SHELL, *DRAWN)
         canvas.view("scan", *(layer for layer in LAYERS if layer != "color"), "boxes", *of_scene)
         draw_panoptic_map(panoptic_map, canvas, *of_scene)
@@ -42,7 +42,7 @@ def view(page: Page) -> dict[str, Any] | None:
         trusted = trust_of_models(cad_scene.info) if cad_scene is not None else None
         name = "scene" if scene is not None else "graph"
         layers = LAYERS if scene is not None else tuple(layer for layer in LAYERS if layer != "color")
-        draw_graph(file, canvas, *layers, trusted=trusted, name=name, boxes=not shown)
+        draw_graph(file, canvas, *layers, trusted=trusted, name=name, boxes=not has_mesh)
     text = canvas.page()
     if len(text) > LARGEST:
         return {"walk_page": "", "walk_size": f"{len(text) / 1e6:.0f} MB", "scripts": ()}

@@ -13,9 +13,9 @@ from scenewright.stages.report.images import Picture, from_file
 from scenewright.stages.report.page import Page
 
 WIDTH = 1100
-"""Of pictures, at most [px]."""
+"""Largest width of pictures [px]."""
 MOST_TURNS = 400
-"""Of the dialogue."""
+"""Most turns of the dialogue that are listed."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ def predicate_rows(file: LearnedDomainFile) -> tuple[PredicateRow, ...]:
     """Return the predicates with the complaints and the examples behind them."""
     rows = []
     for predicate in file.predicates:
-        heard = [phrase for phrase in file.phrases if phrase.predicate == predicate.name]
-        examples = [example.holds for phrase in heard for example in phrase.examples]
-        said = predicate.said.split(": ", 1)[-1]
-        texts = tuple(phrase.text for phrase in heard)
-        rows.append(PredicateRow(predicate.name, said, texts, sum(examples), len(examples) - sum(examples)))
+        phrases = [phrase for phrase in file.phrases if phrase.predicate == predicate.name]
+        examples = [example.holds for phrase in phrases for example in phrase.examples]
+        meaning = predicate.said.split(": ", 1)[-1]
+        texts = tuple(phrase.text for phrase in phrases)
+        rows.append(PredicateRow(predicate.name, meaning, texts, sum(examples), len(examples) - sum(examples)))
     return tuple(rows)
 
 
