@@ -18,6 +18,7 @@ from scenewright.schemas.errors import BadInput, MachineFailure, MissingDependen
 from scenewright.schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
 from scenewright.stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
 from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.discovery import package_of
 from scenewright.stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from scenewright.stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
 from scenewright.stages.engine.model_cache import resolve_weights, with_usual_models
@@ -365,7 +366,7 @@ def _work(stage: Stage, opened: list[_OpenInput], parameters: Parameters, contex
     for item in opened:
         item.check()
     with interruption.waiting():
-        run = importlib.import_module(f"scenewright.stages.{stage.folder}.{stage.module}").run
+        run = importlib.import_module(f"{package_of(stage)}.{stage.module}").run
     values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
     values.update({item.role: item.value for item in opened})
     return run(**values, parameters=parameters, context=context)
