@@ -16,7 +16,8 @@ from tests.contract.installed_package import (
     write_broken_package,
     write_package_of_alternatives,
     write_package_of_the_tutorial,
-)
+)from tests.unit.ingest.folder_writers import write_tum
+from tests.unit.ingest.tiny_room import frames
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 FOLDERS = ("scenewright", "cli", "data", "schemas", "stages")
@@ -45,9 +46,9 @@ assert len(words) > 60
 sys.exit(run(["doctor", "--json"]))
 """
 ALTERNATIVES = """
-import json, sys
+import contextlib, io, json, sys
 from pathlib import Path
-import scenewright
+from scenewright.cli.main import run
 from scenewright.cli.viewing.view import viewer_of
 from scenewright.schemas.kinds import KINDS
 from scenewright.stages.ingest.detection import open_log
@@ -58,11 +59,22 @@ from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.registry import versions
 from scenewright.stages.tableware.planning.choice import declared_policy
 
-log = Path(sys.argv[1])
+def say(*words):
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        assert run(list(words)) == 0, words
+    return " ".join(said.getvalue().split())
+
+helps = {"": "Say how high", "segment": "two spots a frame", "ingest": "crumbs", "report": "--heights",
+         "tableware plan": "newest_first"}
+step = ("heights", "--panoptic-map", sys.argv[1], "--out", "heights", "--json", "--quiet")
+log = Path("log")
 log.mkdir()
 (log / "crumbs.txt").write_text("")
 spots = SegmentParameters(backend="two-spots", spot_size=5)
 print(json.dumps({
+    "helps": [text in say(*name.split(), "--help") for name, text in helps.items()],
+    "runs": [*(json.loads(say(*step))["status"] for _ in range(2)),
+             run(["report", "--heights", "heights", "--out", "report", "--quiet"])],
     "rule": open_log(log, IngestParameters()).rule,
     "backend": choose_backend(BackendRequest(spots)).label,
     "versions": versions(spots),
@@ -140,10 +152,11 @@ def test_every_command_and_doctor_from_another_folder(site: Path, elsewhere: Pat
 
 
 def test_a_step_and_a_chain_make_what_the_checkout_makes(site: Path, elsewhere: Path) -> None:
-    words = ("-m", "scenewright", "tableware", "scene", "--tier", "tier0_cups", "--seed", "3", "--json", "--quiet")
-    made = [json.loads(run(elsewhere, [at], *words, "--out", at.name).stdout) for at in (site, REPOSITORY)]
+    words = ("-m", "scenewright", "ingest", "--log", write_tum(elsewhere / "log", frames(4)), "--json", "--quiet")
+    places = {"by_wheel": site, "by_checkout": REPOSITORY}
+    made = [json.loads(run(elsewhere, [at], *words, "--out", name).stdout) for name, at in places.items()]
     assert made[0]["content_digest"] == made[1]["content_digest"] and made[0]["key"] == made[1]["key"]
-    git = json.loads((elsewhere / site.name / "manifest.json").read_text())["provenance"]["git_commit"]
+    git = json.loads((elsewhere / "by_wheel" / "manifest.json").read_text())["provenance"]["git_commit"]
     assert git == "", "no checkout has made it"
     chain = ("-m", "scenewright", "run", "demo", "--only", "cad_library", "--dry-run", "--json")
     told = json.loads(run(elsewhere, [site], *chain, "--out", "chain").stdout)
@@ -166,22 +179,11 @@ def test_what_installed_packages_add(code: Path, elsewhere: Path, tmp_path: Path
     others = tmp_path / "others"
     write_package_of_the_tutorial(others)
     write_package_of_alternatives(others)
-    path = [code, others]
-    ours = ("-m", "scenewright")
-    for words, expected in {
-        ("--help",): "Say how high",
-        ("segment", "--help"): "two spots a frame",
-        ("ingest", "--help"): "crumbs",
-        ("tableware", "plan", "--help"): "newest_first",
-        ("report", "--help"): "--heights",
-    }.items():
-        assert expected in run(elsewhere, path, *ours, *words, COLUMNS="200").stdout, words
-    step = (*ours, "heights", "--panoptic-map", MAP, "--out", "heights", "--json")
-    assert [json.loads(run(elsewhere, path, *step).stdout)["status"] for _ in range(2)] == ["made", "up to date"]
-    run(elsewhere, path, *ours, "verify", "heights")
-    run(elsewhere, path, *ours, "report", "--heights", "heights", "--out", "report", "--quiet")
+    done = run(elsewhere, [code, others], "-c", ALTERNATIVES, MAP, COLUMNS="200")
     assert '<section id="heights">' in (elsewhere / "report" / "report.html").read_text()
-    assert json.loads(run(elsewhere, path, "-c", ALTERNATIVES, tmp_path / "log").stdout) == {
+    assert json.loads(done.stdout.splitlines()[-1]) == {
+        "helps": [True] * 5,
+        "runs": ["made", "up to date", 0],
         "rule": "folder with crumbs.txt",
         "backend": "spots of 5",
         "versions": {"room-extras": "0.1.0"},
