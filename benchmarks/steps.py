@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.engine.chain import run_command
-from scenewright.stages.engine.discovery import stage_by_name
+from scenewright.stages.engine.discovery import package_of, stage_by_name
 from scenewright.stages.engine.reading import open_artifact
 from scenewright.stages.engine.runner import run_stage
 from scenewright.stages.kit.progress import SilentProgress
@@ -62,7 +62,7 @@ def unrecorded(
     """Run a step's `run` on artifacts that no step wrote (a map made of true surfaces), without a manifest."""
     stage = stage_by_name(name)
     values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
-    function = importlib.import_module(f"scenewright.stages.{stage.folder}.{stage.module}").run
+    function = importlib.import_module(f"{package_of(stage)}.{stage.module}").run
     parameters = stage.parameters.model_validate({} if given is None else dict(given))
     return function(**{**values, **inputs}, parameters=parameters, context=context_in(out, seed, progress))
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
 import typer
 from scenewright.cli import housekeeping
 from scenewright.cli.step_command import make_command
-from scenewright.stages.engine.discovery import all_stages
+from scenewright.stages.engine.discovery import all_stages, package_of
 
+logger = logging.getLogger("scenewright")
 HELP = """Turn robot logs into scenes a robot can act in, and act in them.
 
 Each step reads artifact folders and writes one; `scenewright run reconstruct` chains them.
@@ -24,7 +26,11 @@ def build_application() -> Callable[..., Any]:
     )
     groups: dict[str, typer.Typer] = {}
     two_words = {("urdf", "check"), ("urdf", "settle")}
+    ours = {function.__name__ for function, _ in housekeeping.COMMANDS} | {name for name, *_ in housekeeping.GROUPS}
     for name, stage in all_stages().items():
+        if stage.folder.replace("-", "_") in ours:
+            logger.warning("%s: its step %r is left out: there is a command %s", package_of(stage), name, stage.folder)
+            continue
         group, _, command = name.rpartition(" ")
         parent = application
         if group in all_stages():

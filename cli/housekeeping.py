@@ -1,4 +1,4 @@
-"""Commands that are no steps: run, batch, verify, migrate, view, models, doctor, schemas, makefile."""
+"""Commands that are no steps: run, demo, batch, verify, migrate, view, models, doctor, schemas, makefile."""
 
 from __future__ import annotations
 
@@ -123,6 +123,17 @@ def run(
         _say_what_to_trust(reports)
     _say_what_was_not_ok(reports, accepted, tuple(chain.variables))
     return worst_exit_code(report.code(accepted) for report in reports)
+
+
+def demo(
+    out: Annotated[Path, typer.Option("--out", help="Run folder; one artifact folder per step in it.")],
+    settings: Settings = None,
+    json_output: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> int:
+    """Generate a room, reconstruct it, and let a robot act in it: the pipeline `demo`."""
+    return run("demo", out, settings, json_output=json_output, quiet=quiet, debug=debug)
 
 
 def _say_what_to_trust(reports: list[StepReport]) -> None:
@@ -284,6 +295,7 @@ def makefile(
 
 COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (run, "Pipelines"),
+    (demo, "Pipelines"),
     (batch, "Pipelines"),
     (view, "Artifacts"),
     (inspect, "Artifacts"),

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import tomllib
 from functools import cache
-from pathlib import Path
 from typing import Literal
 
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.places import data_file
 
-VOCABULARY_FILE = Path(__file__).resolve().parent.parent / "data" / "vocabulary.toml"
+VOCABULARY_FILE = data_file("vocabulary.toml")
 VOID = 0
 """Id of points and pixels without a class."""
 UNNAMED = "object"

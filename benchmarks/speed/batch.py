@@ -30,13 +30,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scenewright.schemas.places import HOME
 from scenewright.stages.engine.batch.expansion import Batch, PlannedRun, make_jobs, read_batch, scene_command
 from scenewright.stages.engine.batch.job import Job
 from scenewright.stages.engine.batch.local_executor import LocalExecutor, processors
 from scenewright.stages.engine.batch.results import SceneResult
 from scenewright.stages.engine.batch.scheduler import run_jobs
 from scenewright.stages.engine.batch.session import BatchEnd, run_batch
-from scenewright.stages.engine.chain import REPOSITORY
 from scenewright.stages.kit.measurement.tables import Table, as_markdown
 
 from benchmarks.options import Measurement, asked
@@ -114,7 +114,7 @@ def measure_overhead(folder: Path, scenes: int) -> dict[str, float]:
     """Return seconds per scene of `scenewright run` alone and in a batch."""
     batch, out = write_logs(folder, scenes), folder / "out"
     run_batch(batch, out, jobs=2)
-    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    environment = {**os.environ, "PYTHONPATH": str(HOME)}
     started, processor = time.perf_counter(), processor_seconds()
     for run in batch.runs:
         command = scene_command(batch, run, out / run.name, force=False)

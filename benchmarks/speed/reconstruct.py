@@ -26,8 +26,8 @@ from typing import Any
 import psutil
 from pydantic import Field
 from scenewright.schemas.errors import UsageError
+from scenewright.schemas.places import HOME
 from scenewright.stages.engine.batch.processes import descendants, resident_memory
-from scenewright.stages.engine.chain import REPOSITORY
 from scenewright.stages.kit.measurement.tables import Table, as_markdown
 
 from benchmarks.options import Measurement, asked
@@ -129,7 +129,7 @@ def _processor_seconds() -> float:
 def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
     """Return the figures of all backends and codes: `<code>/<backend>/<measure>`."""
     frames = arguments.frames or (QUICK_FRAMES if arguments.quick else None)
-    codes = {"ours": REPOSITORY}
+    codes = {"ours": HOME}
     if arguments.before is not None:
         if not (arguments.before / ".venv" / "bin" / "python").exists():
             raise UsageError(f"{arguments.before}: no checkout with a .venv", hint="git worktree add, link .venv")

@@ -12,6 +12,7 @@ import scenewright.cli.viewing
 from scenewright.cli.viewing.rerun_canvas import RerunCanvas, import_rerun
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.plugins import taken
 from scenewright.stages.engine.reading import open_artifact
 from scenewright.stages.kit.viewing.canvas import Canvas
 from scenewright.stages.kit.viewing.page.page_canvas import PageCanvas
@@ -20,7 +21,8 @@ PAGE, RECORDING = ".html", ".rrd"
 
 
 def viewer_of(kind: type[Artifact]) -> Callable[[Any, Canvas], None] | None:
-    """Return the function `draw_<kind>` out of a file `*_view.py` of this folder; None when there is none.
+    """Return the function `draw_<kind>` out of a file `*_view.py` of this folder, or of a module that an installed
+    package names in the entry points of `scenewright.viewers`; None when there is none.
 
     It takes the handle and the canvas. A kind without one is drawn as the kind that it can be read as.
     """
@@ -28,6 +30,7 @@ def viewer_of(kind: type[Artifact]) -> Callable[[Any, Canvas], None] | None:
         entry.name for entry in pkgutil.iter_modules(scenewright.cli.viewing.__path__) if entry.name.endswith("_view")
     ]
     modules = [importlib.import_module(f"scenewright.cli.viewing.{name}") for name in files]
+    modules += [module for _, module in taken("scenewright.viewers", lambda module: module)]
     for name in [base.kind for base in kind.__mro__ if issubclass(base, Artifact)]:
         for module in modules:
             draw = getattr(module, f"draw_{name}", None)

@@ -19,11 +19,11 @@ from typing import Any
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.engine import forking
 from scenewright.stages.engine.interruption import PARENT_VARIABLE
+from scenewright.stages.engine.own_code import own_code
 from scenewright.stages.engine.pipelines import Pipeline, Step, resolve_variables, step_arguments, step_modules
 
 OUTCOME_EXIT_CODE = 4
 """An artifact was written, but its outcome is not ok."""
-REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def command_prefix() -> list[str]:
 def run_command(arguments: list[str]) -> tuple[int, str]:
     """Run one scenewright command; progress and messages pass through, standard output is returned."""
     command = [*command_prefix(), *arguments]
-    own = {"PYTHONPATH": str(REPOSITORY), PARENT_VARIABLE: str(os.getpid())}
+    own = {**own_code(), PARENT_VARIABLE: str(os.getpid())}
     if forking.forks():
         return forking.run_forked(command, own)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **own})

@@ -9,8 +9,10 @@ from typing import Any
 
 from scenewright.schemas.base import canonical_json
 from scenewright.schemas.errors import UsageError
+from scenewright.schemas.places import data_file
 from scenewright.schemas.vocabulary import VOCABULARY_FILE
 from scenewright.stages.engine.code.digests import step_code
+from scenewright.stages.engine.discovery import package_of
 from scenewright.stages.kit.digests import sha256_of_file, sha256_of_text
 from scenewright.stages.kit.library_versions import library_version
 from scenewright.stages.kit.stage import Parameters, Stage
@@ -26,9 +28,7 @@ def library_versions(stage: Stage, parameters: Parameters) -> dict[str, str]:
     """
     found = {name: library_version(name) for name in stage.libraries}
     if stage.versions:
-        found.update(
-            importlib.import_module(f"scenewright.stages.{stage.folder}.{stage.versions}").versions(parameters)
-        )
+        found.update(importlib.import_module(f"{package_of(stage)}.{stage.versions}").versions(parameters))
     return dict(sorted(found.items()))
 
 
@@ -36,9 +36,9 @@ def data_file_digests(stage: Stage, parameters: Parameters) -> dict[str, str]:
     """Return name -> sha256 of the files of data/ that the step reads. Raises UsageError for a missing one."""
     names = (VOCABULARY_FILE.name, *(stage.data_files(parameters) if stage.data_files else ()))
     for name in names:
-        if not (VOCABULARY_FILE.parent / name).is_file():
+        if not data_file(name).is_file():
             raise UsageError(f"{stage.name}: data/{name} does not exist", hint="see the files of data/")
-    return {name: sha256_of_file(VOCABULARY_FILE.parent / name) for name in names}
+    return {name: sha256_of_file(data_file(name)) for name in names}
 
 
 def parameters_as_json(parameters: Parameters) -> dict[str, Any]:

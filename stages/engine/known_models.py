@@ -8,9 +8,10 @@ from pathlib import Path
 
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.places import data_file
 from scenewright.stages.kit.digests import sha256_of_file
 
-MODELS_FILE = Path(__file__).resolve().parents[2] / "data" / "models.toml"
+MODELS_FILE = data_file("models.toml")
 
 
 class KnownModel(Model):

@@ -10,11 +10,12 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from scenewright.schemas.errors import UsageError, first_problem
-from scenewright.stages.engine.discovery import all_stages, stage_by_name
+from scenewright.schemas.places import data_file
+from scenewright.stages.engine.discovery import all_stages, package_of, stage_by_name
 from scenewright.stages.kit.configuration import read_toml
 from scenewright.stages.kit.stage import Stage
 
-PIPELINES_FOLDER = Path(__file__).resolve().parents[2] / "data" / "pipelines"
+PIPELINES_FOLDER = data_file("pipelines")
 _VARIABLE = re.compile(r"^\$([a-z_]+)$")
 SHARED_FOLDER = ".shared"
 _NAME = re.compile(r"^[a-z][a-z0-9_]*$")
@@ -115,7 +116,7 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
 def step_modules(pipeline: Pipeline, only: Collection[str] = ()) -> list[str]:
     """Return the module that each of its steps runs, or those of the steps `only`."""
     stages = [stage_by_name(step.stage) for step in pipeline.step if not only or step.name in only]
-    return [f"scenewright.stages.{stage.folder}.{stage.module}" for stage in stages]
+    return [f"{package_of(stage)}.{stage.module}" for stage in stages]
 
 
 def resolve_variables(pipeline: Pipeline, given: Mapping[str, str]) -> dict[str, str | None]:

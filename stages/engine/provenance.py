@@ -8,20 +8,22 @@ import subprocess
 import sys
 from datetime import UTC, datetime
 from functools import cache
-from pathlib import Path
 
 from scenewright.schemas.manifest import Provenance
+from scenewright.schemas.places import HOME, checkout
 from scenewright.stages.kit.digests import sha256_of_file
 from scenewright.stages.kit.library_versions import library_version
-
-REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 @cache
 def _git(*arguments: str) -> str:
+    """Return what git says of the checkout; nothing where there is none, whatever repository lies around it."""
+    folder = checkout()
+    if folder is None or not (folder / ".git").exists():
+        return ""
     try:
         done = subprocess.run(
-            ["git", "-C", str(REPOSITORY), *arguments], capture_output=True, text=True, timeout=10, check=False
+            ["git", "-C", str(folder), *arguments], capture_output=True, text=True, timeout=10, check=False
         )
     except (OSError, subprocess.TimeoutExpired):
         return ""
@@ -43,7 +45,7 @@ def processor_seconds() -> float:
 
 def provenance_now(command: tuple[str, ...], device: str, started: datetime) -> Provenance:
     """Record the command line, versions, platform, time since `started` and peak memory."""
-    lock = REPOSITORY / "requirements.lock"
+    lock = HOME / "requirements.lock"
     return Provenance(
         command=command,
         package_version=library_version("scenewright"),

@@ -20,6 +20,7 @@ from scenewright.stages.engine import estimation, interruption, memory_limit, sh
 from scenewright.stages.engine.accepted_code import carried_on, is_accepted
 from scenewright.stages.engine.code.digests import changed_modules, step_code
 from scenewright.stages.engine.digests import content_digest, record_files
+from scenewright.stages.engine.discovery import package_of
 from scenewright.stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from scenewright.stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
 from scenewright.stages.engine.model_cache import resolve_weights, with_usual_models
@@ -385,7 +386,7 @@ def _work(stage: Stage, opened: list[_OpenInput], parameters: Parameters, contex
     for item in opened:
         item.check()
     with interruption.waiting():
-        run = importlib.import_module(f"scenewright.stages.{stage.folder}.{stage.module}").run
+        run = importlib.import_module(f"{package_of(stage)}.{stage.module}").run
     values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
     values.update({item.role: item.value for item in opened})
     return run(**values, parameters=parameters, context=context)

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
 
-from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.declared import Found, found_in, module_of
 
 STREAMS = ("color", "depth", "right", "labels", "pose")
 
@@ -45,13 +45,18 @@ class SequenceFormat:
     @property
     def module(self) -> str:
         """The module with `write`."""
-        return f"scenewright.stages.export.formats.{self.name}.writer"
+        return f"{module_of(_found(), self.name)}.writer"
+
+
+@cache
+def _found() -> tuple[Found[SequenceFormat], ...]:
+    return found_in("scenewright.stages.export.formats", SequenceFormat, "FORMAT", "scenewright.export_formats")
 
 
 @cache
 def all_formats() -> tuple[SequenceFormat, ...]:
     """Return every declared format in its order. Imports declarations only."""
-    return declared_in("scenewright.stages.export.formats", SequenceFormat, "FORMAT")
+    return tuple(found.declaration for found in _found())
 
 
 def layouts() -> tuple[str, ...]:

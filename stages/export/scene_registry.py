@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from scenewright.schemas.errors import MissingDependency
-from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.declared import Found, found_in, module_of
 from scenewright.stages.kit.library_versions import library_version
 from scenewright.stages.kit.stage import Extra
 
@@ -37,7 +37,7 @@ class SceneFormat:
     @property
     def module(self) -> str:
         """The module with `write`."""
-        return f"scenewright.stages.export.scene_formats.{self.name}.writer"
+        return f"{module_of(_found(), self.name)}.writer"
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,14 @@ class Written:
 
 
 @cache
+def _found() -> tuple[Found[SceneFormat], ...]:
+    return found_in("scenewright.stages.export.scene_formats", SceneFormat, "FORMAT", "scenewright.scene_formats")
+
+
+@cache
 def scene_formats() -> tuple[SceneFormat, ...]:
     """Return every declared format in its order. Imports declarations only."""
-    return declared_in("scenewright.stages.export.scene_formats", SceneFormat, "FORMAT")
+    return tuple(found.declaration for found in _found())
 
 
 def scene_format(name: str) -> SceneFormat:

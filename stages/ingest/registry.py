@@ -29,4 +29,4 @@ class LogLayout:
 @cache
 def all_layouts() -> tuple[LogLayout, ...]:
     """Return every declared layout in the order in which they are tried. Imports declarations only."""
-    return declared_in("scenewright.stages.ingest.layouts", LogLayout, "LAYOUT")
+    return declared_in("scenewright.stages.ingest.layouts", LogLayout, "LAYOUT", "scenewright.layouts")

@@ -17,9 +17,10 @@ from pydantic import ValidationError
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, first_problem
 from scenewright.schemas.outside import file_text, file_toml
+from scenewright.schemas.places import data_file
 from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
 
-LABELS_FOLDER = Path(__file__).resolve().parents[2] / "data" / "labels"
+LABELS_FOLDER = data_file("labels")
 LABEL_FILES = {
     "coco-panoptic": "labels/coco_panoptic.toml",
     "ade20k": "labels/ade20k.toml",

@@ -143,7 +143,7 @@ class PlanAction:
 @cache
 def all_actions() -> tuple[PlanAction, ...]:
     """Return every declared action in the order of the domain."""
-    return declared_in("scenewright.stages.plan.actions", PlanAction, "ACTION")
+    return declared_in("scenewright.stages.plan.actions", PlanAction, "ACTION", "scenewright.actions")
 
 
 @cache

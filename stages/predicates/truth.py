@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from pydantic import Field
 from scenewright.schemas.base import Model
 from scenewright.schemas.outside import LARGEST_SETTINGS, file_text, file_toml
+from scenewright.schemas.places import data_file
 from scenewright.stages.kit.predicates.evaluating import Evaluator
 from scenewright.stages.kit.predicates.expressions import Predicate, check, read
 from scenewright.stages.kit.predicates.room import ROOM_WORDS
@@ -18,7 +18,6 @@ from scenewright.stages.kit.tasks.pddl import parse_domain
 from scenewright.stages.kit.tasks.strips import Atom, Domain
 from scenewright.stages.predicates.state import KITCHEN_WORDS
 
-DATA = Path(__file__).resolve().parents[2] / "data"
 ROOM = "room"
 """The domain of rooms of the chain; the others are the kitchen's."""
 
@@ -75,7 +74,7 @@ class Truth:
 @cache
 def truth_of(domain: str) -> Truth:
     """Return the ground truth of a domain."""
-    folder, words = (DATA / "room", ROOM_WORDS) if domain == ROOM else (DATA / "kitchen", KITCHEN_WORDS)
+    folder, words = (data_file("room"), ROOM_WORDS) if domain == ROOM else (data_file("kitchen"), KITCHEN_WORDS)
     file = TruthFile.model_validate(file_toml(folder / "truth.toml", LARGEST_SETTINGS))
     predicates = {
         name: Predicate(name, meant.arguments, read(meant.means, f"truth.toml, {name}"))

@@ -65,10 +65,14 @@ class Page:
         return RoomViews(self.given("panoptic_map", PanopticMap), self.parameters.view_width)
 
 
-def render(template: str, values: Mapping[str, Any]) -> Markup:
-    """Fill a template of this step. All values are escaped; a missing one raises jinja2.UndefinedError."""
+def render(template: str, values: Mapping[str, Any], folder: Path = FOLDER) -> Markup:
+    """Fill a template of a folder, which may import those of this step. All values are escaped; a missing one raises
+    jinja2.UndefinedError."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(FOLDER), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False
+        loader=jinja2.FileSystemLoader([folder, FOLDER]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=False,
     )
     return Markup(environment.get_template(template).render(**values))
 

@@ -1,5 +1,7 @@
 """Sections of the page, found by place: every folder `sections/<name>/` with a `section.py` is one.
 
+So is every package that an installed distribution names in the entry points of `scenewright.sections`.
+
 `section.py` declares it as SECTION and is cheap to import; `view.py` has `view(page)`, which returns the values of
 `section.html.j2`, or None when there is nothing to show. `tiles` among them (name and value) stand on top of the page;
 `scripts` are digests of the only scripts that may run in it.
@@ -12,10 +14,12 @@ import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from types import ModuleType
 from typing import Any
 
 import scenewright.stages.report.sections
 from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.plugins import taken
 
 
 @dataclass(frozen=True)
@@ -38,14 +42,35 @@ class Section:
 
 
 @cache
+def _found() -> dict[str, tuple[Section, str]]:
+    """Return the sections and their packages by name."""
+    found: dict[str, tuple[Section, str]] = {}
+
+    def take(package: str) -> Section:
+        section: Section = importlib.import_module(f"{package}.section").SECTION
+        if section.name in found:
+            raise RuntimeError(f"section {section.name!r} is declared twice: {package}")
+        found[section.name] = section, package
+        return section
+
+    for entry in pkgutil.iter_modules(scenewright.stages.report.sections.__path__):
+        section = take(f"{scenewright.stages.report.sections.__name__}.{entry.name}")
+        if section.name != entry.name:
+            raise RuntimeError(f"section {section.name!r} is declared in the folder {entry.name!r}")
+    taken("scenewright.sections", lambda module: take(module.__name__))
+    return found
+
+
+@cache
 def all_sections() -> tuple[Section, ...]:
     """Return every section by its place on the page. Imports declarations only."""
-    names = [entry.name for entry in pkgutil.iter_modules(scenewright.stages.report.sections.__path__)]
-    sections = [importlib.import_module(f"scenewright.stages.report.sections.{name}.section").SECTION for name in names]
-    for name, section in zip(names, sections, strict=True):
-        if section.name != name:
-            raise RuntimeError(f"section {section.name!r} is declared in the folder {name!r}")
+    sections = [section for section, _ in _found().values()]
     return tuple(sorted(sections, key=lambda section: (section.order, section.name)))
+
+
+def package_of(section: Section) -> ModuleType:
+    """Return the package with its `view.py` and `section.html.j2`."""
+    return importlib.import_module(_found()[section.name][1])
 
 
 def all_roles() -> dict[str, type[Artifact]]:

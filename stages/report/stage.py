@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from scenewright.schemas.artifact import Artifact
@@ -14,7 +15,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.report.page import Page, render, render_page
 from scenewright.stages.report.parameters import STAGE, ReportParameters
-from scenewright.stages.report.section import all_sections
+from scenewright.stages.report.section import all_sections, package_of
 
 MAXIMUM_BYTES = 15_000_000
 """Largest report [bytes]; a larger one is refused."""
@@ -35,9 +36,10 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
         if section.reads and not any(page.given(role, kind) for role, kind in section.reads.items()):
             continue
         with context.progress.step(section.name):
-            values = importlib.import_module(f"scenewright.stages.report.sections.{section.name}.view").view(page)
+            package = package_of(section)
+            values = importlib.import_module(f"{package.__name__}.view").view(page)
         if values is not None:
-            html = render(f"sections/{section.name}/section.html.j2", {**head, **values})
+            html = render("section.html.j2", {**head, **values}, Path(package.__path__[0]))
             rendered.append({"id": section.name, "name": section.title, "html": html})
             tiles += values.get("tiles", ())
             scripts += values.get("scripts", ())

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
-from scenewright.stages.kit.declared import declared_in
+from scenewright.stages.kit.declared import Found, found_in, module_of
 from scenewright.stages.kit.library_versions import library_version
 from scenewright.stages.kit.services.address import check_address
 from scenewright.stages.kit.stage import Extra, Parameters
@@ -63,13 +63,18 @@ class BackendDeclaration:
 
     def load(self, module: str) -> Any:
         """Return a module of its folder, loaded now: `backend` has `open_backend`."""
-        return importlib.import_module(f"scenewright.stages.segment.backends.{self.name.replace('-', '_')}.{module}")
+        return importlib.import_module(f"{module_of(_found(), self.name)}.{module}")
+
+
+@cache
+def _found() -> tuple[Found[BackendDeclaration], ...]:
+    return found_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND", "scenewright.backends")
 
 
 @cache
 def all_backends() -> tuple[BackendDeclaration, ...]:
     """Return every declared backend in its order. Imports declarations only."""
-    return declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND")
+    return tuple(found.declaration for found in _found())
 
 
 def backend_for(backend: str) -> BackendDeclaration:

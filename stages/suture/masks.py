@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.places import data_file
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.suture_needle import MaskSource
 from scenewright.schemas.suture_scene import SutureScene
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 SEED_OF_MASKS = 5
 """First number of the seed from which masks are spoiled."""
-BUNDLED = Path(__file__).resolve().parents[2] / "data" / CHECKPOINT
+BUNDLED = data_file(CHECKPOINT)
 OTHER_MASKS = "--segmentation spoiled, or --masks FOLDER"
 DRIVER_GROWTH = 5
 """Side [px] of the square by which learned masks of drivers grow: their rims hide the needle too."""

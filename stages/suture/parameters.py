@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
 from scenewright.schemas.disparity import Disparity
 from scenewright.schemas.errors import UsageError
+from scenewright.schemas.places import data_file
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.suture_needle import SutureNeedle, SutureThread
 from scenewright.schemas.suture_scene import SutureScene
@@ -16,7 +16,6 @@ from scenewright.schemas.suture_trial import SutureEvaluation, SutureTrial
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 from scenewright.stages.suture.options import ARM_NAMES, CHECKPOINT, HolderName, MaskOptions, PlaceName
 
-DATA = Path(__file__).resolve().parents[2] / "data"
 NEED_DISPARITY = ("thesis",)
 """Estimators that see no needle without a disparity."""
 MASKS = Optionally(
@@ -136,14 +135,14 @@ def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) ->
 
 def mask_files(parameters: MaskOptions) -> tuple[str, ...]:
     """Return the files of `data/` that masks may come from: the shipped segmenter, where there is one."""
-    shipped = parameters.segmentation in ("auto", "network") and (DATA / CHECKPOINT).is_file()
+    shipped = parameters.segmentation in ("auto", "network") and data_file(CHECKPOINT).is_file()
     return (CHECKPOINT,) if shipped else ()
 
 
 def perception_files(parameters: SimulateParameters) -> tuple[str, ...]:
     """Return the files of `data/` that the arms see by."""
     models = ("stitch/perception_ours.toml", "stitch/perception_thesis.toml")
-    return (*models, CHECKPOINT) if parameters.sight == "pictures" and (DATA / CHECKPOINT).is_file() else models
+    return (*models, CHECKPOINT) if parameters.sight == "pictures" and data_file(CHECKPOINT).is_file() else models
 
 
 SCENE = Stage(

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, ValidationError
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, UsageError, first_problem
+from scenewright.schemas.places import data_file
 
-RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "recipes"
+RECIPE_FOLDER = data_file("recipes")
 """What `--recipe` names lie here."""
 CLUTTER_FACTOR = {"none": 0.0, "low": 0.5, "medium": 1.0, "high": 2.0}
 """By what `--clutter` multiplies the number of small things."""

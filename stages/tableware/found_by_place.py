@@ -7,16 +7,25 @@ import pkgutil
 from types import ModuleType
 
 from scenewright.schemas.errors import UsageError
+from scenewright.schemas.plugins import installed
+
+
+def _modules(package: ModuleType) -> dict[str, str]:
+    """Return name -> module of what lies in a package and of what installed packages add; ours win."""
+    group = f"scenewright.tableware_{package.__name__.rpartition('.')[2]}"
+    ours = {module.name: f"{package.__name__}.{module.name}" for module in pkgutil.iter_modules(package.__path__)}
+    return {plugin.name: plugin.module for plugin in installed(group)} | ours
 
 
 def names_in(package: ModuleType) -> tuple[str, ...]:
-    """Return the names of a package's modules in the order of the alphabet; imports none of them."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__)))
+    """Return the names of a package's modules, and of those that installed packages add in the group of entry points
+    `scenewright.tableware_<package>`, in the order of the alphabet; imports none of them."""
+    return tuple(sorted(_modules(package)))
 
 
 def module_named(package: ModuleType, name: str) -> ModuleType:
     """Return a module of a package. Raises UsageError for a name that no file has."""
-    names = names_in(package)
-    if name not in names:
-        raise UsageError(f"there is no {name!r}", hint=f"choose of {', '.join(names)}")
-    return importlib.import_module(f"{package.__name__}.{name}")
+    modules = _modules(package)
+    if name not in modules:
+        raise UsageError(f"there is no {name!r}", hint=f"choose of {', '.join(sorted(modules))}")
+    return importlib.import_module(modules[name])

@@ -15,8 +15,9 @@ from scenewright.schemas.base import as_transform
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from scenewright.schemas.places import data_file
 from scenewright.schemas.sequence import Sequence
-from scenewright.schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
+from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.drawing.palette import instance_color
 from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
 from scenewright.stages.kit.formats.scenenn_annotation import (
@@ -98,7 +99,7 @@ def run(
 
 def read_words() -> dict[str, str]:
     """Return word -> class name, in the order of data/annotations/scenenn.toml."""
-    rows = tomllib.loads((VOCABULARY_FILE.parent / WORDS).read_text())["word"]
+    rows = tomllib.loads(data_file(WORDS).read_text())["word"]
     return {row["word"]: load_vocabulary().by_name(row["class"]).name for row in rows}
 
 

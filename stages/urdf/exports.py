@@ -26,7 +26,7 @@ class SceneExporter:
 
 def scene_exporters() -> tuple[SceneExporter, ...]:
     """Return every declared exporter in the order of writing."""
-    return declared_in("scenewright.stages.urdf.exporters", SceneExporter, "EXPORTER")
+    return declared_in("scenewright.stages.urdf.exporters", SceneExporter, "EXPORTER", "scenewright.exporters")
 
 
 def write_exports(root: Path, scene: InteractiveSceneFile) -> None:

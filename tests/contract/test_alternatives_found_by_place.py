@@ -259,11 +259,11 @@ def test_what_declares_nothing_is_an_error(tmp_path: Path, monkeypatch: pytest.M
     write(tmp_path / "silent", __init__="")
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
     with pytest.raises(RuntimeError, match=r"backends\.silent declares no BACKEND"):
-        declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND")
+        declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND", "scenewright.backends")
     (tmp_path / "silent" / "__init__.py").write_text("from scenewright.stages.segment.backends.onnx import BACKEND")
     sys.modules.pop("scenewright.stages.segment.backends.silent")
     with pytest.raises(RuntimeError, match="'onnx' is declared twice"):
-        declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND")
+        declared_in("scenewright.stages.segment.backends", BackendDeclaration, "BACKEND", "scenewright.backends")
     sys.modules.pop("scenewright.stages.segment.backends.silent")
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import Field
-from scenewright.stages.engine.chain import REPOSITORY, command_prefix
+from scenewright.schemas.places import HOME
+from scenewright.stages.engine.chain import command_prefix
 from scenewright.stages.engine.reading import read_manifest
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.segment.registry import all_backends
@@ -95,7 +96,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict
         for name, value in settings(bench, trial).items():
             words += ["--set", f"{name}={value}"]
         process = subprocess.run(
-            [*command_prefix(), *words], cwd=REPOSITORY, capture_output=True, text=True, errors="replace", check=False
+            [*command_prefix(), *words], cwd=HOME, capture_output=True, text=True, errors="replace", check=False
         )
         run.with_suffix(".log").write_text(process.stderr, encoding="utf-8")
         yield trial, {"exit": process.returncode, **told(process.stderr), **found(run)}

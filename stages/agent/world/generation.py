@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from functools import cache
 from math import hypot, pi
-from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.apartment import Apartment, Door, Furniture, Room, Thing
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import data_file
 
-RECIPE = Path(__file__).resolve().parents[3] / "data" / "agent" / "apartment.toml"
+RECIPE = data_file("agent/apartment.toml")
 TRIES = 60
 """Whole apartments that are drawn before a seed is given up."""
 PLACES = 200

@@ -22,7 +22,7 @@ from scenewright.stages.engine.batch.scene_log import clean
 from scenewright.stages.engine.batch.scene_run import run_scene, this_host
 from scenewright.stages.engine.batch.spec import RayOptions
 from scenewright.stages.engine.batch.warm import WarmScenes
-from scenewright.stages.engine.chain import REPOSITORY
+from scenewright.stages.engine.own_code import own_code
 
 CANCEL_PATIENCE = 5.0
 """Added to the grace of the scenes when the cluster is asked to stop them [s]."""
@@ -87,7 +87,7 @@ class RayExecutor:
             resources=dict(options.resources),
             max_retries=0,  # lost scenes are counted and recorded here, which Ray's own retries would hide
             scheduling_strategy="SPREAD",
-            runtime_env={"env_vars": {"PYTHONPATH": str(REPOSITORY)}},
+            runtime_env={"env_vars": own_code()},
         )
 
     def _connect(self) -> None:

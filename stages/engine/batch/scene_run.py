@@ -38,8 +38,8 @@ from scenewright.stages.engine.batch.quantities import format_bytes, format_seco
 from scenewright.stages.engine.batch.results import SceneResult
 from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower, clean
 from scenewright.stages.engine.batch.storage import drop_local, send
-from scenewright.stages.engine.chain import REPOSITORY
 from scenewright.stages.engine.forking import Process
+from scenewright.stages.engine.own_code import own_code
 
 LAUNCHER = Path(__file__).with_name("launcher.py")
 PROCESS_NAME = ".batch-process.json"
@@ -119,7 +119,7 @@ def _has_exited(pid: int) -> bool:
 
 def scene_environment(job: Job) -> dict[str, str]:
     """Return the variables of a scene's processes; what the user has set wins."""
-    return {**job.environment, **os.environ, "PYTHONPATH": str(REPOSITORY)}
+    return {**job.environment, **os.environ, **own_code()}
 
 
 def start_scene(job: Job, log: int) -> Process:

@@ -19,7 +19,7 @@ from scenewright.schemas.outside import file_text
 from scenewright.stages.engine.batch.job import Job
 from scenewright.stages.engine.batch.results import RESULTS_NAME, ResultsFile, read_results
 from scenewright.stages.engine.batch.spec import SlurmOptions
-from scenewright.stages.engine.chain import REPOSITORY
+from scenewright.stages.engine.own_code import own_code
 
 FOLDER_NAME = "slurm"
 LIST_NAME = "jobs.txt"
@@ -104,7 +104,7 @@ def _script(directives: Sequence[str], options: SlurmOptions, command: str) -> s
         "set -eu",
         *options.setup,
         f"cd {shlex.quote(os.getcwd())}",
-        f"export PYTHONPATH={shlex.quote(str(REPOSITORY))}",
+        *(f"export {name}={shlex.quote(value)}" for name, value in own_code().items()),
         command,
     ]
     return "\n".join(lines) + "\n"

@@ -17,9 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from scenewright.schemas.errors import MachineFailure
+from scenewright.schemas.plugins import plugins
 from scenewright.stages.engine.code import inherited
 from scenewright.stages.engine.code.places import OURS, places_here
 from scenewright.stages.engine.code.program import Code, Definition, Program, Whole
+from scenewright.stages.engine.discovery import package_of
 from scenewright.stages.engine.user_cache import cache_folder
 from scenewright.stages.kit.digests import sha256_of_text
 from scenewright.stages.kit.stage import Stage
@@ -65,7 +67,7 @@ def changed_modules(stage: Stage, before: str) -> list[str]:
 
 
 def _roots_of(stage: Stage) -> tuple[str, str]:
-    run = f"scenewright.stages.{stage.folder}.{stage.module}:run"
+    run = f"{package_of(stage)}.{stage.module}:run"
     return run, f"{stage.parameters.__module__}:{stage.parameters.__name__}"
 
 
@@ -98,8 +100,13 @@ def _program(also: tuple[str, ...]) -> Program:
     return Program(places_here(_plugins(), also))
 
 
+@cache
 def _plugins() -> Mapping[str, Sequence[str]]:
-    return {}
+    """Group of entry points -> modules that installed distributions declare in it."""
+    modules: dict[str, list[str]] = {}
+    for plugin in plugins():
+        modules.setdefault(plugin.group, []).append(plugin.module)
+    return modules
 
 
 def _file_of(roots: Sequence[str]) -> Path | None:

@@ -23,7 +23,7 @@ class Places:
     roots: Mapping[str, Sequence[Path]]
     """Package at the top -> its folders."""
     plugins: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    """Package -> modules that installed distributions declare for it."""
+    """Group of entry points -> modules that installed distributions declare in it."""
     loaded: bool = False
     """Whether what this process has loaded counts. Not for another tree."""
     files: set[Path] = field(default_factory=set)
@@ -67,8 +67,8 @@ class Places:
         return Path(found) if found else None
 
     def beneath(self, name: str) -> tuple[str, ...]:
-        """Return a module, all below it where it is a package, and what installed distributions declare for it."""
-        found = {name, *self.plugins.get(name, ())}
+        """Return a module, and all below it where it is a package."""
+        found = {name}
         for folder in self.below(name):
             for file in folder.rglob("*.py") if folder.is_dir() else ():
                 self.folders.add(file.parent)

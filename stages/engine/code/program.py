@@ -101,7 +101,10 @@ class Program:
         file = self.file(name)
         assert file is not None, name
         module = Module(name)
-        tree = ast.parse(file.read_text(encoding="utf-8"))
+        try:
+            tree = ast.parse(file.read_text(encoding="utf-8"))
+        except SyntaxError:  # an installed package that cannot be imported either, and is left out
+            return module
         package = name if file.name == "__init__.py" else name.rpartition(".")[0]
         self._enter(module, tree.body, package)
         return module
@@ -397,7 +400,10 @@ class _Writer:
                 self._put(Whole(module))
 
     def _constant(self, value: object) -> None:
-        """A text that is the name of one of our modules is an import."""
+        """A text that is the name of one of our modules is an import, and so is that of a group of entry points."""
+        if isinstance(value, str):
+            for module in self._program.places.plugins.get(value, ()):
+                self._put(Whole(module))
         if isinstance(value, str) and "." in value and self._program.is_ours(value):
             self._put(Whole(value))
         else:

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import data_file
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.open_words.encoder import Encoder
 
 FILE = "words/calibration.toml"
 """File below data/."""
-BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
+BUNDLED = data_file(FILE)
 NAMED_SPLAT = "named splat"
 """Source of fits for splats whose pieces have classes of a panoptic map."""
 CLOSEST = 1e-4

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.places import data_file
 from scenewright.stages.kit.formats.network_file import put_tensors, write_network
 from scenewright.stages.kit.formats.safetensors_file import read_safetensors
 from scenewright.stages.kit.open_words.two_towers import SIDE, WIDTH, TwoTowers, tokens, words_of
@@ -17,7 +18,7 @@ FORMAT = "scenewright two towers"
 VERSION = "2"
 FILE = "words/two_towers.safetensors"
 """File below data/."""
-BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
+BUNDLED = data_file(FILE)
 BATCH = 512
 """Crops that pass the network at a time, which bounds the memory."""
 SMALL_WORDS = frozenset(("a", "an", "the", "of"))

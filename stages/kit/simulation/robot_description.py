@@ -12,9 +12,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scenewright.schemas.errors import BadInput, MissingDependency, UsageError, first_problem
 from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import data_file
 from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
 
-FOLDER = Path(__file__).resolve().parents[3] / "data" / "robots"
+FOLDER = data_file("robots")
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
 PEDESTAL_LINK = "pedestal"
 GROUND_CLEARANCE = 0.02

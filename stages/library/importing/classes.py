@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 import tomllib
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from pydantic import Field
 from scenewright.schemas.base import Model
+from scenewright.schemas.places import data_file
 from scenewright.schemas.vocabulary import load_vocabulary
 
-DATA = Path(__file__).resolve().parents[3] / "data"
 TABLE_FILE, WORDS_FILE = "imported_models.toml", "labels/words.toml"
 LONGEST_PHRASE = 4
 """Most words of a phrase that names a class."""
@@ -50,7 +49,7 @@ class ImportTable(Model):
 @cache
 def import_table() -> ImportTable:
     """Read data/imported_models.toml once."""
-    return ImportTable.model_validate(tomllib.loads((DATA / TABLE_FILE).read_text(encoding="utf-8")), strict=False)
+    return ImportTable.model_validate(tomllib.loads(data_file(TABLE_FILE).read_text(encoding="utf-8")), strict=False)
 
 
 @cache
@@ -59,7 +58,7 @@ def phrases() -> dict[str, str]:
     thing_classes = [entry for entry in load_vocabulary().classes if entry.kind == "thing"]
     names = {entry.name for entry in thing_classes}
     class_of_phrase: dict[str, str] = {}
-    for row in tomllib.loads((DATA / WORDS_FILE).read_text(encoding="utf-8"))["labels"]:
+    for row in tomllib.loads(data_file(WORDS_FILE).read_text(encoding="utf-8"))["labels"]:
         if row["class"] in names:
             class_of_phrase.update(dict.fromkeys((row["name"], *row.get("also", ())), row["class"]))
     for source in ("ade20k", "coco", "nyu40", "scannet"):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, model_validator
 from scenewright.schemas.base import Model
 from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
+from scenewright.schemas.places import data_file
 
-KITCHEN = Path(__file__).resolve().parents[3] / "data" / "kitchen" / "kitchen.toml"
+KITCHEN = data_file("kitchen/kitchen.toml")
 DOMAINS = ("store_objects", "set_table", "cook_meal")
 Goal = tuple[str, ...]
 """Literals as `on bread plate`."""

@@ -6,13 +6,14 @@ import json
 from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.places import data_file
 from scenewright.stages.kit.formats.network_file import put_tensors, write_network
 from scenewright.stages.kit.formats.safetensors_file import read_safetensors
 from scenewright.stages.suture.segmentation.model import CLASSES, SutureNetwork
 
 FORMAT = "scenewright suture segmentation"
 VERSION = "1"
-BUNDLED = Path(__file__).resolve().parents[3] / "data" / "stitch" / "segmentation.safetensors"
+BUNDLED = data_file("stitch/segmentation.safetensors")
 _OTHER = "give a checkpoint that `make stitch-train` wrote"
 
 

@@ -15,9 +15,10 @@ from pydantic import Field, ValidationError
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, first_problem
 from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import data_file
 from scenewright.stages.suture.motion.needle import SWAGE, TIP, from_ends
 
-FOLDER = Path(__file__).resolve().parents[3] / "data" / "stitch"
+FOLDER = data_file("stitch")
 STILL = 1.5e-3
 """A needle whose ends moved less than this [m] is seen as before."""
 

@@ -10,14 +10,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import pi, sqrt
-from pathlib import Path
 
 import numpy as np
 from pydantic import Field
 from scenewright.schemas.base import Model
+from scenewright.schemas.places import data_file
 from scenewright.stages.tableware.options import THESIS_TIMES
 
-FILE = Path(__file__).resolve().parents[3] / "data" / THESIS_TIMES
+FILE = data_file(THESIS_TIMES)
 PLACEMENT_KINDS = ("cup", "bowl")
 
 

@@ -5,14 +5,13 @@ The file is written by `python -m benchmarks.tidy.physics_times` from trials on 
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from pydantic import Field
 from scenewright.schemas.base import Model
+from scenewright.schemas.places import data_file
 from scenewright.stages.tableware.options import PHYSICS_TIMES
 from scenewright.stages.tableware.planning.time_model import TimeModel
 
-FILE = Path(__file__).resolve().parents[3] / "data" / PHYSICS_TIMES
+FILE = data_file(PHYSICS_TIMES)
 
 
 class ArmTimes(Model):

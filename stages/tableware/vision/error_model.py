@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from pydantic import Field
 from scenewright.schemas.base import Model
+from scenewright.schemas.places import data_file
 from scenewright.stages.tableware.vision.detections import Detection
 from scenewright.stages.tableware.world.items import TABLE_SIDES, UTENSILS, Kind, Table
 
-FILE = Path(__file__).resolve().parents[3] / "data" / "tableware" / "error_model.json"
+FILE = data_file("tableware/error_model.json")
 
 
 class KindErrors(Model):

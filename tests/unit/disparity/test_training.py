@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import torch
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.places import HOME
 from scenewright.stages.disparity.raft.architecture import SMALL
 from scenewright.stages.disparity.raft.checkpoint import load_network
 from scenewright.stages.disparity.raft.matching import moved_right, open_raft
 from scenewright.stages.disparity.raft.network import RaftStereo
-from scenewright.stages.engine.chain import REPOSITORY
 
 from benchmarks.disparity.crops import HEIGHT, WIDTH, Sample, counted, kept_sample, shapes_sample
 from benchmarks.disparity.rendered_pairs import KeptPair, keep, kept
@@ -152,7 +152,7 @@ def test_samples_are_those_of_their_step(bank: list[np.ndarray]) -> None:
 
 
 def test_the_checkpoint_that_comes_with_it_is_the_one_its_record_describes() -> None:
-    path = REPOSITORY / "data" / "disparity" / "raft_stereo_small.safetensors"
+    path = HOME / "data" / "disparity" / "raft_stereo_small.safetensors"
     facts = tomllib.loads(path.with_suffix(".toml").read_text())
     assert hashlib.sha256(path.read_bytes()).hexdigest() == facts["sha256"]
     network = load_network(path)
@@ -162,7 +162,7 @@ def test_the_checkpoint_that_comes_with_it_is_the_one_its_record_describes() -> 
 
 def test_the_checkpoint_that_comes_with_it_finds_a_wall() -> None:
     left, right, truth, seen = pair()
-    matcher, detail = open_raft(REPOSITORY / "data" / "disparity" / "raft_stereo_small.safetensors", None, 1.0, "cpu")
+    matcher, detail = open_raft(HOME / "data" / "disparity" / "raft_stereo_small.safetensors", None, 1.0, "cpu")
     found = matcher(left, right, (0, 48))
     error = np.abs(found.disparity - truth)[found.known & seen]
     assert "5 updates at 1/4" in detail and found.known.mean() > 0.6

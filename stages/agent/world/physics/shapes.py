@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 from math import cos, pi, sin
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -12,10 +11,11 @@ from scenewright.schemas.apartment import Thing
 from scenewright.schemas.base import Model, as_transform, as_vector
 from scenewright.schemas.interactive_scene import SceneBody
 from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import data_file
 from scenewright.schemas.scene_parts import Box, Joint
 from scenewright.stages.kit.simulation.shapes import paint
 
-SHAPES = Path(__file__).resolve().parents[4] / "data" / "agent" / "things.toml"
+SHAPES = data_file("agent/things.toml")
 COLORS = {
     "red": (0.80, 0.10, 0.10),
     "blue": (0.10, 0.20, 0.80),

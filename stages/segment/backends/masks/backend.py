@@ -138,7 +138,9 @@ class MasksBackend:
 
 def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
     """Return the format of a folder and its masks. Raises BadInput when it is of none, or broken."""
-    formats = declared_in("scenewright.stages.segment.backends.masks.formats", MaskFormat, "FORMAT")
+    formats = declared_in(
+        "scenewright.stages.segment.backends.masks.formats", MaskFormat, "FORMAT", "scenewright.mask_formats"
+    )
     for form in formats:
         source = form.open(listing)
         if source is not None:

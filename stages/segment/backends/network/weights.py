@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.places import data_file
 from scenewright.schemas.vocabulary import Vocabulary
 from scenewright.stages.kit.formats.network_file import put_tensors, write_network
 from scenewright.stages.kit.formats.safetensors_file import read_safetensors
@@ -16,8 +17,8 @@ from scenewright.stages.segment.backends.network.model import PanopticNetwork, W
 
 FORMAT = "scenewright panoptic network"
 VERSION = 1
-"""Of the layout of a checkpoint; others are refused."""
-BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "panoptic.safetensors"
+"""Version of the layout of a checkpoint; others are refused."""
+BUNDLED = data_file("networks/panoptic.safetensors")
 """The checkpoint that comes with the project."""
 _OTHER = "give a checkpoint that `make train-network` wrote, or leave --weights out"
 

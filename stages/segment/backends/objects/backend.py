@@ -7,9 +7,9 @@ be handled: the fusion keeps those as segments of the depth, which nobody has na
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.places import data_file
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
 from scenewright.stages.kit.formats.frames import Frame
@@ -23,7 +23,7 @@ from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
-BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "tabletop_pairs.safetensors"
+BUNDLED = data_file("networks/tabletop_pairs.safetensors")
 GREY = 128
 """Colour of everything in a log without colour."""
 
