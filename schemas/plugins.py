@@ -24,6 +24,10 @@ Taken = TypeVar("Taken")
 logger = logging.getLogger("scenewright")
 
 
+def _imported(module: str) -> ModuleType:
+    return importlib.import_module(module)
+
+
 @dataclass(frozen=True)
 class PlugIn:
     """One entry point."""
@@ -35,7 +39,7 @@ class PlugIn:
 
     def load(self) -> ModuleType:
         """Import what it names. Raises whatever that raises."""
-        return importlib.import_module(self.module)
+        return _imported(self.module)
 
     def say_broken(self, reason: str) -> None:
         """Tell that it is left out."""

@@ -70,6 +70,11 @@ def module_of(found: Iterable[Found[Declared]], name: str) -> str:
     return {one.declaration.name: one.module for one in found}[name]
 
 
+def load_beside(package: str, module: str) -> ModuleType:
+    """Import a module that lies in the package of a declaration."""
+    return importlib.import_module(f"{package}.{module}")
+
+
 def declared_in(package: str, kind: type[Declared], attribute: str, group: str) -> tuple[Declared, ...]:
     """Return the declarations of `found_in`."""
     return tuple(one.declaration for one in found_in(package, kind, attribute, group))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.evaluation import Report, ReportFile
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.declared import load_beside
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.report.page import Page, render, render_page
 from scenewright.stages.report.parameters import STAGE, ReportParameters
@@ -37,7 +37,7 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
             continue
         with context.progress.step(section.name):
             package = package_of(section)
-            values = importlib.import_module(f"{package.__name__}.view").view(page)
+            values = load_beside(package.__name__, "view").view(page)
         if values is not None:
             html = render("section.html.j2", {**head, **values}, Path(package.__path__[0]))
             rendered.append({"id": section.name, "name": section.title, "html": html})

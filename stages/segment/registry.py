@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -11,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
-from scenewright.stages.kit.declared import Found, found_in, module_of
+from scenewright.stages.kit.declared import Found, found_in, load_beside, module_of
 from scenewright.stages.kit.library_versions import library_version
 from scenewright.stages.kit.services.address import check_address
 from scenewright.stages.kit.stage import Extra, Parameters
@@ -63,7 +62,7 @@ class BackendDeclaration:
 
     def load(self, module: str) -> Any:
         """Return a module of its folder, loaded now: `backend` has `open_backend`."""
-        return importlib.import_module(f"{module_of(_found(), self.name)}.{module}")
+        return load_beside(module_of(_found(), self.name), module)
 
 
 @cache

@@ -36,7 +36,7 @@ class Places:
     def file(self, name: str) -> Path | None:
         """Return the file of a dotted name; None where it is no module that is followed."""
         top, _, _ = name.partition(".")
-        if top not in self.roots:
+        if top not in self.roots or not all(part.isidentifier() for part in name.split(".")):
             return None
         candidates = []
         parent, _, last = name.rpartition(".")

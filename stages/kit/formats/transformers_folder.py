@@ -35,10 +35,10 @@ def transformers_library() -> Any:
 
 def processor_class(model_type: str, name: str) -> Any:
     """Return an image processor that needs no torchvision. Raises MissingDependency when the library has none."""
-    library = transformers_library()
-    path = f"{library.__name__}.models.{model_type}.image_processing_pil_{model_type}"
+    transformers_library()
     try:
-        return getattr(importlib.import_module(path), name)
+        module = importlib.import_module(f"transformers.models.{model_type}.image_processing_pil_{model_type}")
+        return getattr(module, name)
     except (ImportError, AttributeError) as error:
         raise MissingDependency(
             f"this transformers has no {name} ({error})", hint="see requirements-extras.lock"
