@@ -1,7 +1,7 @@
-"""What the page asks for of each kind of edit, out of the declaration of the kind (schemas/edits.py).
+"""What a page and a command ask for of each kind of edit, out of the declaration of the kind (schemas/edits.py).
 
 A new kind has a form as soon as it is declared, if its fields are things, classes, boxes, points, choices, numbers,
-words or yes and no; one that has others is left to the command line.
+words or yes and no; one that has others is left to whoever writes edits.toml.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def kinds_of(union: Any) -> tuple[type[edits.Edit], ...]:
 
 
 def forms_of(kinds: Iterable[type[edits.Edit]]) -> list[Form]:
-    """Return the forms of the kinds that can be asked for on a page, as JSON: `what`, `says`, and `fields`."""
+    """Return the forms of the kinds that can be asked for, as JSON: `what`, `says`, and `fields`."""
     found = []
     for kind in kinds:
         asked = {
@@ -46,8 +46,8 @@ def forms_of(kinds: Iterable[type[edits.Edit]]) -> list[Form]:
 
 
 def field_of(name: str, info: FieldInfo) -> Form | None:
-    """Return how a field is asked for, as JSON: `name`, `kind`, `needed` and what goes with its kind; None when a page
-    cannot ask for it."""
+    """Return how a field is asked for, as JSON: `name`, `says`, `kind`, `needed` and what goes with its kind; None when
+    it cannot be asked for."""
     needed = info.is_required()
     asked = _kind_of(info.annotation, tuple(info.metadata))
     if asked is None:
@@ -55,7 +55,7 @@ def field_of(name: str, info: FieldInfo) -> Form | None:
     start = None if needed or not isinstance(info.default, str | int | float | bool) else info.default
     if not needed and (word := WITHOUT.get(asked["kind"])) is not None:
         needed, asked = True, {**asked, "choices": [*asked.get("choices", ()), word]}
-    return {"name": name, "needed": needed, "start": start, **asked}
+    return {"name": name, "says": info.description or "", "needed": needed, "start": start, **asked}
 
 
 def _kind_of(annotation: Any, metadata: tuple[Any, ...]) -> Form | None:
