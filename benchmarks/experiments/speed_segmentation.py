@@ -1,6 +1,4 @@
-"""Speed of per-frame segmentation beside named peers: medians over one run, on a generated room at 640x480.
-
-    python -m benchmarks.speed.segmentation --out FOLDER [--quick] [--weights detector.onnx]
+"""Speed of per-frame segmentation beside named peers: medians over frames, of a generated room at 640x480.
 
 Peers do a comparable part each: OpenCV's RgbdNormals and Open3D's estimate_normals for the normals, OpenCV's
 findPlanes as another way to cut a depth image up, and the same convexity algorithm written with numpy alone. Our own
@@ -10,20 +8,12 @@ as long.
 
 from __future__ import annotations
 
-import os
-import platform
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 import trimesh
-from pydantic import Field
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.geometry.cameras import back_project, intrinsic_matrix
@@ -43,13 +33,23 @@ from scenewright.stages.segment.geometric import (
 from scenewright.stages.segment.normals import surface_normals
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
-from benchmarks.options import Measurement, asked
-from benchmarks.results import write_measured
+from benchmarks.experiment import Bench, Experiment, Results, Trial, median
+from benchmarks.timing import Clock
 
 CAMERA = Camera(width=640, height=480, fx=560.0, fy=560.0, cx=319.5, cy=239.5)
 VIEWS = 6
-FLOOR_FRAMES_PER_SECOND = 5.0
-"""What the geometric segmentation must reach on two cores."""
+OURS, NETWORK, BY_NETWORK = "ours", "our network", "a frame by our network"
+PARTS = ("whole", "smoothing", "normals", "convexity", "labels", "fusion", NETWORK, BY_NETWORK)
+PEERS = (
+    ("numpy", "whole"),
+    ("numpy", "normals"),
+    ("opencv-fals", "normals"),
+    ("opencv-sri", "normals"),
+    ("opencv-findPlanes", "whole"),
+    ("open3d", "normals"),
+)
+Work = Callable[[int], object]
+"""What is timed, on the frame of a number."""
 
 
 def rendered_frames() -> list[tuple[np.ndarray, np.ndarray]]:
@@ -142,28 +142,8 @@ def open3d_normals(depth: np.ndarray) -> np.ndarray:
     return np.asarray(cloud.normals)
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Medians per frame [s]: time on the wall, and processor time of all threads (less moved by other load)."""
-
-    wall: float
-    processor: float
-
-
-def median_seconds(work: Callable[[int], object], repeats: int) -> Timing:
-    """Return the median times of `work(k)` over `repeats` calls after one that warms up."""
-    work(0)
-    wall, processor = [], []
-    for k in range(repeats):
-        started, started_processor = time.perf_counter(), time.process_time()
-        work(k)
-        wall.append(time.perf_counter() - started)
-        processor.append(time.process_time() - started_processor)
-    return Timing(float(np.median(wall)), float(np.median(processor)))
-
-
-def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
-    """Return the time per frame of every part and peer (method/part -> medians)."""
+def works() -> dict[tuple[str, str], Work]:
+    """Return what is timed of every method and part."""
     frames = rendered_frames()
     settings = GeometricSettings()
     depths = [depth for depth, _ in frames]
@@ -197,27 +177,6 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
         cloud = pick(homogeneous, k)
         return cv2.findPlanes(cloud, opencv["FALS"].apply(cloud))
 
-    slow = max(2, repeats // 5)
-    seconds = {
-        "ours/whole": median_seconds(lambda k: segment_depth(pick(depths, k), CAMERA), repeats),
-        "ours/smoothing": median_seconds(lambda k: smooth_depth(pick(depths, k)), repeats),
-        "ours/normals": median_seconds(lambda k: surface_normals(pick(points, k), window=window, step=step), repeats),
-        "ours/convexity": median_seconds(lambda k: minimum_convexity(pick(points, k), pick(normals, k)), repeats),
-        "ours/labels": median_seconds(
-            lambda k: label_regions(pick(edges, k), pick(points, k), pick(normals, k), minimum_pixels=200, ratio=0.01),
-            repeats,
-        ),
-        "ours/fusion": median_seconds(
-            lambda k: fuse(pick(segmented, k).labels, pick(panoptic, k), pick(segmented, k).points, FusionSettings()),
-            repeats,
-        ),
-        "numpy/whole": median_seconds(lambda k: numpy_segmentation(pick(depths, k), settings), slow),
-        "numpy/normals": median_seconds(lambda k: numpy_normals(pick(points, k), window, step, 0.05), slow),
-        "opencv-fals/normals": median_seconds(lambda k: opencv["FALS"].apply(pick(homogeneous, k)), repeats),
-        "opencv-sri/normals": median_seconds(lambda k: opencv["SRI"].apply(pick(homogeneous, k)), repeats),
-        "opencv-findPlanes/whole": median_seconds(planes, repeats),
-        "open3d/normals": median_seconds(lambda k: open3d_normals(pick(smooth, k)), slow),
-    }
     from scenewright.stages.segment.backends.network.backend import load_predictor
     from scenewright.stages.segment.backends.network.features import mount_of_pose
     from scenewright.stages.segment.backends.network.weights import BUNDLED
@@ -226,68 +185,77 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
     nowhere = mount_of_pose(None, gravity_known=False, floor_is_zero=False)
     picture = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
 
+    def network(k: int) -> PanopticFrame:
+        return predictor.predict(pick(depths, k), picture, CAMERA, nowhere)
+
     def by_network(k: int) -> object:
-        found, geometric = (
-            predictor.predict(pick(depths, k), picture, CAMERA, nowhere),
-            segment_depth(pick(depths, k), CAMERA),
-        )
+        found, geometric = network(k), segment_depth(pick(depths, k), CAMERA)
         return fuse(geometric.labels, found, geometric.points, FusionSettings())
 
-    seconds["ours/network"] = median_seconds(
-        lambda k: predictor.predict(pick(depths, k), picture, CAMERA, nowhere), slow
-    )
-    seconds["ours/frame-by-network"] = median_seconds(by_network, slow)
-    if weights is not None:
-        from scenewright.stages.segment.backends.detector.yolox import Detector
+    def fused(k: int) -> object:
+        return fuse(pick(segmented, k).labels, pick(panoptic, k), pick(segmented, k).points, FusionSettings())
 
-        for name, side in (("detector-whole-image", 0), ("detector-tiles", 480)):
-            detector = Detector(weights, score_threshold=0.3, suppression_overlap=0.5, tile_side=side)
-            seconds[f"ours/{name}"] = median_seconds(partial(_detect, detector, picture), slow)
-    return seconds
+    def labelled(k: int) -> object:
+        return label_regions(pick(edges, k), pick(points, k), pick(normals, k), minimum_pixels=200, ratio=0.01)
 
-
-def _detect(detector: Any, color: np.ndarray, k: int) -> object:
-    return detector.detect(color)
-
-
-def table(seconds: dict[str, Timing], repeats: int) -> str:
-    """Return the table as Markdown: every part, its time, and its ratio to ours."""
-    lines = ["| part | method | ms per frame | processor ms | frames/s | time / ours |", "|---|---|---|---|---|---|"]
-    for name, value in sorted(seconds.items(), key=lambda item: (item[0].split("/")[1], item[1].wall)):
-        method, part = name.split("/")
-        ratio = value.wall / seconds[f"ours/{part}"].wall
-        lines.append(
-            f"| {part} | {method} | {value.wall * 1000:.1f} | {value.processor * 1000:.1f} | {1 / value.wall:.1f} "
-            f"| {ratio:.2f} |"
-        )
-    verdict = 1 / seconds["ours/whole"].wall
-    lines += [
-        "",
-        f"Geometric segmentation: {verdict:.1f} frames/s at 640x480 (floor {FLOOR_FRAMES_PER_SECOND:g}), median of "
-        f"{repeats} frames, {VIEWS} views of a generated room with sensor noise; {os.cpu_count()} cores, "
-        f"{platform.machine()}, load average {os.getloadavg()[0]:.1f} at the end. numpy's and findPlanes' results are "
-        "not the same segments: numpy leaves edge pixels unlabelled, findPlanes finds planes alone.",
-    ]
-    return "\n".join(lines) + "\n"
+    return {
+        (OURS, "whole"): lambda k: segment_depth(pick(depths, k), CAMERA),
+        (OURS, "smoothing"): lambda k: smooth_depth(pick(depths, k)),
+        (OURS, "normals"): lambda k: surface_normals(pick(points, k), window=window, step=step),
+        (OURS, "convexity"): lambda k: minimum_convexity(pick(points, k), pick(normals, k)),
+        (OURS, "labels"): labelled,
+        (OURS, "fusion"): fused,
+        (OURS, NETWORK): network,
+        (OURS, BY_NETWORK): by_network,
+        ("numpy", "whole"): lambda k: numpy_segmentation(pick(depths, k), settings),
+        ("numpy", "normals"): lambda k: numpy_normals(pick(points, k), window, step, 0.05),
+        ("opencv-fals", "normals"): lambda k: opencv["FALS"].apply(pick(homogeneous, k)),
+        ("opencv-sri", "normals"): lambda k: opencv["SRI"].apply(pick(homogeneous, k)),
+        ("opencv-findPlanes", "whole"): planes,
+        ("open3d", "normals"): lambda k: open3d_normals(pick(smooth, k)),
+    }
 
 
-class Options(Measurement):
-    """Options."""
-
-    weights: Path | None = Field(None, description="ONNX detector to time as well")
-
-
-def main() -> None:
-    """Measure, print the table, write metrics.json and table.md."""
-    numba.config.THREADING_LAYER = "omp"  # type: ignore[attr-defined] # the default probes TBB first and warns about its version
-    arguments = asked(Options)
-    repeats = 6 if arguments.quick else 30
-    seconds = measure(repeats, arguments.weights)
-    text = table(seconds, repeats)
-    metrics = {f"{name}/seconds_per_frame": value.wall for name, value in seconds.items()}
-    metrics |= {f"{name}/processor_seconds_per_frame": value.processor for name, value in seconds.items()}
-    write_measured(arguments.out, metrics, text)
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterable[tuple[Trial, dict[str, float]]]:
+    """Yield what each frame took, after one that warms up."""
+    timed, warm = works(), set()
+    for trial in trials:
+        work, clock = timed[trial.arm, trial.case], Clock()
+        if work not in warm:
+            work(0)
+            warm.add(work)
+        with clock.lap():
+            work(int(trial.seed))
+        yield trial, {"time": 1000 * clock.wall[0], "processor time": 1000 * clock.processor[0]}
 
 
-if __name__ == "__main__":
-    main()
+def beside_ours(results: Results) -> Mapping[str, float | None]:
+    """Return frames a second, and the time over ours, by the wall."""
+    figures: dict[str, float | None] = {}
+    for case in results.cases:
+        ours = results.value(OURS, case, "time")
+        for arm in results.arms(case):
+            if (time := results.value(arm, case, "time")) is not None:
+                figures[f"{arm}/{case}/frames per s"] = 1000 / time
+                figures[f"{arm}/{case}/over ours"] = time / ours if ours else None
+    return figures
+
+
+EXPERIMENT = Experiment(
+    name="speed_segmentation",
+    title="Segmentation beside its peers",
+    simulated="Six views of a room with noise.",
+    knows="Depth alone; our network depth and a picture of noise.",
+    does_not_show="Quality: numpy's and findPlanes' results are not the same segments (numpy leaves edge pixels "
+    "unlabelled, findPlanes finds planes alone).",
+    arms={name: name for name in (OURS, *dict.fromkeys(arm for arm, _ in PEERS))},
+    cases=PARTS,
+    reporting=tuple(map(str, range(1, 31))),
+    quick_seeds=6,
+    runs=lambda arm, case: arm == OURS or (arm, case) in PEERS,
+    together=lambda trial: "",
+    measure=measure,
+    record=dict[str, float],
+    measures={name: median(name, "ms", interval=False) for name in ("time", "processor time")},
+    more_figures=beside_ours,
+)

@@ -1,11 +1,9 @@
 """Labelled fusion beside Open3D's VoxelBlockGrid without labels: frames/s, peak memory, surface error.
 
-    python -m benchmarks.speed.fusion [--out FOLDER] [--quick]
-
 A room of boxes, whose surface is known, is seen by a walking depth camera with the axial noise of Nguyen, Izadi &
-Lovell (2012), millimetre steps and a range of 4 m. Every arm runs in a process of its own on the same decoded frames,
-the arms in turn, several times over; the table shows medians. Memory is the growth of the process's peak over what
-it held before the first frame (libraries loaded, kernels compiled, frames in memory).
+Lovell (2012), millimetre steps and a range of 4 m. Every run of an arm has a process of its own and the same decoded
+frames; figures are medians over runs. Memory is the growth of the process's peak over what it held before the first
+frame (libraries loaded, kernels compiled, frames in memory).
 
 Arms: `ours` is everything that fuse does with a frame: overlap with the map, association, integration of depth and
 colour, label vote, counts, merges. `ours-vote` integrates depth and colour and votes, with labels given. `open3d`
@@ -14,15 +12,7 @@ integrates depth alone, `open3d-color` depth and colour; both with truncation 4 
 
 from __future__ import annotations
 
-import json
-import os
-import platform
-import subprocess
-import sys
-import tempfile
-import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from pydantic import Field
@@ -31,20 +21,38 @@ from scenewright.schemas.segments import FrameSegment
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.geometry.cameras import back_project, intrinsic_matrix
 from scenewright.stages.kit.geometry.transforms import look_at
-from scenewright.stages.kit.measurement.tables import Table, as_markdown
+from scenewright.stages.kit.stage import Parameters
 
-from benchmarks.options import Measurement, asked
-from benchmarks.results import write_measured
+from benchmarks.experiment import Bench, Experiment, Results, Trial, median
+from benchmarks.timing import AS_THE_COMMAND_LINE, Clock, alone, medians, memory, reset_peak
 
-REPOSITORY = Path(__file__).resolve().parents[2]
 CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
 RANGE = 4.0
 TRUNCATION_VOXELS = 4.0
-ARMS = ("ours", "ours-vote", "open3d", "open3d-color")
+ARMS = {
+    "ours": "ours",
+    "ours-vote": "ours, vote only",
+    "open3d": "Open3D, no labels, no colour",
+    "open3d-color": "Open3D, no labels, colour",
+}
 CASES = {"2cm": 0.02, "1cm": 0.01}
 ERROR_CASE = "2cm"
-AIM_SHARE, AIM_ERROR = 0.5, 0.002
-"""Aims: share of Open3D's rate, mean surface error at 2 cm [m]."""
+UNITS = {
+    "frames per s": "",
+    "frames per s, all": "",
+    "processor time": "ms",
+    "peak memory": "MB",
+    "meshing": "s",
+    "mean error": "mm",
+    "p95 error": "mm",
+    "area": "m²",
+}
+
+
+class FusionParameters(Parameters):
+    """Options of the experiment."""
+
+    frames: int = Field(100, ge=3, description="Frames of a run")
 
 
 def room() -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -216,158 +224,78 @@ def build(arm: str, frames: dict[str, np.ndarray], voxel_size: float) -> tuple[S
 
 
 def surface_error(vertices: np.ndarray, faces: np.ndarray) -> dict[str, float]:
-    """Distances [m] from points spread evenly over a mesh to the true surface, and the mesh's area [m^2]."""
+    """Distances [mm] from points spread evenly over a mesh to the true surface, and the mesh's area [m^2]."""
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     points, _ = trimesh.sample.sample_surface(mesh, 100_000, seed=0)
     distance = true_scene().compute_distance(points.astype(np.float32)).numpy()
     return {
-        "error_mean": float(distance.mean()),
-        "error_p95": float(np.percentile(distance, 95)),
+        "mean error": 1000 * float(distance.mean()),
+        "p95 error": 1000 * float(np.percentile(distance, 95)),
         "area": float(mesh.area),
     }
 
 
-def memory(field: str) -> float:
-    """Return `VmRSS` (resident now) or `VmHWM` (the most since the peak was reset) of this process [MB]."""
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith(field + ":"):
-            return int(line.split()[1]) / 1024
-    raise RuntimeError(f"/proc/self/status has no {field}")
-
-
-def reset_peak() -> None:
-    """Make VmHWM start again from what is resident now."""
-    Path("/proc/self/clear_refs").write_text("5")
-
-
-def work(arm: str, case: str, frames_file: Path) -> dict[str, float]:
-    """Run one arm once on the frames of a file; this is what a subprocess does."""
-    frames = {
-        name: np.load(frames_file / f"{name}.npy", allow_pickle=False) for name in ("depth", "color", "ids", "poses")
-    }
+def work(arm: str, case: str, frames: dict[str, np.ndarray]) -> dict[str, float]:
+    """Run one arm once on frames, in a process of its own."""
     step, mesh = build(arm, {name: images[:2] for name, images in frames.items()}, 0.05)
     step(0)
     step(1)
     mesh()  # kernels compiled, libraries loaded, threads started
     step, mesh = build(arm, frames, CASES[case])
     reset_peak()
-    before = memory("VmRSS")
-    seconds, processor = [], []
+    before, clock, meshing = memory("VmRSS"), Clock(), Clock()
     for k in range(len(frames["depth"])):
-        started, started_processor = time.perf_counter(), time.process_time()
-        step(k)
-        seconds.append(time.perf_counter() - started)
-        processor.append(time.process_time() - started_processor)
-    started = time.perf_counter()
-    vertices, faces = mesh()
+        with clock.lap():
+            step(k)
+    with meshing.lap():
+        vertices, faces = mesh()
+    wall, processor = medians(clock)
     measures = {
-        "frames_per_second": 1 / float(np.median(seconds)),
-        "mean_frames_per_second": len(seconds) / sum(seconds),
-        "mesh_seconds": time.perf_counter() - started,
-        "processor_ms": 1000 * float(np.median(processor)),
-        "peak_memory_mb": memory("VmHWM") - before,
+        "frames per s": 1 / wall,
+        "frames per s, all": len(clock.wall) / sum(clock.wall),
+        "processor time": 1000 * processor,
+        "peak memory": memory("VmHWM") - before,
+        "meshing": meshing.wall[0],
     }
-    if case == ERROR_CASE:
-        measures |= surface_error(vertices, faces)
-    return measures
+    return measures | (surface_error(vertices, faces) if case == ERROR_CASE else {})
 
 
-def measure(frame_count: int, runs: int) -> dict[str, float]:
-    """Return the medians over the runs: `<arm>/<case>/<measure>`, and ours as a share of Open3D's rate."""
-    collected: dict[str, list[float]] = {}
-    # Ours as the command line runs it (cli/main.py): TBB is not probed, idle threads of OpenMP sleep.
-    settings = {"NUMBA_THREADING_LAYER": "omp", "OMP_WAIT_POLICY": "passive"}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, images in render_frames(frame_count).items():
-            np.save(Path(folder) / f"{name}.npy", images)
-        for run in range(runs):
-            for case in CASES:
-                for arm in ARMS:
-                    print(f"run {run + 1}/{runs}: {arm}, {case}", file=sys.stderr, flush=True)
-                    environment = {**os.environ, **(settings if arm.startswith("ours") else {})}
-                    command = [sys.executable, "-m", "benchmarks.speed.fusion", "--worker", arm, case, folder]
-                    done = subprocess.run(
-                        command, check=True, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY, env=environment
-                    )
-                    for name, value in json.loads(done.stdout.splitlines()[-1]).items():
-                        collected.setdefault(f"{arm}/{case}/{name}", []).append(value)
-    metrics = {name: float(np.median(values)) for name, values in collected.items()}
-    for arm in ("ours", "ours-vote"):
-        for case in CASES:
-            share = metrics[f"{arm}/{case}/frames_per_second"] / metrics[f"open3d/{case}/frames_per_second"]
-            metrics[f"{arm}/{case}/share_of_open3d"] = share
-    return metrics | {"all/all/runs": float(runs), "all/all/frames": float(frame_count)}
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterable[tuple[Trial, dict[str, float]]]:
+    """Yield what each run took."""
+    frames = render_frames(bench.parameters.frames)
+    for trial in trials:
+        variables = AS_THE_COMMAND_LINE if trial.arm.startswith("ours") else {}
+        yield trial, alone(work, trial.arm, trial.case, frames, **variables)
 
 
-def as_table(metrics: dict[str, float]) -> Table:
-    """Return the figures as a table, a row for each arm and case."""
-    rows = []
-    for case in CASES:
-        for arm in ARMS:
-
-            def get(name: str, scale: float = 1.0, arm: str = arm, case: str = case) -> float | None:
-                value = metrics.get(f"{arm}/{case}/{name}")
-                return None if value is None else scale * value
-
-            rows.append(
-                (
-                    case,
-                    arm,
-                    get("frames_per_second"),
-                    get("mean_frames_per_second"),
-                    get("share_of_open3d"),
-                    get("processor_ms"),
-                    get("peak_memory_mb"),
-                    get("mesh_seconds"),
-                    get("error_mean", 1000),
-                    get("error_p95", 1000),
-                    get("area"),
-                )
-            )
-    share = min(metrics[f"ours/{case}/share_of_open3d"] for case in CASES)
-    error = metrics[f"ours/{ERROR_CASE}/error_mean"]
-    note = (
-        f"Medians of {metrics['all/all/runs']:.0f} runs on {metrics['all/all/frames']:.0f} frames of 640x480, "
-        f"{os.cpu_count()} processors, {platform.machine()}, Python {platform.python_version()}, load average "
-        f"{os.getloadavg()[0]:.1f} at the end. frames/s: 1 / median time of a frame; all: frames / total time. Aims: "
-        f"at least {AIM_SHARE} of open3d's rate ({share:.2f}: {'met' if share >= AIM_SHARE else 'missed'}), mean error "
-        f"at 2 cm at most {1000 * AIM_ERROR:g} mm ({1000 * error:.2f}: {'met' if error <= AIM_ERROR else 'missed'})."
-    )
-    columns = (
-        "voxel",
-        "arm",
-        "frames/s",
-        "frames/s (all)",
-        "share of open3d",
-        "processor ms",
-        "peak MB",
-        "mesh s",
-        "error mean mm",
-        "error p95 mm",
-        "area m2",
-    )
-    return Table("table", "Labelled fusion beside Open3D without labels", columns, tuple(rows), note)
+def shares(results: Results) -> Mapping[str, float | None]:
+    """Return the rates of ours over that of Open3D, which integrates depth alone."""
+    rates = {(arm, case): results.value(arm, case, "frames per s") for case in results.cases for arm in results.arms()}
+    return {
+        f"{arm}/{case}/share of Open3D": rate / other
+        for (arm, case), rate in rates.items()
+        if arm.startswith("ours") and rate is not None and (other := rates.get(("open3d", case)))
+    }
 
 
-class Options(Measurement):
-    """Options."""
-
-    worker: tuple[str, ...] = Field((), description="Arm, case and folder of frames: one measurement in this process")
-
-
-def main() -> None:
-    """Measure, print the table, write metrics.json and table.md."""
-    arguments = asked(Options)
-    if arguments.worker:
-        arm, case, folder = arguments.worker
-        print(json.dumps(work(arm, case, Path(folder))))
-        return
-    metrics = measure(frame_count=20, runs=1) if arguments.quick else measure(frame_count=100, runs=5)
-    text = as_markdown(as_table(metrics))
-    write_measured(arguments.out, metrics, text)
-
-
-if __name__ == "__main__":
-    main()
+EXPERIMENT = Experiment(
+    name="speed_fusion",
+    title="Labelled fusion beside Open3D",
+    simulated="Frames of a room with noise.",
+    knows="Exact poses.",
+    does_not_show="Speed on other hardware. Where other work ran beside it, less than half as much again is a tie. "
+    "Open3D fuses no labels.",
+    arms=ARMS,
+    cases=tuple(CASES),
+    reporting=tuple(f"run {k}" for k in range(1, 6)),
+    quick_seeds=1,
+    together=lambda trial: "",
+    measure=measure,
+    record=dict[str, float],
+    measures={name: median(name, unit, interval=False) for name, unit in UNITS.items()},
+    parameters=FusionParameters,
+    quick={"frames": 20},
+    more_figures=shares,
+)

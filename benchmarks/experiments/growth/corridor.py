@@ -8,9 +8,7 @@ a frame mean nothing beyond the frame, so they need not be changed from cell to 
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -145,39 +143,6 @@ def _frame(  # type: ignore[no-untyped-def]
     geometric = segment_depth(depth, CAMERA, geometric_settings(options))
     fused = fuse(geometric.labels, panoptic, geometric.points, fusion_settings(options))
     return CorridorFrame(depth, color, pose, fused.ids, describe(0, fused).segments, panoptic)
-
-
-def save_frames(frames: list[CorridorFrame], folder: Path) -> None:
-    """Write frames into a folder, for processes that should not hold what rendering leaves behind."""
-    for name in ("depth", "color", "pose", "ids"):
-        np.save(folder / f"{name}.npy", np.array([getattr(frame, name) for frame in frames]))
-    np.save(folder / "masks.npy", np.array([frame.masks.ids for frame in frames]))
-    described = [
-        {
-            "listing": [segment.model_dump() for segment in frame.listing],
-            "masks": {str(k): [mask.category_id, mask.is_thing] for k, mask in frame.masks.masks.items()},
-        }
-        for frame in frames
-    ]
-    (folder / "frames.json").write_text(json.dumps(described))
-
-
-def load_frames(folder: Path) -> list[CorridorFrame]:
-    """Read what `save_frames` wrote."""
-    arrays = {
-        name: np.load(folder / f"{name}.npy", allow_pickle=False) for name in ("depth", "color", "pose", "ids", "masks")
-    }
-    return [
-        CorridorFrame(
-            arrays["depth"][k],
-            arrays["color"][k],
-            arrays["pose"][k],
-            arrays["ids"][k],
-            tuple(FrameSegment(**segment) for segment in described["listing"]),
-            PanopticFrame(arrays["masks"][k], {int(i): PanopticMask(*mask) for i, mask in described["masks"].items()}),
-        )
-        for k, described in enumerate(json.loads((folder / "frames.json").read_text()))
-    ]
 
 
 def moved(pose: np.ndarray, cell: int) -> np.ndarray:

@@ -1,29 +1,22 @@
-"""What many scenes cost: stretches of logs over a Ray cluster with storage and a killed node; batches without work.
-
-    python -m benchmarks.speed.scale --out FOLDER [--logs FOLDER] [--scenes N] [--simulated N ...]
+"""What a scene costs: stretches of logs over a Ray cluster with storage and a killed node, and on this machine.
 
 Cluster: short stretches of three logs (two recorded, one rendered), each to the graph of its room by the pipeline
 `short_logs.toml`, on three nodes of one processor each on this machine with warm workers; what scenes make goes to an
 S3 server of this machine (a process of its own), and nothing stays in the batch's own folder. One node is killed while
 a scene runs on it. Every scene has to end well, whole in the storage, with the digests that the same scenes have
-without cluster, storage and kill. Some of the scenes run without warm workers too. Simulated: batches whose scenes end
-at once: what a scene costs beside its steps, as batches grow. A run that was stopped goes on from FOLDER.
+without cluster, storage and kill. Some of the scenes run without warm workers too. A run that was stopped goes on.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import resource
-import shutil
 import socket
-import statistics
 import subprocess
 import sys
-import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -41,11 +34,10 @@ from scenewright.stages.engine.batch.storage import stored_digest
 from scenewright.stages.engine.reading import read_manifest
 from scenewright.stages.engine.runner import PROCESSOR
 from scenewright.stages.engine.store import TIMINGS_NAME
-from scenewright.stages.kit.measurement.tables import Table, as_markdown
+from scenewright.stages.kit.stage import Parameters
 
-from benchmarks.options import Measurement, asked
-from benchmarks.results import write_measured
-from benchmarks.speed.batch import measure_scheduler
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
+from benchmarks.tabulation import Figure
 
 NODES = 3
 PATIENCE = 3600.0
@@ -61,15 +53,22 @@ SPAN, EVERY = 12, 2
 COLD = 10
 """Scenes that run without warm workers too."""
 BUCKET = "scenes"
+ARMS = {"cold": "a process a step", "warm": "warm workers", "cluster": "warm workers on the cluster"}
 PIPELINE = Path(__file__).with_name("short_logs.toml")
 
 
-class ScaleMeasurement(Measurement):
-    """Options of the measurement."""
+STEPS = {"ingest": "sequence", "segment": "segments", "fuse": "panoptic_map", "graph": "contact_graph"}
+"""Step of the pipeline -> its artifact."""
+BESIDE = "beside the steps"
+FEW, MANY = "few", "many"
+"""Cases: on this machine alone; on the cluster."""
+
+
+class SceneParameters(Parameters):
+    """Options of the experiment."""
 
     logs: Path = Field(Path("../shared/data"), description="Folder of the recorded logs")
-    scenes: int = Field(200, ge=0, description="Stretches of logs on the cluster")
-    simulated: tuple[int, ...] = Field((100, 1000, 10_000), description="Sizes of batches without work")
+    scenes: int = Field(200, ge=1, description="Stretches of logs on the cluster")
 
 
 def stretches(scenes: int) -> list[tuple[str, str, int]]:
@@ -126,32 +125,37 @@ def s3_server() -> Iterator[str]:
         server.wait()
 
 
-def measure_cluster(folder: Path, logs: Path, scenes: int) -> dict[str, float]:
-    """Run the scenes here and on the cluster, kill a node, compare; return what a scene cost."""
-    wanted = stretches(scenes)
-    cold = _run_here(batch_file(folder / "cold", logs, wanted[:: max(1, scenes // COLD)]), folder / "cold", warm=False)
-    warm = _run_here(batch_file(folder / "warm", logs, wanted), folder / "warm", warm=True)
-    _refuse_differences(cold, warm, "cold")
+def scenes_of(bench: Bench, case: str) -> list[tuple[str, str, int]]:
+    """Return the scenes of a case: all stretches, or COLD of them, evenly."""
+    wanted = stretches(bench.parameters.scenes)
+    return wanted if case == MANY else wanted[:: max(1, len(wanted) // COLD)]
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterable[tuple[Trial, dict[str, float]]]:
+    """Run the scenes of a case warm, and cold or on the cluster with a killed node; compare; yield what each cost."""
+    case = trials[0].case
+    folder, logs, scenes = bench.out / "runs" / case, bench.parameters.logs, scenes_of(bench, case)
+    found = {"warm": _run_here(batch_file(folder / "warm", logs, scenes), folder / "warm", warm=True)}
+    if case == MANY:
+        found["cluster"] = _stored(folder / "cluster", logs, scenes)
+    else:
+        found["cold"] = _run_here(batch_file(folder / "cold", logs, scenes), folder / "cold", warm=False)
+    for arm, results in found.items():
+        _refuse_differences(results, found["warm"], arm)
+    for trial in trials:
+        result = found[trial.arm][trial.seed]
+        yield trial, _cost(result) | (_by_step(folder / trial.arm, result) if case == FEW else {})
+
+
+def _stored(folder: Path, logs: Path, scenes: list[tuple[str, str, int]]) -> dict[str, SceneResult]:
+    """Run scenes on the cluster. Raises RuntimeError unless all are whole in the storage."""
     with s3_server() as url:
-        storage = f'[storage]\nurl = "{url}"\nkeep = false'
-        found, seconds = _run_on_cluster(batch_file(folder / "cluster", logs, wanted, storage), folder / "cluster")
-        _refuse_differences(found, warm, "on the cluster")
+        found = _run_on_cluster(batch_file(folder, logs, scenes, f'[storage]\nurl = "{url}"\nkeep = false'), folder)
         for name, result in found.items():
             for step, digest in result.artifacts.items():
                 if stored_digest(f"{url}/{name}", step, 60.0) != digest:
                     raise RuntimeError(f"{name}: {step} is not whole in the storage")
-    first = [result for result in found.values() if not result.lost]
-    again = {name: warm[name] for name in cold}
-    return {
-        "cluster/scenes": scenes,
-        "cluster/lost": len(found) - len(first),
-        "cluster/wall_s": seconds,
-        **_costs("cluster", first),
-        **_costs("cold", list(cold.values())),
-        **_costs("warm", list(again.values())),
-        **_by_step("cold", folder / "cold", cold),
-        **_by_step("warm", folder / "warm", again),
-    }
+    return found
 
 
 def _run_here(batch: Batch, folder: Path, *, warm: bool) -> dict[str, SceneResult]:
@@ -159,7 +163,7 @@ def _run_here(batch: Batch, folder: Path, *, warm: bool) -> dict[str, SceneResul
     return _all_done(batch, folder)
 
 
-def _run_on_cluster(batch: Batch, folder: Path) -> tuple[dict[str, SceneResult], float]:
+def _run_on_cluster(batch: Batch, folder: Path) -> dict[str, SceneResult]:
     from ray.cluster_utils import Cluster
 
     out = folder / "out"
@@ -172,15 +176,13 @@ def _run_on_cluster(batch: Batch, folder: Path) -> tuple[dict[str, SceneResult],
         cluster.wait_for_nodes()
         killer = threading.Thread(target=_kill_a_node, args=(cluster, out, len(batch.runs), ended), daemon=True)
         killer.start()
-        began = time.perf_counter()
         options = RayOptions(kind="ray", address=cluster.address, warm=True)
         run_batch(batch, out, executor=RayExecutor(options), say=_say)
-        seconds = time.perf_counter() - began
     finally:
         ended.set()
         load_ray().shutdown()
         cluster.shutdown()
-    return _all_done(batch, folder), seconds
+    return _all_done(batch, folder)
 
 
 def _all_done(batch: Batch, folder: Path) -> dict[str, SceneResult]:
@@ -194,38 +196,27 @@ def _all_done(batch: Batch, folder: Path) -> dict[str, SceneResult]:
 def _refuse_differences(found: dict[str, SceneResult], warm: dict[str, SceneResult], where: str) -> None:
     for name, result in found.items():
         if result.artifacts != warm[name].artifacts:
-            raise RuntimeError(f"{name}: other digests {where} than in a warm worker of this machine")
+            raise RuntimeError(f"{name}: {where}: other digests than in a warm worker of this machine")
 
 
-def _costs(name: str, results: list[SceneResult]) -> dict[str, float]:
-    processor = [result.processor_seconds for result in results]
+def _cost(result: SceneResult) -> dict[str, float]:
     return {
-        f"{name}/measured": len(results),
-        f"{name}/processor_s": statistics.mean(processor),
-        f"{name}/processor_median_s": statistics.median(processor),
-        f"{name}/processor_most_s": max(processor),
-        f"{name}/megabytes": statistics.mean(result.artifact_bytes / 1e6 for result in results),
-        f"{name}/memory_mb": max(result.peak_memory_bytes / 1e6 for result in results),
+        "core-seconds": result.processor_seconds,
+        "megabytes": result.artifact_bytes / 1e6,
+        "memory": result.peak_memory_bytes / 1e6,
+        "lost": float(result.lost),
     }
 
 
-def _by_step(name: str, folder: Path, results: dict[str, SceneResult]) -> dict[str, float]:
-    """Mean processor time and bytes of every step, and of what runs the steps."""
-    seconds: dict[str, list[float]] = {}
-    sizes: dict[str, list[float]] = {}
-    for scene, result in results.items():
-        for step in result.artifacts:
-            artifact = folder / "out" / scene / step
-            manifest = read_manifest(artifact)
-            seconds.setdefault(step, []).append(json.loads((artifact / TIMINGS_NAME).read_text())[PROCESSOR])
-            sizes.setdefault(step, []).append(sum(file.bytes for file in manifest.files) / 1e6)
-    steps = {step: statistics.mean(values) for step, values in seconds.items()}
-    beside = statistics.mean(result.processor_seconds for result in results.values()) - sum(steps.values())
-    return {
-        **{f"{name}/{step}/processor_s": value for step, value in steps.items()},
-        **{f"{name}/{step}/megabytes": statistics.mean(values) for step, values in sizes.items()},
-        f"{name}/beside the steps/processor_s": beside,
-    }
+def _by_step(folder: Path, result: SceneResult) -> dict[str, float]:
+    """Return processor time and bytes of every step, and what runs the steps takes beside them."""
+    costs: dict[str, float] = {}
+    for step, name in STEPS.items():
+        artifact = folder / "out" / result.scene / name
+        costs[f"{step}/core-seconds"] = json.loads((artifact / TIMINGS_NAME).read_text())[PROCESSOR]
+        costs[f"{step}/megabytes"] = sum(file.bytes for file in read_manifest(artifact).files) / 1e6
+    beside = result.processor_seconds - sum(costs[f"{step}/core-seconds"] for step in STEPS)
+    return costs | {f"{BESIDE}/core-seconds": beside}
 
 
 def _say(text: str) -> None:
@@ -250,30 +241,58 @@ def _kill_a_node(cluster: Any, out: Path, scenes: int, ended: threading.Event) -
                 return
 
 
-def measure(folder: Path, logs: Path, scenes: int, simulated: tuple[int, ...]) -> dict[str, float]:
-    """Return all figures; what the scenes made is kept in `folder`."""
-    metrics: dict[str, float] = {}
-    for count in simulated:
-        empty = Path(tempfile.mkdtemp())
-        try:
-            found = measure_scheduler(empty, count)
-        finally:
-            shutil.rmtree(empty)
-        metrics |= {f"simulated/{count}/{name.split('/')[1]}": value for name, value in found.items()}
-        metrics[f"simulated/{count}/peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-        _say(json.dumps({name: value for name, value in metrics.items() if f"/{count}/" in name}))
-    return metrics | (measure_cluster(folder, logs, scenes) if scenes else {})
+def part_of(step: str) -> Callable[[Mapping[str, float]], dict[str, float] | None]:
+    """Return what picks the costs of a step out of those of a scene; None where they are not known."""
+    return lambda record: (
+        {name: record[f"{step}/{name}"] for name in ("core-seconds", "megabytes") if f"{step}/{name}" in record} or None
+    )
 
 
-def main() -> None:
-    """Measure, print the table, write metrics.json and table.md."""
-    arguments = asked(ScaleMeasurement)
-    chosen = (8, (100,)) if arguments.quick else (arguments.scenes, arguments.simulated)
-    folder = arguments.out or Path(tempfile.mkdtemp())
-    metrics = measure(folder, arguments.logs, *chosen)
-    rows = tuple(metrics.items())
-    write_measured(arguments.out, metrics, as_markdown(Table("scale", "What many scenes cost", ("", "value"), rows)))
+def most(name: str) -> Callable[[Sequence[Mapping[str, float]]], float | None]:
+    """Return a figure: the largest entry of that name."""
+    return lambda records: max((record[name] for record in records if name in record), default=None)
 
 
-if __name__ == "__main__":
-    main()
+def whole(record: Mapping[str, float]) -> Mapping[str, float] | None:
+    """Return the costs of a scene; None of one that was lost with its node, and ran twice."""
+    return None if record["lost"] else record
+
+
+def hundred_thousand(results: Results) -> Mapping[str, Figure | None]:
+    """Return core-hours and terabytes of a hundred thousand scenes."""
+    figures: dict[str, Figure | None] = {}
+    for case, arm in ((shown, arm) for shown in ("all", MANY) for arm in results.arms(shown)):
+        seconds, size = (results.value(arm, case, name) or 0.0 for name in ("core-seconds", "megabytes"))
+        count = len(results.of(arm, case))
+        figures[f"{arm}/{case}/hundred thousand"] = Figure(1e5 * seconds / 3600, None, None, count, "core-hours")
+        figures[f"{arm}/{case}/hundred thousand on disk"] = Figure(1e5 * size / 1e6, None, None, count, "TB")
+    return figures
+
+
+EXPERIMENT = Experiment(
+    name="scene_cost",
+    title="What a scene costs on a cluster with storage",
+    simulated="The living room's pictures are rendered; the kitchen and the office are recorded.",
+    knows="Exact poses of the logs.",
+    does_not_show="Scenes of a user's size: six frames each, to the graph of the room by geometry alone. A network "
+    "between machines: nodes and storage share this one. The processor time of Ray, of the storage, and of loading "
+    "libraries once a worker, is not in it. One node is killed, once.",
+    arms=ARMS,
+    cases=(FEW, MANY),
+    seeds_of=lambda bench, case: [name for name, _, _ in scenes_of(bench, case)],
+    runs=lambda arm, case: (arm == "cluster") == (case == MANY),
+    together=lambda trial: trial.case,
+    measure=measure,
+    record=dict[str, float],
+    measures={
+        "core-seconds": mean("core-seconds", "s", interval=False),
+        "megabytes": mean("megabytes", "MB", interval=False),
+        "memory": Measure(most("memory"), "MB", interval=False),
+    },
+    parameters=SceneParameters,
+    places=frozenset({"logs"}),
+    quick={"scenes": 8},
+    steps=tuple(STEPS),
+    subcases={step: (FEW, part_of(step)) for step in (*STEPS, BESIDE)} | {"all": (FEW, whole), MANY: (MANY, whole)},
+    more_figures=hundred_thousand,
+)
