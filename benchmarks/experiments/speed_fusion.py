@@ -1,7 +1,7 @@
 """Labelled fusion beside Open3D's VoxelBlockGrid without labels: frames/s, peak memory, surface error.
 
-A room of boxes, whose surface is known, is seen by a walking depth camera with the axial noise of Nguyen, Izadi &
-Lovell (2012), millimetre steps and a range of 4 m. Every run of an arm has a process of its own and the same decoded
+The corridor of boxes (benchmarks/corridor.py), whose surface is known, is seen by a walking depth camera with noise,
+millimetre steps and a range of 4 m. Every run of an arm has a process of its own and the same decoded
 frames; figures are medians over runs. Memory is the growth of the process's peak over what it held before the first
 frame (libraries loaded, kernels compiled, frames in memory).
 
@@ -16,18 +16,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from pydantic import Field
-from scenewright.schemas.scene_parts import Camera
-from scenewright.schemas.segments import FrameSegment
 from scenewright.schemas.vocabulary import load_vocabulary
-from scenewright.stages.kit.geometry.cameras import back_project, intrinsic_matrix
-from scenewright.stages.kit.geometry.transforms import look_at
+from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
 from scenewright.stages.kit.stage import Parameters
 
+from benchmarks.corridor import CAMERA, RANGE, CorridorFrame, corridor_scene, make_frames
 from benchmarks.experiment import Bench, Experiment, Results, Trial, median
 from benchmarks.timing import AS_THE_COMMAND_LINE, Clock, alone, medians, memory, reset_peak
 
-CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
-RANGE = 4.0
 TRUNCATION_VOXELS = 4.0
 ARMS = {
     "ours": "ours",
@@ -55,71 +51,11 @@ class FusionParameters(Parameters):
     frames: int = Field(100, ge=3, description="Frames of a run")
 
 
-def room() -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Return the boxes (class, minimum (3,), maximum (3,)) of the room; the first is the room itself, seen from inside.
-
-    Thin boards and legs are there on purpose: they are what a truncation distance breaks.
-    """
-    parts = [("wall", (-2.5, -2.0, 0.0), (2.5, 2.0, 2.6))]
-    for x, y, length, width, height in ((0.0, 0.0, 1.4, 0.8, 0.75), (-1.9, 1.2, 1.0, 0.7, 0.45)):
-        parts.append(("table", (x - length / 2, y - width / 2, height - 0.04), (x + length / 2, y + width / 2, height)))
-        for side_x in (-1, 1):
-            for side_y in (-1, 1):
-                leg_x, leg_y = x + side_x * (length / 2 - 0.05), y + side_y * (width / 2 - 0.05)
-                parts.append(
-                    ("table", (leg_x - 0.025, leg_y - 0.025, 0.0), (leg_x + 0.025, leg_y + 0.025, height - 0.04))
-                )
-    parts += [
-        ("cabinet", (1.6, 1.2, 0.0), (2.4, 1.9, 1.8)),
-        ("sofa", (-2.4, -1.9, 0.0), (-1.5, -1.0, 0.45)),
-        ("box", (-0.2, -0.1, 0.75), (0.1, 0.1, 1.0)),
-        ("cup", (0.3, 0.1, 0.75), (0.4, 0.2, 0.87)),
-    ]
-    return [(name, np.array(low), np.array(high)) for name, low, high in parts]
-
-
-def true_scene():  # type: ignore[no-untyped-def]  # open3d has no types
-    """Return the room as an open3d RaycastingScene; geometry ids follow `room()`."""
-    import open3d as o3d
-    import trimesh
-
-    scene = o3d.t.geometry.RaycastingScene()
-    for _, low, high in room():
-        mesh = trimesh.creation.box(
-            extents=high - low, transform=trimesh.transformations.translation_matrix((low + high) / 2)
-        )
-        scene.add_triangles(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
-    return scene
-
-
-def render_frames(count: int) -> dict[str, np.ndarray]:
-    """Return depth (N, H, W) float32 [m], color (N, H, W, 3) uint8, ids (N, H, W) uint16, poses (N, 4, 4)."""
-    import open3d as o3d
-
-    scene, random = true_scene(), np.random.default_rng(0)
-    palette = random.integers(30, 226, (len(room()), 3)).astype(np.uint8)
-    frames: dict[str, list[np.ndarray]] = {"depth": [], "color": [], "ids": [], "poses": []}
-    for angle in 2 * np.pi * np.arange(count) / count:
-        eye = np.array([1.7 * np.cos(angle), 1.3 * np.sin(angle), 1.5 + 0.2 * np.sin(3 * angle)])
-        pose = look_at(eye, np.array([-0.9 * np.cos(angle), -0.7 * np.sin(angle), 0.5]))
-        directions = back_project(np.ones((CAMERA.height, CAMERA.width), dtype=np.float32), CAMERA) @ pose[:3, :3].T
-        rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=-1)
-        hit = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))  # type: ignore[call-overload]
-        depth = hit["t_hit"].numpy()
-        depth = depth + (0.0012 + 0.0019 * (depth - 0.4) ** 2) * random.standard_normal(depth.shape)
-        ids = hit["geometry_ids"].numpy().astype(np.int64)
-        frames["depth"].append(np.where(depth <= RANGE, np.round(depth * 1000) / 1000, 0).astype(np.float32))
-        frames["color"].append(palette[ids])
-        frames["ids"].append((ids + 1).astype(np.uint16))
-        frames["poses"].append(pose)
-    return {name: np.array(images) for name, images in frames.items()}
-
-
 Step = Callable[[int], None]
 Mesh = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 
-def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple[Step, Mesh]:
+def ours(frames: list[CorridorFrame], voxel_size: float, whole: bool) -> tuple[Step, Mesh]:
     """Return what integrates frame k, and what gives the mesh. `whole`: with association, counts and merges."""
     from scenewright.stages.fuse.integration import integrate
     from scenewright.stages.fuse.parameters import FuseParameters
@@ -130,42 +66,25 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
     options = FuseParameters.model_validate(
         {"voxel_size": voxel_size, "truncation_voxels": TRUNCATION_VOXELS, "maximum_depth": RANGE}
     )
-    vocabulary = load_vocabulary()
-    mapper = new_mapper(options, vocabulary)
-    classes = [vocabulary.by_name(name) for name, _, _ in room()]
-    listings = []
-    for image in frames["ids"]:
-        numbers = np.unique(image).tolist()
-        listings.append(
-            [
-                FrameSegment(
-                    id=number,
-                    category_id=classes[number - 1].id,
-                    instance=number,
-                    score=1.0,
-                    area=1,
-                    is_thing=classes[number - 1].kind == "thing",
-                )
-                for number in numbers
-            ]
-        )
-    ids = frames["ids"].astype(np.int32)
-    labels = np.arange(len(classes) + 1, dtype=np.int32)
+    mapper = new_mapper(options, load_vocabulary())
+    true = [frame.masks.ids.astype(np.uint16) for frame in frames]
+    labels = np.arange(1 + max(int(image.max()) for image in true), dtype=np.int32)
 
     def with_everything(k: int) -> None:
-        mapper.add_frame(CAMERA, frames["depth"][k], frames["color"][k], frames["poses"][k], ids[k], listings[k])
+        frame = frames[k]
+        mapper.add_frame(CAMERA, frame.depth, frame.color, frame.pose, frame.ids, frame.listing)
 
     def vote_only(k: int) -> None:
         integrate(
             mapper.blocks,
-            frames["depth"][k],
+            frames[k].depth,
             CAMERA,
-            frames["poses"][k],
+            frames[k].pose,
             truncation=mapper.truncation_distance,
             near=options.minimum_depth,
             far=RANGE,
-            color=frames["color"][k],
-            index_image=frames["ids"][k],
+            color=frames[k].color,
+            index_image=true[k],
             label_of_index=labels,
             canonical=labels,
             label_band=options.label_band * mapper.truncation_distance,
@@ -179,7 +98,7 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
     return (with_everything if whole else vote_only), mesh
 
 
-def open3d(frames: dict[str, np.ndarray], voxel_size: float, color: bool) -> tuple[Step, Mesh]:
+def open3d(frames: list[CorridorFrame], voxel_size: float, color: bool) -> tuple[Step, Mesh]:
     """The same for Open3D's VoxelBlockGrid on the processor (8^3 blocks, capacity as large as the room needs)."""
     import open3d as o3d
 
@@ -200,11 +119,11 @@ def open3d(frames: dict[str, np.ndarray], voxel_size: float, color: bool) -> tup
     options = (1.0, RANGE, TRUNCATION_VOXELS)
 
     def step(k: int) -> None:
-        depth = geometry.Image(core.Tensor(frames["depth"][k]))  # type: ignore[call-overload]
-        extrinsic = core.Tensor(np.linalg.inv(frames["poses"][k]))  # type: ignore[call-overload]
+        depth = geometry.Image(core.Tensor(frames[k].depth))  # type: ignore[call-overload]
+        extrinsic = core.Tensor(np.linalg.inv(frames[k].pose))  # type: ignore[call-overload]
         blocks = grid.compute_unique_block_coordinates(depth, intrinsic, extrinsic, *options)
         if color:
-            image = geometry.Image(core.Tensor(frames["color"][k]).to(core.float32))  # type: ignore[call-overload]
+            image = geometry.Image(core.Tensor(frames[k].color).to(core.float32))  # type: ignore[call-overload]
             grid.integrate(blocks, depth, image, intrinsic, extrinsic, *options)
         else:
             grid.integrate(blocks, depth, intrinsic, extrinsic, *options)
@@ -216,7 +135,7 @@ def open3d(frames: dict[str, np.ndarray], voxel_size: float, color: bool) -> tup
     return step, mesh
 
 
-def build(arm: str, frames: dict[str, np.ndarray], voxel_size: float) -> tuple[Step, Mesh]:
+def build(arm: str, frames: list[CorridorFrame], voxel_size: float) -> tuple[Step, Mesh]:
     """Return the steps of an arm."""
     if arm.startswith("ours"):
         return ours(frames, voxel_size, whole=arm == "ours")
@@ -229,7 +148,7 @@ def surface_error(vertices: np.ndarray, faces: np.ndarray) -> dict[str, float]:
 
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     points, _ = trimesh.sample.sample_surface(mesh, 100_000, seed=0)
-    distance = true_scene().compute_distance(points.astype(np.float32)).numpy()
+    distance = corridor_scene()[0].compute_distance(points.astype(np.float32)).numpy()
     return {
         "mean error": 1000 * float(distance.mean()),
         "p95 error": 1000 * float(np.percentile(distance, 95)),
@@ -237,16 +156,16 @@ def surface_error(vertices: np.ndarray, faces: np.ndarray) -> dict[str, float]:
     }
 
 
-def work(arm: str, case: str, frames: dict[str, np.ndarray]) -> dict[str, float]:
+def work(arm: str, case: str, frames: list[CorridorFrame]) -> dict[str, float]:
     """Run one arm once on frames, in a process of its own."""
-    step, mesh = build(arm, {name: images[:2] for name, images in frames.items()}, 0.05)
+    step, mesh = build(arm, frames[:2], 0.05)
     step(0)
     step(1)
     mesh()  # kernels compiled, libraries loaded, threads started
     step, mesh = build(arm, frames, CASES[case])
     reset_peak()
     before, clock, meshing = memory("VmRSS"), Clock(), Clock()
-    for k in range(len(frames["depth"])):
+    for k in range(len(frames)):
         with clock.lap():
             step(k)
     with meshing.lap():
@@ -264,7 +183,7 @@ def work(arm: str, case: str, frames: dict[str, np.ndarray]) -> dict[str, float]
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterable[tuple[Trial, dict[str, float]]]:
     """Yield what each run took."""
-    frames = render_frames(bench.parameters.frames)
+    frames = make_frames(bench.parameters.frames)
     for trial in trials:
         variables = AS_THE_COMMAND_LINE if trial.arm.startswith("ours") else {}
         yield trial, alone(work, trial.arm, trial.case, frames, **variables)
@@ -283,7 +202,7 @@ def shares(results: Results) -> Mapping[str, float | None]:
 EXPERIMENT = Experiment(
     name="speed_fusion",
     title="Labelled fusion beside Open3D",
-    simulated="Frames of a room with noise.",
+    simulated="Frames of a corridor with noise.",
     knows="Exact poses.",
     does_not_show="Speed on other hardware. Where other work ran beside it, less than half as much again is a tie. "
     "Open3D fuses no labels.",

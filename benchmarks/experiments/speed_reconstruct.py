@@ -210,5 +210,5 @@ EXPERIMENT = Experiment(
     places=frozenset({"log", "weights"}),
     inputs=lambda bench, trial: [bench.parameters.log],
     quick={"frames": 20},
-    steps=("report",),
+    steps=("ingest", "segment", "articulate", "fuse", "graph", "library build", "cad", "urdf", "evaluate", "report"),
 )

@@ -1,4 +1,4 @@
-"""Speed of per-frame segmentation beside named peers: medians over frames, of a generated room at 640x480.
+"""Speed of per-frame segmentation beside named peers: medians over frames of a corridor at 640x480.
 
 Peers do a comparable part each: OpenCV's RgbdNormals and Open3D's estimate_normals for the normals, OpenCV's
 findPlanes as another way to cut a depth image up, and the same convexity algorithm written with numpy alone. Our own
@@ -13,12 +13,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-import trimesh
-from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.geometry.cameras import back_project, intrinsic_matrix
-from scenewright.stages.kit.geometry.transforms import look_at
-from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scenewright.stages.segment.fusion import FusionSettings
 from scenewright.stages.segment.fusion_ours import fuse
 from scenewright.stages.segment.geometric import (
@@ -31,12 +27,12 @@ from scenewright.stages.segment.geometric import (
     smooth_depth,
 )
 from scenewright.stages.segment.normals import surface_normals
-from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.panoptic import PanopticFrame
 
+from benchmarks.corridor import CAMERA, make_frames
 from benchmarks.experiment import Bench, Experiment, Results, Trial, median
 from benchmarks.timing import Clock
 
-CAMERA = Camera(width=640, height=480, fx=560.0, fy=560.0, cx=319.5, cy=239.5)
 VIEWS = 6
 OURS, NETWORK, BY_NETWORK = "ours", "our network", "a frame by our network"
 PARTS = ("whole", "smoothing", "normals", "convexity", "labels", "fusion", NETWORK, BY_NETWORK)
@@ -50,34 +46,6 @@ PEERS = (
 )
 Work = Callable[[int], object]
 """What is timed, on the frame of a number."""
-
-
-def rendered_frames() -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return (depth with sensor noise, true instances) of a room with furniture made of boxes and cylinders."""
-    random = np.random.default_rng(0)
-    meshes = []
-    room = trimesh.creation.box(extents=(5, 5, 2.6), transform=trimesh.transformations.translation_matrix([0, 0, 1.3]))
-    room.invert()
-    meshes.append((1, room))
-    for k in range(14):
-        size = random.uniform([0.3, 0.3, 0.3], [1.2, 0.8, 1.2])
-        place = np.array([*random.uniform(-2, 2, 2), size[2] / 2])
-        box = trimesh.creation.box(extents=size)
-        box.apply_transform(trimesh.transformations.rotation_matrix(random.uniform(0, 3), [0, 0, 1]))
-        box.apply_translation(place)
-        cup = trimesh.creation.cylinder(radius=0.05, height=0.12)
-        cup.apply_translation(place + [0.05, 0.05, size[2] / 2 + 0.06])
-        meshes += [(2 + 2 * k, box), (3 + 2 * k, cup)]
-    renderer = SceneRenderer(meshes)
-    frames = []
-    for k in range(VIEWS):
-        angle = 2 * np.pi * k / VIEWS
-        eye = np.array([1.9 * np.cos(angle), 1.9 * np.sin(angle), 1.5])
-        seen = renderer.render(CAMERA, look_at(eye, np.array([-0.5 * np.cos(angle), -0.5 * np.sin(angle), 0.4])))
-        noise = (0.0012 + 0.0019 * (seen.depth - 0.4) ** 2) * random.standard_normal(seen.depth.shape)
-        depth = np.where(seen.depth > 0, np.round((seen.depth + noise) * 1000) / 1000, 0).astype(np.float32)
-        frames.append((depth, seen.instance))
-    return frames
 
 
 def numpy_normals(points: np.ndarray, window: int, step: int, distance_factor: float) -> np.ndarray:
@@ -144,19 +112,16 @@ def open3d_normals(depth: np.ndarray) -> np.ndarray:
 
 def works() -> dict[tuple[str, str], Work]:
     """Return what is timed of every method and part."""
-    frames = rendered_frames()
+    frames = make_frames(VIEWS)
     settings = GeometricSettings()
-    depths = [depth for depth, _ in frames]
+    depths = [frame.depth for frame in frames]
     smooth = [smooth_depth(depth) for depth in depths]
     points = [back_project(depth, CAMERA) for depth in smooth]
     window, step = settings.normal_window, settings.normal_step
     normals = [surface_normals(cloud, window=window, step=step) for cloud in points]
     edges = [edge_map(d, p, n, settings) for d, p, n in zip(smooth, points, normals, strict=True)]
     segmented = [segment_depth(depth, CAMERA) for depth in depths]
-    panoptic = []
-    for _, instance in frames:
-        numbers = np.unique(instance[instance > 0]).tolist()
-        panoptic.append(PanopticFrame(instance.astype(np.int32), {n: PanopticMask(4, n > 1) for n in numbers}))
+    panoptic = [frame.masks for frame in frames]
     opencv = {
         name: cv2.RgbdNormals_create(  # type: ignore[attr-defined]
             480, 640, cv2.CV_32F, intrinsic_matrix(CAMERA), 5, 50, method
@@ -244,7 +209,7 @@ def beside_ours(results: Results) -> Mapping[str, float | None]:
 EXPERIMENT = Experiment(
     name="speed_segmentation",
     title="Segmentation beside its peers",
-    simulated="Six views of a room with noise.",
+    simulated="Six views of a corridor with noise.",
     knows="Depth alone; our network depth and a picture of noise.",
     does_not_show="Quality: numpy's and findPlanes' results are not the same segments (numpy leaves edge pixels "
     "unlabelled, findPlanes finds planes alone).",

@@ -7,17 +7,8 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks.experiments.growth.corridor import FURNITURE, LENGTH, PER_CELL, ROOM, class_of, instance_of, moved, walk
-from benchmarks.experiments.growth.experiment import (
-    EXPERIMENT,
-    REPEATS,
-    WALKS,
-    WHOLE,
-    edges_of,
-    frame_at,
-    growth,
-    row_at,
-)
+from benchmarks.corridor import FURNITURE, LENGTH, PER_CELL, ROOM, class_of, instance_of, moved, walk
+from benchmarks.experiments.growth import EXPERIMENT, REPEATS, WALKS, WHOLE, edges_of, frame_at, growth, row_at
 from benchmarks.timing import Clock, alone, memory
 
 

@@ -96,25 +96,27 @@ def walk(count: int) -> np.ndarray:
     return np.array(poses)
 
 
-def make_frames(count: int, seed: int = 0) -> list[CorridorFrame]:
-    """Render and segment `count` frames of the first cell, with the noise of a structured-light camera."""
+def corridor_scene():  # type: ignore[no-untyped-def]  # open3d has no types
+    """Return the cells in and around the first one as an open3d RaycastingScene, and the true instance of each of its
+    geometries, and last of none (N + 1,)."""
     import open3d as o3d
 
-    random = np.random.default_rng(seed)
-    scene = o3d.t.geometry.RaycastingScene()
-    instances = []
+    scene, instances = o3d.t.geometry.RaycastingScene(), []
     for cell in (-1, 0, 1, 2):
         for number, (_, low, high) in enumerate(ROOM + FURNITURE):
-            extents = np.subtract(high, low)
             middle = np.add(low, high) / 2 + [cell * LENGTH, 0, 0]
-            box = trimesh.creation.box(extents, trimesh.transformations.translation_matrix(middle))
-            scene.add_triangles(
-                o3d.core.Tensor(box.vertices.astype(np.float32)),  # type: ignore[call-overload]
-                o3d.core.Tensor(box.faces.astype(np.uint32)),  # type: ignore[call-overload]
-            )
+            box = trimesh.creation.box(np.subtract(high, low), trimesh.transformations.translation_matrix(middle))
+            scene.add_triangles(box.vertices.astype(np.float32), box.faces.astype(np.uint32))
             owner = len(ROOM) + SAME.get(number - len(ROOM), number - len(ROOM)) if number >= len(ROOM) else number
             instances.append(instance_of(owner, cell))
-    table = np.array([*instances, 0])
+    return scene, np.array([*instances, 0])
+
+
+def make_frames(count: int, seed: int = 0) -> list[CorridorFrame]:
+    """Render and segment `count` frames of the first cell, with the axial noise of a structured-light camera (Nguyen,
+    Izadi & Lovell, 2012)."""
+    random = np.random.default_rng(seed)
+    scene, table = corridor_scene()
     palette = random.integers(40, 220, (PER_CELL, 3)).astype(np.uint8)
     return [_frame(scene, pose, table, palette, random) for pose in walk(count)]
 

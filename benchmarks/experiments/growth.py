@@ -1,9 +1,9 @@
 """What a frame costs while the map grows, and what holds the memory: `fuse` by part, 100 to 3,000 frames, 5 to 200 m^2.
 
-A camera walks down an endless furnished corridor (corridor.py), 15 frames a square metre of floor. `growing` walks on;
-`standing` sees the same cell again and again (a third of the frames), so that the log grows and the map does not. Cases
-are the frames up to which a figure is the mean since the case before; `all`: of all frames. Every arm runs in a process
-of its own. Times are processor time, which other work on the machine hardly changes;
+A camera walks down an endless furnished corridor (benchmarks/corridor.py), 15 frames a square metre of floor. `growing`
+walks on; `standing` sees the same cell again and again (a third of the frames), so that the log grows and the map does
+not. Cases are the frames up to which a figure is the mean since the case before; `all`: of all frames. Every arm runs
+in a process of its own. Times are processor time, which other work on the machine hardly changes;
 frames/s on a quiet machine are 1000 / wall_ms. Memory is the growth of the peak over what the process held before the
 first frame (libraries loaded, kernels compiled, frames in memory). Parts of `fuse`: overlap (which voxels of the map
 lie under a frame's segments), labels (association, counts, merging of segments), integration, regularisation (merging
@@ -26,8 +26,8 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context, Parameters
 
+from benchmarks.corridor import AREA, CAMERA, RANGE, CorridorFrame, make_frames, moved
 from benchmarks.experiment import Bench, Experiment, Results, Trial, only
-from benchmarks.experiments.growth.corridor import AREA, CAMERA, RANGE, CorridorFrame, make_frames, moved
 from benchmarks.timing import AS_THE_COMMAND_LINE, Clock, alone, memory, reset_peak
 
 DISTINCT = 50
