@@ -200,13 +200,13 @@ pair-rules: setup ## Fit the rules of `segment --backend objects` anew (QUICK=1:
 	$(PYTHON) -m benchmarks.training.pair_rules $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/pair-rules$(if $(QUICK),-quick)
 
 bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
-	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
-	$(PYTHON) -m benchmarks.speed.segmentation $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-segmentation
-	$(PYTHON) -m benchmarks.speed.splatting $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-splatting
+	$(EXPERIMENT) speed_fusion --out $(OUTPUTS)/experiments/bench-speed-fusion$(if $(QUICK),-quick) $(ASKED)
+	$(EXPERIMENT) speed_segmentation --out $(OUTPUTS)/experiments/bench-speed-segmentation$(if $(QUICK),-quick) $(ASKED)
+	$(EXPERIMENT) speed_splatting --out $(OUTPUTS)/experiments/bench-speed-splatting$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: bench-growth
 bench-growth: setup ## What a frame costs as the map grows, and what holds the memory (QUICK=1: 300 frames)
-	$(PYTHON) -m benchmarks.speed.growth $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-growth
+	$(EXPERIMENT) growth --out $(OUTPUTS)/experiments/bench-growth$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: bench-supports bench-timeline
 # Four studios of tuning and four of reporting seeds, on perfect maps.

@@ -1,4 +1,4 @@
-"""Command lines out of parameters: of experiments, and of recipes and measurements, which have no others."""
+"""Command lines out of parameters: of experiments, and of recipes, which have no others."""
 
 from __future__ import annotations
 
@@ -19,13 +19,6 @@ class Recipe(Parameters):
 
     out: Path = Field(description="Output folder")
     quick: bool = Field(False, description="Proves the recipe: little data, few steps")
-
-
-class Measurement(Parameters):
-    """Options of every measurement of speed."""
-
-    out: Path | None = Field(None, description="Folder for metrics.json and table.md")
-    quick: bool = Field(False, description="Fewer repetitions, smaller inputs")
 
 
 def asked(kind: type[Asked]) -> Asked:

@@ -1,164 +1,158 @@
-"""`scenewright edit rename | delete | merge | split | add | gravity | floor`: a line more in edits.toml, which
-`edit map` applies."""
+"""`scenewright edit rename | merge | support | move ...`: a line more in edits.toml, which `edit map`, `edit graph` or
+`edit scene` applies. The commands come out of the declaration of the edits (schemas/edits.py), as a page's forms do."""
 
 from __future__ import annotations
 
 import getpass
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any, Literal, Optional
 
 import typer
+from scenewright.cli.edit_forms import Form, field_of, forms_of, kinds_of
 from scenewright.cli.output import out, say
+from scenewright.schemas.artifact import Artifact
+from scenewright.schemas.cad_scene import CadScene
+from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.edits import AnyEdit, Edit, GraphEdit, MapEdit, SceneEdit
 from scenewright.schemas.errors import UsageError
+from scenewright.schemas.hand_written import UprightBox
+from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.plain_text import cleaned
 
 if TYPE_CHECKING:
-    from scenewright.schemas.edits import AnyEdit
-    from scenewright.stages.edit.map_state import MapState
+    from scenewright.cli.viewing.desk.subject import Subject
 
-File = Annotated[Path, typer.Argument(help="edits.toml; it is made where there is none.")]
-ThingName = Annotated[str, typer.Argument(help="A thing of the map: its instance number, or its node's name (cup_7).")]
-Things = Annotated[list[str], typer.Argument(help="Things of the map; the first gives its class.")]
-Map = Annotated[Path, typer.Option("--panoptic-map", help="The map as it was seen, edited or not.")]
-ClassName = Annotated[str, typer.Option("--class", help="A class of data/vocabulary.toml.")]
-Center = Annotated[tuple[float, float, float], typer.Option("--center", help="Of a box: x y z in the world [m].")]
-Size = Annotated[tuple[float, float, float], typer.Option("--size", help="Of a box: its edges, the last one up [m].")]
-Yaw = Annotated[float, typer.Option("--yaw", help="Of a box: its turn about the vertical [degrees].")]
-By = Annotated[str, typer.Option("--by", help="Who edits [default: the name of your account].")]
-Note = Annotated[str, typer.Option("--note", help="Why.")]
-Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
-
-
-def rename(
-    file: File,
-    thing: ThingName,
-    panoptic_map: Map,
-    class_name: ClassName,
-    by: By = "",
-    note: Note = "",
-    debug: Debug = False,
-) -> int:
-    """Say that a thing of a map is of another class."""
-    return append(file, by, note, what="rename", of=_anchors(panoptic_map, [thing])[0], **{"class": class_name})
-
-
-def delete(file: File, thing: ThingName, panoptic_map: Map, by: By = "", note: Note = "", debug: Debug = False) -> int:
-    """Say that there is no such thing; its surface stays in the map, without a name."""
-    return append(file, by, note, what="delete", of=_anchors(panoptic_map, [thing])[0])
-
-
-def merge(file: File, things: Things, panoptic_map: Map, by: By = "", note: Note = "", debug: Debug = False) -> int:
-    """Say that several things of a map are one."""
-    if len(set(things)) < 2:
-        raise UsageError("merge takes at least two things", hint="give their instance numbers or names")
-    return append(file, by, note, what="merge", of=_anchors(panoptic_map, things))
-
-
-def split(
-    file: File,
-    thing: ThingName,
-    panoptic_map: Map,
-    class_name: ClassName,
-    center: Center,
-    size: Size,
-    yaw: Yaw = 0.0,
-    by: By = "",
-    note: Note = "",
-    debug: Debug = False,
-) -> int:
-    """Say that what of a thing lies in a box is a thing of its own."""
-    part = {"center": center, "size": size, "yaw_degrees": yaw}
-    of = _anchors(panoptic_map, [thing])[0]
-    return append(file, by, note, what="split", of=of, part=part, **{"class": class_name})
-
-
-def add(
-    file: File,
-    class_name: ClassName,
-    center: Center,
-    size: Size,
-    yaw: Yaw = 0.0,
-    drawn: Annotated[
-        bool, typer.Option("--drawn", help="No camera saw it (glass): the box itself is its surface.")
-    ] = False,
-    by: By = "",
-    note: Note = "",
-    debug: Debug = False,
-) -> int:
-    """Say that there is a thing in a box that the map does not name."""
-    box = {"center": center, "size": size, "yaw_degrees": yaw}
-    surface = "box" if drawn else "seen"
-    return append(file, by, note, what="add", box=box, surface=surface, **{"class": class_name})
-
-
-Place = tuple[float, float, float]
-
-
-def gravity(
-    file: File,
-    first: Annotated[Place, typer.Option("--first", help="A place x y z [m] of a surface that is level in truth.")],
-    second: Annotated[Place, typer.Option("--second", help="Another one.")],
-    third: Annotated[Place, typer.Option("--third", help="Another one, not on a line with them.")],
-    by: By = "",
-    note: Note = "",
-    debug: Debug = False,
-) -> int:
-    """Say what is level: the map is turned until it is."""
-    return append(file, by, note, what="gravity", level=(first, second, third))
-
-
-def floor(
-    file: File,
-    at: Annotated[Place, typer.Option("--at", help="A place on the floor: x y z [m].")],
-    by: By = "",
-    note: Note = "",
-    debug: Debug = False,
-) -> int:
-    """Say where the floor is: level, at this height, below the whole map."""
-    return append(file, by, note, what="floor", at=at)
-
-
-GRAPH, SCENE = "graph --contact-graph", "scene --cad-scene"
-APPLIED_BY = {
-    "support": GRAPH,
-    "mark": "graph|scene",
-    **dict.fromkeys(("model", "move", "joint", "no_joint", "new_joint"), SCENE),
+EDITED: dict[type[Artifact], tuple[str, Any]] = {
+    PanopticMap: ("map", MapEdit),
+    ContactGraph: ("graph", GraphEdit),
+    CadScene: ("scene", SceneEdit),
 }
-"""What applies an edit that is none of a map, and to what."""
-COMMANDS = (rename, delete, merge, split, add, gravity, floor)
+"""What edits are applied to -> by which `edit` command, and which edits."""
+ARGUMENTS = {
+    "thing": "A thing: its node's name (cup_7), or its instance number.",
+    "things": "Things: names of their nodes, or instance numbers; the first gives its class.",
+    "joint": "Name of a joint of its model.",
+    "model": "",
+    "as": "",
+}
+"""Kind or name of a needed field that is typed without an option -> help, where its declaration has none."""
+FILE = "edits.toml; it is made where there is none."
+FLAGS = {"surface": "drawn"}
+"""Choice of two that is typed as a flag, which means the second."""
+ORDINALS = ("first", "second", "third")
+Triple = tuple[float, float, float]
+TYPED = {"number": float, "yes": bool, "things": list[str], **dict.fromkeys(("point", "direction", "numbers"), Triple)}
+"""Kind of a field -> type of what is typed; a word where it is not here."""
 
 
-def _anchors(path: Path, names: list[str]) -> list[Any]:
-    from scenewright.schemas.panoptic_map import PanopticMap
-    from scenewright.stages.edit.anchoring import anchor_of
-    from scenewright.stages.edit.map_state import read_state
+def _parameter(name: str, annotation: Any, declared: Any) -> inspect.Parameter:
+    """Return a parameter of a command. The underscore is for names that Python keeps to itself: `class`, `as`."""
+    return inspect.Parameter(f"{name}_", inspect.Parameter.KEYWORD_ONLY, default=declared, annotation=annotation)
+
+
+def _option(name: str, annotation: Any, text: str | None, default: Any = ..., **bounds: Any) -> inspect.Parameter:
+    """Return an option, which is needed when it has no default."""
+    annotation = Optional[annotation] if default is None else annotation  # noqa: UP045
+    return _parameter(name, annotation, typer.Option(default, f"--{name.replace('_', '-')}", help=text, **bounds))
+
+
+def _typed(field: Form) -> list[inspect.Parameter]:
+    """Return what is typed for a field: an argument, an option, or several."""
+    name, kind, text, words = _short(field["name"]), field["kind"], field["says"], field.get("choices", ())
+    if kind == "box":
+        parts = [field_of(part, info) or {} for part, info in UprightBox.model_fields.items()]
+        return [parameter for part in parts for parameter in _typed(part)]
+    if kind == "points":
+        return [_option(ordinal, Triple, text) for ordinal in ORDINALS[: field["fewest"]]]
+    if kind == "place":
+        return [_option(name, Triple, text, None), _option("shift", Triple, "Or how far it goes: x y z [m].", None)]
+    if name in FLAGS:
+        return [_option(FLAGS[name], bool, text, False)]
+    annotation: Any = Literal[tuple(words)] if kind == "choice" else TYPED.get(kind, str)
+    called = name if name in ARGUMENTS else kind
+    if called in ARGUMENTS and not (kind == "thing" and words):
+        metavar = "|".join(words) if kind == "choice" else called.upper()
+        return [_parameter(name, annotation, typer.Argument(..., metavar=metavar, help=text or ARGUMENTS[called]))]
+    default = ... if field["needed"] else field["start"]
+    return [_option(name, annotation, text, default, min=field.get("least"), max=field.get("most"))]
+
+
+def _said(field: Form, given: Mapping[str, Any]) -> Any:
+    """Return what was typed for a field as a page says it; None where it was left out."""
+    if field["kind"] == "box":
+        return {part: given[f"{_short(part)}_"] for part in UprightBox.model_fields}
+    if field["kind"] == "points":
+        return [given[f"{ordinal}_"] for ordinal in ORDINALS[: field["fewest"]]]
+    if (flag := FLAGS.get(field["name"])) is not None:
+        return field["choices"][given[f"{flag}_"]]
+    return given[f"{_short(field['name'])}_"]
+
+
+def _short(name: str) -> str:
+    return name.removesuffix("_degrees")
+
+
+def make_command(form: Form) -> Callable[..., int]:
+    """Return a function with the signature that typer reads for a kind of edit, out of its form."""
+    what, fields = form["what"], form["fields"]
+    edited = [kind for kind, (_, edits) in EDITED.items() if what in {one["what"] for one in forms_of(kinds_of(edits))}]
+    sources = {_flag(kind): kind for kind in edited if any(field["kind"] in ("thing", "things") for field in fields)}
+
+    def command(**given: Any) -> int:
+        named = [kind for kind in sources.values() if given[f"{kind.kind}_"] is not None]
+        if sources and len(named) != 1:
+            raise UsageError(f"edit {what}: give either {' or '.join(sources)}", hint="see --help")
+        asked = {field["name"]: _said(field, given) for field in fields}
+        values = {"what": what, **asked}
+        if named:
+            subject = _subject(named[0], given[f"{named[0].kind}_"])
+            if given.get("shift_") is not None:
+                asked["to"] = _shifted(subject, given)
+            values = subject.fields(what, fields, asked)
+        return _append(given, values, (named or edited)[0])
+
+    parameters = [_parameter("file", Path, typer.Argument(..., metavar="FILE", help=FILE))]
+    parameters += [parameter for field in fields for parameter in _typed(field)]
+    needed = ... if len(sources) == 1 else None
+    parameters += [_option(kind.kind, Path, f"The {kind.kind}, edited or not.", needed) for kind in sources.values()]
+    parameters += [_option(name, str, Edit.model_fields[name].description, "") for name in ("by", "note")]
+    parameters.append(_option("debug", bool, "Show the traceback of an error.", False))
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    command.__name__, command.__doc__ = what, form["says"]
+    return command
+
+
+def _subject(kind: type[Artifact], path: Path) -> Subject[Any]:
+    from scenewright.cli.viewing.desk.subjects import SUBJECTS
     from scenewright.stages.engine.reading import open_artifact
 
-    opened = open_artifact(path, PanopticMap)
-    assert isinstance(opened, PanopticMap)
-    state, _ = read_state(opened)
-    return [anchor_of(state, _instance(state, name, path)).model_dump(by_alias=True) for name in names]
+    return dict(SUBJECTS)[kind](open_artifact(path, kind), frozenset())
 
 
-def _instance(state: MapState, name: str, path: Path) -> int:
-    """Return the instance that is called so. Raises UsageError when the map has none with a surface."""
-    things = {thing.name: thing.instance for thing in state.things()}
-    found = things.get(name) or next((k for k in things.values() if str(k) == name), None)
-    if found is None:
-        shown = ", ".join(list(things)[:12]) + (", ..." if len(things) > 12 else "")
-        raise UsageError(f"{path}: has no thing {name!r:.80}", hint=f"it has: {shown or 'none'}")
-    return found
+def _shifted(subject: Subject[Any], given: Mapping[str, Any]) -> list[float]:
+    """Return where the middle of a thing's box goes when it is shifted. Raises UsageError when that is said too."""
+    if given["to_"] is not None:
+        raise UsageError("edit move: give --to or --shift, not both", hint="see --help")
+    middle = subject.anchor_of(subject.thing(given["of_"])).box.center
+    return [start + way for start, way in zip(middle, given["shift_"], strict=True)]
 
 
-def append(file: Path, by: str, note: str, **values: Any) -> int:
+def _flag(kind: type[Artifact]) -> str:
+    return f"--{kind.kind.replace('_', '-')}"
+
+
+def _append(given: Mapping[str, Any], values: Mapping[str, Any], kind: type[Artifact]) -> int:
     """Add the edit that somebody asks for now to the file, and say what to do next."""
     from scenewright.stages.edit.edits_file import append_edits
 
-    edits = append_edits(file, [asked_edit(by, note, values)])
-    where = APPLIED_BY.get(values["what"], "map --panoptic-map")
-    say(f"edit {len(edits.edits)} of {file}; next: scenewright edit {where} ... --edits {file} --out ...")
+    file = given["file_"]
+    edits = append_edits(file, [asked_edit(given["by_"], given["note_"], values)])
+    apply = f"scenewright edit {EDITED[kind][0]} {_flag(kind)} ... --edits {file} --out ..."
+    say(f"edit {len(edits.edits)} of {file}; next: {apply}")
     out(str(file))
     return 0
 
@@ -166,7 +160,6 @@ def append(file: Path, by: str, note: str, **values: Any) -> int:
 def asked_edit(by: str, note: str, values: Mapping[str, Any]) -> AnyEdit:
     """Return the edit that somebody asks for now; `values` are its fields. Raises UsageError for what is none."""
     from pydantic import TypeAdapter, ValidationError
-    from scenewright.schemas.edits import AnyEdit
 
     said = {"by": cleaned(by or _account()), "when": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", "note": cleaned(note)}
     try:
@@ -183,3 +176,6 @@ def _account() -> str:
         return getpass.getuser()
     except (OSError, KeyError, ImportError):
         return ""
+
+
+COMMANDS = tuple(make_command(form) for form in forms_of(kinds_of(AnyEdit)))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from scenewright.cli import edit_command, edit_node_command
+from scenewright.cli import edit_command
 from scenewright.cli.batch_command import batch
 from scenewright.cli.collection_command import gc
 from scenewright.cli.comparison_command import diff
@@ -322,6 +322,6 @@ BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("suture", follow),
     ("splat", view),
     ("predicates", show),
-    *(("edit", command) for command in (*edit_command.COMMANDS, *edit_node_command.COMMANDS)),
+    *(("edit", command) for command in edit_command.COMMANDS),
 )
 """Commands of a group of steps that are no steps; they are there where the group's steps are."""

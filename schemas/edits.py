@@ -59,11 +59,10 @@ class Anchor(Model):
 class Edit(Model):
     """What all edits say."""
 
-    by: Text = ""
-    """Who made it."""
+    by: Text = Field("", description="Who made it: an account's name where nobody says another.")
     when: str = Field(default="", pattern=r"^(\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}Z)?$")
     """Universal time."""
-    note: Text = ""
+    note: Text = Field("", description="Why.")
 
 
 class Rename(Edit):
@@ -71,7 +70,7 @@ class Rename(Edit):
 
     what: Literal["rename"]
     of: Anchor
-    class_name: ClassName = Field(alias="class")
+    class_name: ClassName = Field(alias="class", description="A class of data/vocabulary.toml.")
 
 
 class Delete(Edit):
@@ -94,8 +93,7 @@ class Split(Edit):
     what: Literal["split"]
     of: Anchor
     part: UprightBox
-    class_name: ClassName = Field(alias="class")
-    """Of the part."""
+    class_name: ClassName = Field(alias="class", description="Of the part: a class of data/vocabulary.toml.")
 
 
 class Add(Edit):
@@ -103,35 +101,39 @@ class Add(Edit):
 
     what: Literal["add"]
     box: UprightBox
-    class_name: ClassName = Field(alias="class")
-    surface: Literal["seen", "box"] = "seen"
-    """`seen`: the surface in the box that nothing else owns. `box`: its six faces, for what no camera sees (glass)."""
+    class_name: ClassName = Field(alias="class", description="A class of data/vocabulary.toml.")
+    surface: Literal["seen", "box"] = Field(
+        "seen",
+        description="`seen`: the surface in the box that nothing else owns. `box`: its six faces, for what no camera "
+        "sees (glass).",
+    )
 
 
 class SetGravity(Edit):
     """These places lie on a surface that is level in truth: the map is turned until it is."""
 
     what: Literal["gravity"]
-    level: tuple[Point, ...] = Field(min_length=3, max_length=64)
-    """On the surface, not on one line [m]."""
+    level: tuple[Point, ...] = Field(
+        min_length=3, max_length=64, description="On the surface, not on one line: x y z [m]."
+    )
 
 
 class SetFloor(Edit):
     """The floor is level and as high as this place; other surface that is called floor is none."""
 
     what: Literal["floor"]
-    at: Point
+    at: Point = Field(description="A place on the floor: x y z [m].")
 
 
 class Support(Edit):
-    """What the thing stands on, in, at or below, whatever was measured."""
+    """What the thing stands on, in, at or below, or that nothing carries it, whatever was measured."""
 
     what: Literal["support"]
     of: Anchor
-    on: Anchor | None = None
-    """None: nothing that the graph knows carries it."""
-    relation: Literal["supports", "contains", "carries_on_wall", "hangs_from"] = "supports"
-    """Of what carries it to the thing."""
+    on: Anchor | None = Field(None, description="What carries it; nothing: nothing that the graph knows.")
+    relation: Literal["supports", "contains", "carries_on_wall", "hangs_from"] = Field(
+        "supports", description="What the carrier does."
+    )
 
 
 class Mark(Edit):
@@ -139,16 +141,17 @@ class Mark(Edit):
 
     what: Literal["mark"]
     of: Anchor
-    as_: Literal["fixed", "movable"] = Field(alias="as")
+    as_: Literal["fixed", "movable"] = Field(alias="as", description="What it is.")
 
 
 class ChooseModel(Edit):
-    """Which CAD model stands for the thing."""
+    """Which CAD model stands for the thing, or that none does."""
 
     what: Literal["model"]
     of: Anchor
-    model: Annotated[Name | None, Asked.MODEL] = None
-    """Of the scene or the library; None: none, its own mesh does."""
+    model: Annotated[Name | None, Asked.MODEL] = Field(
+        None, description="Id of a model of the scene or the library; none: its own mesh."
+    )
 
 
 class Move(Edit):
@@ -156,16 +159,16 @@ class Move(Edit):
 
     what: Literal["move"]
     of: Anchor
-    to: Annotated[Point, Asked.PLACE]
-    """The middle of its box [m]."""
+    to: Annotated[Point, Asked.PLACE] = Field(description="Where the middle of its box goes: x y z [m].")
     heading_degrees: Annotated[float | None, Asked.NOT] = Field(default=None, ge=-360, le=360)
     """Of the x axis of its `model` about the vertical; None: as it is."""
     model: Annotated[Name | None, Asked.NOT] = None
     """What the heading is of: other models look another way."""
-    turn_degrees: float = Field(default=0.0, ge=-360, le=360)
-    """Of a thing with a mesh of its own: how far it is turned about the middle of its box."""
-    carried: bool = False
-    """Whether what it carries goes with it."""
+    turn_degrees: float = Field(
+        0.0, ge=-360, le=360, description="How far it turns about the vertical through the middle of its box [degrees]."
+    )
+    """Of a thing with a mesh of its own: of others the heading is kept."""
+    carried: bool = Field(False, description="What it carries goes with it.")
 
 
 class JointAnchor(Model):
@@ -179,20 +182,18 @@ class JointAnchor(Model):
 
 
 class SetJoint(Edit):
-    """The thing's model is right in that this moves."""
+    """This joint moves, as the thing's model says."""
 
     what: Literal["joint"]
     of: Anchor
     at: JointAnchor
-    lower: float | None = Field(default=None, ge=-100, le=100)
-    upper: float | None = Field(default=None, ge=-100, le=100)
-    """Another range [rad, m]."""
-    value: float | None = Field(default=None, ge=-100, le=100)
-    """Where it stands."""
+    lower: float | None = Field(None, ge=-100, le=100, description="Another least value [rad, m].")
+    upper: float | None = Field(None, ge=-100, le=100, description="Another largest value [rad, m].")
+    value: float | None = Field(None, ge=-100, le=100, description="Where it stands [rad, m].")
 
 
 class RemoveJoint(Edit):
-    """This does not move."""
+    """This joint does not move: its part stays where it is."""
 
     what: Literal["no_joint"]
     of: Anchor
@@ -205,16 +206,16 @@ class AddJoint(Edit):
     what: Literal["new_joint"]
     of: Anchor
     part: UprightBox
-    type: Literal["revolute", "prismatic"]
-    axis: Annotated[Point, Asked.DIRECTION]
-    """Direction in the world; opening goes by it (right-handed)."""
-    origin: Point
-    """On the axis, in the world [m]."""
-    lower: float = Field(default=0.0, ge=-100, le=100)
-    upper: float = Field(ge=-100, le=100)
-    """[rad, m]"""
-    handle: Point | None = None
-    """Where a hand takes hold of the part, closed, in the world [m]."""
+    type: Literal["revolute", "prismatic"] = Field(description="Whether it turns or slides.")
+    axis: Annotated[Point, Asked.DIRECTION] = Field(
+        description="Direction in the world that opening goes by (right-handed)."
+    )
+    origin: Point = Field(description="On the axis, in the world: x y z [m].")
+    lower: float = Field(0.0, ge=-100, le=100, description="Least value [rad, m].")
+    upper: float = Field(ge=-100, le=100, description="How far it opens [rad, m].")
+    handle: Point | None = Field(
+        None, description="Where a hand takes hold of the part, closed, in the world: x y z [m]."
+    )
 
 
 MapEdit = Annotated[Rename | Delete | Merge | Split | Add | SetGravity | SetFloor, Field(discriminator="what")]

@@ -19,7 +19,6 @@ Point = tuple[Coordinate, Coordinate, Coordinate]
 class UprightBox(Model):
     """A box that stands upright in the world."""
 
-    center: Point
-    size: tuple[Edge, Edge, Edge]
-    """Full edge lengths [m], the last one up."""
-    yaw_degrees: float = Field(0.0, ge=-360, le=360)
+    center: Point = Field(description="Middle of the box in the world: x y z [m].")
+    size: tuple[Edge, Edge, Edge] = Field(description="Full edge lengths of the box, the last one up [m].")
+    yaw_degrees: float = Field(0.0, ge=-360, le=360, description="Turn of the box about the vertical [degrees].")

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from scenewright.cli.edit_command import asked_edit
+from scenewright.cli.edit_forms import forms_of
 from scenewright.cli.viewing.desk.asking import Asking
-from scenewright.cli.viewing.desk.forms import forms_of
 from scenewright.cli.viewing.desk.subjects import subjects_of
 from scenewright.cli.viewing.view import viewer_of
 from scenewright.schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile

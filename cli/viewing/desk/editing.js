@@ -77,6 +77,7 @@ window.addEventListener("scenewright-ready", async function () {
     for (const field of form.fields) {
       // A label would pass clicks on its text to the first button in it.
       const label = made([...CLICKED, "numbers", "model"].includes(field.kind) ? "div" : "label", undefined, "field");
+      label.title = field.says;
       label.append(made("span", field.name.replaceAll("_", " ") + (field.needed ? "" : " (may be left out)")), widget(field));
       place.append(label);
     }

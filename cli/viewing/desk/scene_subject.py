@@ -83,10 +83,10 @@ class SceneSubject(GraphSubject):
         if (name := kinds.get("place")) is not None:
             turn = values.pop("turn_degrees", 0.0)
             if not isinstance(turn, int | float) or not math.isfinite(turn):
-                raise UsageError("turn_degrees: that is no number", hint="leave it out, or give degrees")
+                raise UsageError(f"edit {what}: turn_degrees: that is no number", hint="leave it out, or give degrees")
             to = values.get(name)
             if to is not None and not _is_place(to):
-                raise UsageError(f"{name}: that is no place", hint="click where it goes")
+                raise UsageError(f"edit {what}: {name}: that is no place", hint="click where it goes, or give numbers")
             values |= asked_move(node, to, turn)
         return values
 
@@ -133,7 +133,7 @@ class SceneSubject(GraphSubject):
 
 def _is_place(value_given: object) -> bool:
     return (
-        isinstance(value_given, list)
+        isinstance(value_given, list | tuple)
         and len(value_given) == 3
         and all(isinstance(value, int | float) and math.isfinite(value) for value in value_given)
     )

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
-from scenewright.cli.edit_node_command import NO_MODEL, NOTHING
+from scenewright.cli.edit_forms import WITHOUT
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.edits import Anchor, AnyEdit, AppliedEdit, Edit
 from scenewright.schemas.errors import UsageError
@@ -57,27 +57,33 @@ class Subject(ABC, Generic[Held]):
         return apply_edits(self.state, edits, FITTING, self.table)
 
     def thing(self, name: object) -> Thing:
-        """Return the thing that is, or was called so. Raises UsageError."""
-        things = self.state.things()
-        called = next((thing.instance for thing in things if thing.name == name), self.first.get(str(name)))
+        """Return the thing that is, or was called so, or has this number in its name. Raises UsageError."""
+        names = {thing.name: thing.instance for thing in self.state.things()}
+        numbered = [instance for full, instance in names.items() if full.rpartition("_")[2] == name]
+        called = names.get(str(name), self.first.get(str(name), numbered[0] if len(numbered) == 1 else None))
         if called is None:
-            raise UsageError(f"there is no thing {str(name)!r:.80} here", hint="click on one")
-        match = next((thing for thing in things if thing.instance == called), None)
+            shown = ", ".join(list(names)[:12]) + (", ..." if len(names) > 12 else "")
+            many = "more than one thing" if numbered else "no thing"
+            raise UsageError(f"{self.artifact.root}: has {many} {str(name)!r:.80}", hint=f"it has: {shown or 'none'}")
+        match = next((thing for thing in self.state.things() if thing.instance == called), None)
         if match is None:
             raise UsageError(f"{name} is not there any more: an edit took it away", hint="delete that edit first")
         return match
 
     def fields(self, what: str, form: Sequence[Mapping[str, Any]], asked: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the fields of an edit out of what a page asks for, where things are named. Raises UsageError."""
+        """Return the fields of an edit out of what somebody asks for, where things are named. Raises UsageError."""
         values: dict[str, Any] = {"what": what}
         for field in form:
             name, kind, value = field["name"], field["kind"], asked.get(field["name"])
-            if value is None or (value in (NOTHING, NO_MODEL) and value in field.get("choices", ())):
+            if value is None or (value == WITHOUT.get(kind) and value in field.get("choices", ())):
                 continue
             if kind == "thing" and value not in field.get("choices", ()):
                 value = self._anchor_fields(self.thing(value))
             elif kind == "things" and isinstance(value, list):
-                value = [self._anchor_fields(self.thing(name_of_thing)) for name_of_thing in value]
+                things = {thing.instance: thing for thing in map(self.thing, value)}
+                if len(things) < field["fewest"]:
+                    raise UsageError(f"edit {what}: takes at least {field['fewest']} things", hint="name other ones")
+                value = [self._anchor_fields(thing) for thing in things.values()]
             values[name] = value
         return values
 

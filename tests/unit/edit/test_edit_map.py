@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
+from scenewright.cli.edit_command import COMMANDS
+from scenewright.cli.edit_forms import kinds_of
 from scenewright.cli.main import run as scenewright
-from scenewright.schemas.edits import AppliedEdit, MapEdit
+from scenewright.schemas.edits import AddJoint, AnyEdit, AppliedEdit, MapEdit
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.stages.edit.anchoring import Fitting, anchor_of
@@ -269,6 +271,27 @@ def test_commands_refuse_what_is_not_there(seen: PanopticMap, tmp_path: Path, ca
     )
     assert scenewright(["edit", "delete", str(tmp_path / "no" / "edits.toml"), "3", *where]) == 3
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_kind_of_edit_is_a_command_with_its_fields_and_ranges(capsys) -> None:
+    kinds = kinds_of(AnyEdit)
+    assert [command.__name__ for command in COMMANDS] == [get_args(k.model_fields["what"].annotation)[0] for k in kinds]
+    assert scenewright(["edit", "new-joint", "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "FILE",
+        "THING",
+        "--center",
+        "--yaw",
+        "--axis",
+        "-100.0<=x<=100.0",
+        "--handle",
+        "--cad-scene",
+        "--by",
+    ):
+        assert words in said
+    assert AddJoint.model_fields["upper"].description in said
+    assert scenewright(["edit", "joint", "e.toml", "fridge_3", "door", "--lower", "200", "--cad-scene", "x"]) == 2
 
 
 def test_gravity_turns_the_whole_map_and_what_follows_it(tmp_path: Path) -> None:

@@ -8,9 +8,7 @@ a frame mean nothing beyond the frame, so they need not be changed from cell to 
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -98,25 +96,27 @@ def walk(count: int) -> np.ndarray:
     return np.array(poses)
 
 
-def make_frames(count: int, seed: int = 0) -> list[CorridorFrame]:
-    """Render and segment `count` frames of the first cell, with the noise of a structured-light camera."""
+def corridor_scene():  # type: ignore[no-untyped-def]  # open3d has no types
+    """Return the cells in and around the first one as an open3d RaycastingScene, and the true instance of each of its
+    geometries, and last of none (N + 1,)."""
     import open3d as o3d
 
-    random = np.random.default_rng(seed)
-    scene = o3d.t.geometry.RaycastingScene()
-    instances = []
+    scene, instances = o3d.t.geometry.RaycastingScene(), []
     for cell in (-1, 0, 1, 2):
         for number, (_, low, high) in enumerate(ROOM + FURNITURE):
-            extents = np.subtract(high, low)
             middle = np.add(low, high) / 2 + [cell * LENGTH, 0, 0]
-            box = trimesh.creation.box(extents, trimesh.transformations.translation_matrix(middle))
-            scene.add_triangles(
-                o3d.core.Tensor(box.vertices.astype(np.float32)),  # type: ignore[call-overload]
-                o3d.core.Tensor(box.faces.astype(np.uint32)),  # type: ignore[call-overload]
-            )
+            box = trimesh.creation.box(np.subtract(high, low), trimesh.transformations.translation_matrix(middle))
+            scene.add_triangles(box.vertices.astype(np.float32), box.faces.astype(np.uint32))
             owner = len(ROOM) + SAME.get(number - len(ROOM), number - len(ROOM)) if number >= len(ROOM) else number
             instances.append(instance_of(owner, cell))
-    table = np.array([*instances, 0])
+    return scene, np.array([*instances, 0])
+
+
+def make_frames(count: int, seed: int = 0) -> list[CorridorFrame]:
+    """Render and segment `count` frames of the first cell, with the axial noise of a structured-light camera (Nguyen,
+    Izadi & Lovell, 2012)."""
+    random = np.random.default_rng(seed)
+    scene, table = corridor_scene()
     palette = random.integers(40, 220, (PER_CELL, 3)).astype(np.uint8)
     return [_frame(scene, pose, table, palette, random) for pose in walk(count)]
 
@@ -145,39 +145,6 @@ def _frame(  # type: ignore[no-untyped-def]
     geometric = segment_depth(depth, CAMERA, geometric_settings(options))
     fused = fuse(geometric.labels, panoptic, geometric.points, fusion_settings(options))
     return CorridorFrame(depth, color, pose, fused.ids, describe(0, fused).segments, panoptic)
-
-
-def save_frames(frames: list[CorridorFrame], folder: Path) -> None:
-    """Write frames into a folder, for processes that should not hold what rendering leaves behind."""
-    for name in ("depth", "color", "pose", "ids"):
-        np.save(folder / f"{name}.npy", np.array([getattr(frame, name) for frame in frames]))
-    np.save(folder / "masks.npy", np.array([frame.masks.ids for frame in frames]))
-    described = [
-        {
-            "listing": [segment.model_dump() for segment in frame.listing],
-            "masks": {str(k): [mask.class_id, mask.is_thing] for k, mask in frame.masks.masks.items()},
-        }
-        for frame in frames
-    ]
-    (folder / "frames.json").write_text(json.dumps(described))
-
-
-def load_frames(folder: Path) -> list[CorridorFrame]:
-    """Read what `save_frames` wrote."""
-    arrays = {
-        name: np.load(folder / f"{name}.npy", allow_pickle=False) for name in ("depth", "color", "pose", "ids", "masks")
-    }
-    return [
-        CorridorFrame(
-            arrays["depth"][k],
-            arrays["color"][k],
-            arrays["pose"][k],
-            arrays["ids"][k],
-            tuple(FrameSegment(**segment) for segment in described["listing"]),
-            PanopticFrame(arrays["masks"][k], {int(i): PanopticMask(*mask) for i, mask in described["masks"].items()}),
-        )
-        for k, described in enumerate(json.loads((folder / "frames.json").read_text()))
-    ]
 
 
 def moved(pose: np.ndarray, cell: int) -> np.ndarray:

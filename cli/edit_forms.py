@@ -1,7 +1,7 @@
-"""What the page asks for of each kind of edit, out of the declaration of the kind (schemas/edits.py).
+"""What a page and a command ask for of each kind of edit, out of the declaration of the kind (schemas/edits.py).
 
 A new kind has a form as soon as it is declared, if its fields are things, classes, boxes, points, choices, numbers,
-words or yes and no; one that has others is left to the command line.
+words or yes and no; one that has others is left to whoever writes edits.toml.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def kinds_of(union: Any) -> tuple[type[edits.Edit], ...]:
 
 
 def forms_of(kinds: Iterable[type[edits.Edit]]) -> list[Form]:
-    """Return the forms of the kinds that can be asked for on a page, as JSON: `what`, `says`, and `fields`."""
+    """Return the forms of the kinds that can be asked for, as JSON: `what`, `says`, and `fields`."""
     forms = []
     for kind in kinds:
         field_infos = {
@@ -46,8 +46,8 @@ def forms_of(kinds: Iterable[type[edits.Edit]]) -> list[Form]:
 
 
 def field_of(name: str, info: FieldInfo) -> Form | None:
-    """Return how a field is asked for, as JSON: `name`, `kind`, `needed` and what goes with its kind; None when a page
-    cannot ask for it."""
+    """Return how a field is asked for, as JSON: `name`, `says`, `kind`, `needed` and what goes with its kind; None when
+    it cannot be asked for."""
     needed = info.is_required()
     kind_form = _kind_of(info.annotation, tuple(info.metadata))
     if kind_form is None:
@@ -55,7 +55,7 @@ def field_of(name: str, info: FieldInfo) -> Form | None:
     start = None if needed or not isinstance(info.default, str | int | float | bool) else info.default
     if not needed and (word := WITHOUT.get(kind_form["kind"])) is not None:
         needed, kind_form = True, {**kind_form, "choices": [*kind_form.get("choices", ()), word]}
-    return {"name": name, "needed": needed, "start": start, **kind_form}
+    return {"name": name, "says": info.description or "", "needed": needed, "start": start, **kind_form}
 
 
 def _kind_of(annotation: Any, metadata: tuple[Any, ...]) -> Form | None:

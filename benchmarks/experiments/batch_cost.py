@@ -1,6 +1,4 @@
-"""What a batch costs beside its scenes: overhead per scene, efficiency on two cores, the scheduler at 1,000 scenes.
-
-    python -m benchmarks.speed.batch [--out FOLDER] [--quick]
+"""What a batch costs beside its scenes: overhead per scene, efficiency on two cores, the scheduler as batches grow.
 
 Overhead: the same scenes one after the other by `scenewright run`, and as a batch with one job; the one step of the
 pipeline is up to date, so that nearly all of it is starting processes. The same with a program that does nothing.
@@ -9,44 +7,58 @@ the share of slots x time in which a scene ran: what the batch itself leaves idl
 On a machine that others use, one job on one core is given more than half of what two jobs on two are given, so that
 the plain ratio falls short of 2 whatever the batch does; beside it stands the ratio had the machine been ours: 2 x
 occupied x processor time of the scenes on one core over that on two.
-Scheduler: 1,000 scenes that end at once, through everything but the processes.
-Arms alternate within a run, as the machine may be busy with other work; medians over the runs are given.
+Scheduler: scenes that end at once, through everything but the processes.
+Cases alternate within a run, as the machine may be busy with other work; medians over the runs are given.
 """
 
 from __future__ import annotations
 
 import os
-import platform
 import resource
 import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import cv2
 import numpy as np
+from pydantic import Field
 from scenewright.schemas.places import HOME
 from scenewright.stages.engine.batch.expansion import Batch, PlannedRun, make_jobs, read_batch, scene_command
 from scenewright.stages.engine.batch.job import Job
-from scenewright.stages.engine.batch.local_executor import LocalExecutor, processors
+from scenewright.stages.engine.batch.local_executor import LocalExecutor
 from scenewright.stages.engine.batch.results import SceneResult
 from scenewright.stages.engine.batch.scheduler import run_jobs
 from scenewright.stages.engine.batch.session import BatchEnd, run_batch
-from scenewright.stages.kit.measurement.tables import Table, as_markdown
+from scenewright.stages.kit.stage import Parameters
 
-from benchmarks.options import Measurement, asked
-from benchmarks.results import write_measured
+from benchmarks.experiment import Bench, Experiment, Trial, median
+from benchmarks.timing import alone
 
-AIM_EFFICIENCY = 1.8
-"""Scenes per second on two cores over those on one."""
-AIM_SCHEDULER_MS = 10.0
-"""The scheduler's time for a scene."""
-PARTS = ("overhead", "nothing", "efficiency", "scheduler")
+RUNNING, NOTHING, EFFICIENCY = "scenewright run", "a program that does nothing", "two cores"
+SIMULATED = {f"{count} scenes that end at once": count for count in (100, 1_000, 10_000)}
+UNITS = {
+    **dict.fromkeys(("in a batch over alone", "in a batch over alone, processor time"), ""),
+    **dict.fromkeys(("alone", "in a batch", "in a batch of two jobs", "processor"), "ms"),
+    **dict.fromkeys(("scheduler's loop", "reading the batch file", "wall", "again"), "ms"),
+    "memory": "MB",
+    **dict.fromkeys(("one job over one core", "two jobs over one core"), ""),
+    **dict.fromkeys(("two jobs, threads not shared out over one core", "slots occupied, two jobs"), ""),
+    "two jobs over one core, had the machine been ours": "",
+}
+
+
+class BatchParameters(Parameters):
+    """Options of the experiment."""
+
+    scenes: int = Field(6, ge=2, description="Scenes of a batch that runs programs")
+    rounds: int = Field(80, ge=1, description="Products of matrices in a scene")
+
+
 PIPELINE = """
 name = "tiny"
 summary = "one step"
@@ -111,7 +123,7 @@ def occupied(end: BatchEnd, jobs: int, seconds: float) -> float:
 
 
 def measure_overhead(folder: Path, scenes: int) -> dict[str, float]:
-    """Return seconds per scene of `scenewright run` alone and in a batch."""
+    """Return milliseconds per scene of `scenewright run` alone and in a batch."""
     batch, out = write_logs(folder, scenes), folder / "out"
     run_batch(batch, out, jobs=2)
     environment = {**os.environ, "PYTHONPATH": str(HOME)}
@@ -123,10 +135,10 @@ def measure_overhead(folder: Path, scenes: int) -> dict[str, float]:
     processor = processor_seconds()
     seconds, _ = timed_batch(batch, out, jobs=1)
     return {
-        "run/alone_s": direct,
-        "run/batch_s": seconds / scenes,
-        "run/ratio": seconds / scenes / direct,
-        "run/processor_ratio": (processor_seconds() - processor) / direct_processor,
+        "alone": 1000 * direct,
+        "in a batch": 1000 * seconds / scenes,
+        "in a batch over alone": seconds / scenes / direct,
+        "in a batch over alone, processor time": (processor_seconds() - processor) / direct_processor,
     }
 
 
@@ -148,10 +160,10 @@ def measure_nothing(folder: Path, scenes: int) -> dict[str, float]:
     processor = processor_seconds() - processor
     two, _ = timed_batch(batch, folder / "two", jobs=2, command=nothing)
     return {
-        "nothing/alone_ms": 1000 * direct,
-        "nothing/batch_ms": 1000 * one / scenes,
-        "nothing/batch_two_jobs_ms": 1000 * two / scenes,
-        "nothing/batch_processor_ms": 1000 * processor / scenes,
+        "alone": 1000 * direct,
+        "in a batch": 1000 * one / scenes,
+        "in a batch of two jobs": 1000 * two / scenes,
+        "processor": 1000 * processor / scenes,
     }
 
 
@@ -175,22 +187,24 @@ def measure_efficiency(folder: Path, scenes: int, rounds: int) -> dict[str, floa
     def multiply(batch: Batch, run: PlannedRun, folder: Path, *, force: bool) -> tuple[str, ...]:
         return (sys.executable, "-c", WORK, str(rounds))
 
-    arms = {"one_core": (1, 1, None), "one_job": (2, 1, None), "two_jobs": (2, 2, None), "two_jobs_free": (2, 2, 2)}
-    figures = {}
+    arms = {
+        "one core": (1, 1, None),
+        "one job": (2, 1, None),
+        "two jobs": (2, 2, None),
+        "two jobs, threads not shared out": (2, 2, 2),
+    }
+    seconds, busy, used = {}, {}, {}
     for arm, (cores, jobs, threads) in arms.items():
         with on_cores(cores):
             executor, processor = LocalExecutor(jobs, threads), processor_seconds()
-            seconds, end = timed_batch(batch, folder / arm, executor=executor, command=multiply)
-        figures[f"efficiency/{arm}_s"] = seconds
-        figures[f"efficiency/{arm}_occupied"] = occupied(end, jobs, seconds)
-        figures[f"efficiency/{arm}_processor_s"] = processor_seconds() - processor
-    cost = figures["efficiency/one_core_processor_s"] / figures["efficiency/two_jobs_processor_s"]
-    figures["efficiency/two_jobs_undisturbed"] = (
-        2 * cost * (figures["efficiency/two_jobs_occupied"] / figures["efficiency/one_core_occupied"])
-    )
-    for arm in ("one_job", "two_jobs", "two_jobs_free"):
-        figures[f"efficiency/{arm}_over_one_core"] = figures["efficiency/one_core_s"] / figures[f"efficiency/{arm}_s"]
-    return figures
+            seconds[arm], end = timed_batch(batch, folder / arm, executor=executor, command=multiply)
+        busy[arm], used[arm] = occupied(end, jobs, seconds[arm]), processor_seconds() - processor
+    undisturbed = 2 * used["one core"] / used["two jobs"] * busy["two jobs"] / busy["one core"]
+    return {
+        **{f"{arm} over one core": seconds["one core"] / seconds[arm] for arm in arms if arm != "one core"},
+        "two jobs over one core, had the machine been ours": undisturbed,
+        "slots occupied, two jobs": busy["two jobs"],
+    }
 
 
 class InstantExecutor:
@@ -254,88 +268,49 @@ def measure_scheduler(folder: Path, scenes: int) -> dict[str, float]:
     if again.ran:
         raise RuntimeError("a finished batch ran again")
     return {
-        "scheduler/loop_ms": 1000 * loop / scenes,
-        "scheduler/reading_ms": 1000 * reading / scenes,
-        "scheduler/whole_ms": 1000 * whole / scenes,
-        "scheduler/processor_ms": 1000 * processor / scenes,
-        "scheduler/nothing_to_do_ms": 1000 * resumed / scenes,
+        "scheduler's loop": 1000 * loop / scenes,
+        "reading the batch file": 1000 * reading / scenes,
+        "wall": 1000 * whole / scenes,
+        "processor": 1000 * processor / scenes,
+        "again": 1000 * resumed / scenes,
+        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3,
     }
 
 
-def measure(runs: int, scenes: int, rounds: int, many: int) -> dict[str, float]:
-    """Return the medians over the runs, with the least and the most of each ratio."""
-    collected: dict[str, list[float]] = {}
-    for number in range(runs):
-        for part in PARTS:
-            print(f"run {number + 1}/{runs}: {part}", file=sys.stderr, flush=True)
-            folder = Path(tempfile.mkdtemp())
-            try:
-                figures = {
-                    "overhead": lambda folder=folder: measure_overhead(folder, scenes),
-                    "nothing": lambda folder=folder: measure_nothing(folder, 10 * scenes),
-                    "efficiency": lambda folder=folder: measure_efficiency(folder, scenes, rounds),
-                    "scheduler": lambda folder=folder: measure_scheduler(folder, many),
-                }[part]()
-            finally:
-                shutil.rmtree(folder)
-            for name, value in figures.items():
-                collected.setdefault(name, []).append(value)
-    metrics = {name: statistics.median(values) for name, values in collected.items()}
-    for name, values in collected.items():
-        metrics |= {f"{name}_least": min(values), f"{name}_most": max(values)}
-    sizes = {"all/runs": runs, "all/scenes": scenes, "all/many": many, "all/load": os.getloadavg()[0]}
-    return metrics | {name: float(value) for name, value in sizes.items()}
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterable[tuple[Trial, dict[str, float]]]:
+    """Yield what each case took in each run."""
+    scenes = bench.parameters.scenes
+    for trial in trials:
+        folder = Path(tempfile.mkdtemp())
+        try:
+            if trial.case == RUNNING:
+                yield trial, measure_overhead(folder, scenes)
+            elif trial.case == NOTHING:
+                yield trial, measure_nothing(folder, 10 * scenes)
+            elif trial.case == EFFICIENCY:
+                yield trial, measure_efficiency(folder, scenes, bench.parameters.rounds)
+            else:
+                yield trial, alone(measure_scheduler, folder, SIMULATED[trial.case])
+        finally:
+            shutil.rmtree(folder)
 
 
-ROWS = (
-    ("scenewright run, alone", "run/alone_s", "s a scene"),
-    ("scenewright run, in a batch of one job", "run/batch_s", "s a scene"),
-    ("in a batch over alone", "run/ratio", ""),
-    ("the same, processor time", "run/processor_ratio", ""),
-    ("a program that does nothing, alone", "nothing/alone_ms", "ms a scene"),
-    ("the same in a batch of one job", "nothing/batch_ms", "ms a scene"),
-    ("the same, processor time", "nothing/batch_processor_ms", "ms a scene"),
-    ("the same in a batch of two jobs", "nothing/batch_two_jobs_ms", "ms a scene"),
-    ("rate on two cores, two jobs, over one core", "efficiency/two_jobs_over_one_core", ""),
-    ("rate on two cores, one job, over one core", "efficiency/one_job_over_one_core", ""),
-    (
-        "rate on two cores, two jobs, threads not shared out, over one core",
-        "efficiency/two_jobs_free_over_one_core",
-        "",
-    ),
-    ("the same, two jobs, had the machine been ours (below)", "efficiency/two_jobs_undisturbed", ""),
-    ("slots occupied, two jobs", "efficiency/two_jobs_occupied", ""),
-    ("scheduler alone", "scheduler/loop_ms", "ms a scene"),
-    ("reading and checking the batch file", "scheduler/reading_ms", "ms a scene"),
-    ("whole batch without processes: plan, results, summary", "scheduler/whole_ms", "ms a scene"),
-    ("the same, processor time", "scheduler/processor_ms", "ms a scene"),
-    ("a second batch that finds all done", "scheduler/nothing_to_do_ms", "ms a scene"),
+EXPERIMENT = Experiment(
+    name="batch_cost",
+    title="What a batch costs",
+    simulated="Nothing; of the last cases the scenes, which end at once, with twenty measures each.",
+    knows="Nothing.",
+    does_not_show="What scenes cost. Speed-up where others use the machine: one job on one core is then given more "
+    "than half of what two jobs on two are given. Ratios say more than times.",
+    arms={"ours": "ours"},
+    cases=(RUNNING, NOTHING, EFFICIENCY, *SIMULATED),
+    default_cases=lambda bench: [RUNNING, NOTHING, EFFICIENCY, *list(SIMULATED)[: 1 if bench.quick else None]],
+    reporting=tuple(f"run {k}" for k in range(1, 6)),
+    quick_seeds=1,
+    together=lambda trial: trial.seed,
+    measure=measure,
+    record=dict[str, float],
+    measures={name: median(name, unit) for name, unit in UNITS.items()},
+    parameters=BatchParameters,
+    quick={"scenes": 4, "rounds": 30},
 )
-
-
-def as_table(metrics: dict[str, float]) -> Table:
-    """Return the figures as a table: median, least and most of the runs."""
-    rows = tuple(
-        (text, metrics[name], metrics[f"{name}_least"], metrics[f"{name}_most"], unit) for text, name, unit in ROWS
-    )
-    efficiency, whole = metrics["efficiency/two_jobs_over_one_core"], metrics["scheduler/whole_ms"]
-    note = (
-        f"{metrics['all/runs']:.0f} runs, {metrics['all/scenes']:.0f} scenes ({metrics['all/many']:.0f} for the "
-        f"scheduler), {processors()} processors, {platform.machine()}, Python {platform.python_version()}, load "
-        f"average {metrics['all/load']:.1f} at the end. Aims: rate on two cores at least {AIM_EFFICIENCY} of one "
-        f"({efficiency:.2f}: {'met' if efficiency >= AIM_EFFICIENCY else 'missed'}), scheduler under "
-        f"{AIM_SCHEDULER_MS:g} ms a scene ({whole:.2f}: {'met' if whole < AIM_SCHEDULER_MS else 'missed'})."
-    )
-    return Table("table", "What a batch costs", ("", "median", "least", "most", "unit"), rows, note)
-
-
-def main() -> None:
-    """Measure, print the table, write metrics.json and table.md."""
-    arguments = asked(Measurement)
-    metrics = measure(1, 4, 30, 200) if arguments.quick else measure(5, 6, 80, 1000)
-    text = as_markdown(as_table(metrics))
-    write_measured(arguments.out, metrics, text)
-
-
-if __name__ == "__main__":
-    main()

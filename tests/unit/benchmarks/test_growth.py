@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
-from benchmarks.speed.corridor import FURNITURE, LENGTH, PER_CELL, ROOM, class_of, instance_of, moved, walk
-from benchmarks.speed.growth import REPEATS, Timers, frame_at, growth
+from benchmarks.corridor import FURNITURE, LENGTH, PER_CELL, ROOM, class_of, instance_of, moved, walk
+from benchmarks.experiments.growth import EXPERIMENT, REPEATS, WALKS, WHOLE, edges_of, frame_at, growth, row_at
+from benchmarks.timing import Clock, alone, memory
 
 
 def test_entities_of_all_cells_have_numbers_of_their_own() -> None:
@@ -38,19 +41,33 @@ def test_a_standing_camera_stays_in_the_first_cell() -> None:
 
 def test_growth_is_the_end_beside_the_beginning() -> None:
     def rows(costs: list[float]) -> list[dict[str, float]]:
-        return [{"frame_ms": cost} for cost in costs]
+        return [{"time a frame": cost} for cost in costs]
 
     assert growth(rows([50, 10, 10, 10, 10, 10])) == 1.0, "the first window does not count"
     assert growth(rows([5, 10, 20, 30, 60, 90])) == 5.0
 
 
-def test_timers_count_what_they_wrap() -> None:
+def test_every_window_of_every_walk_is_a_case() -> None:
+    for _, one_of, _ in WALKS.values():
+        assert {str(edge) for edge in edges_of(WHOLE // one_of)[1:]} <= set(EXPERIMENT.subcases)
+    rows = [{"frames": 250.0, "floor": 17.0}, {"time a frame": 5.0}]
+    assert row_at(250)(rows) == rows[0] and row_at(None)(rows) == rows[1] and row_at(500)(rows) is None
+
+
+def test_a_clock_counts_what_it_wraps() -> None:
     class Owner:
         @staticmethod
         def work(number: int) -> int:
             return sum(range(number))
 
-    timers = Timers()
-    timers.wrap(Owner, "work", "labels")
+    clock = Clock()
+    clock.wrap(Owner, "work")
     assert Owner.work(300_000) == 300_000 * 299_999 // 2
-    assert timers.taken()["labels"] > 0 and timers.seconds["labels"] == 0
+    assert clock.wall[0] > 0 and clock.taken() > 0 and clock.taken() == 0
+
+
+def test_a_process_of_its_own_has_its_own_variables_and_memory() -> None:
+    before = dict(os.environ)
+    assert alone(os.getenv, "FROM_OUTSIDE", FROM_OUTSIDE="3") == "3"
+    assert dict(os.environ) == before
+    assert 0 < alone(memory, "VmRSS") <= alone(memory, "VmHWM")

@@ -1,11 +1,8 @@
 """From a log to an interactive scene: seconds by step, frames a second, memory; this code and one of before in turn.
 
-    python -m benchmarks.speed.reconstruct --out FOLDER [--before FOLDER] [--log LOG] [--weights ONNX] [--frames N]
-
 Runs `scenewright run reconstruct` on every frame of a recorded log for three backends, with the CAD library made before
 (runs share it), by this code and by the checkout of earlier code in `--before`, one after the other for each backend.
-Nothing else should run beside it. Artifacts of both codes are compared by their content digests. FOLDER/figures.json is
-docs/results/speed_reconstruct.json.
+Nothing else should run beside it. Artifacts of both codes are compared by their content digests.
 """
 
 from __future__ import annotations
@@ -15,9 +12,9 @@ import os
 import resource
 import shutil
 import subprocess
-import sys
 import threading
 import time
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,22 +25,38 @@ from pydantic import Field
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.places import HOME
 from scenewright.stages.engine.batch.processes import descendants, resident_memory
-from scenewright.stages.kit.measurement.tables import Table, as_markdown
+from scenewright.stages.kit.stage import Parameters
 
-from benchmarks.options import Measurement, asked
-from benchmarks.results import circumstances, write_measured
-from benchmarks.tabulation import Figure
+from benchmarks.experiment import Bench, Experiment, Trial, only
 
 BACKENDS = ("auto", "detector", "geometric")
-QUICK_FRAMES = 20
+STEPS = (
+    "sequence",
+    "segments",
+    "articulations",
+    "panoptic_map",
+    "contact_graph",
+    "cad_library",
+    "cad_scene",
+    "interactive_scene",
+    "evaluation",
+    "report",
+)
 FIRST_FRAMES = 8
 """Of a run before each that is measured, in which numba compiles what has changed."""
 SECONDS_BETWEEN_LOOKS = 0.2
 PEAKS = ("peak memory", "peak memory, shared pages for each")
+UNITS = {
+    "frames": "",
+    "frames per s": "",
+    "same artifacts": "",
+    **dict.fromkeys(PEAKS, "MB"),
+    **dict.fromkeys(("whole", "processor time", *STEPS), "s"),
+}
 
 
-class ReconstructMeasurement(Measurement):
-    """Options of the measurement."""
+class ReconstructParameters(Parameters):
+    """Options of the experiment."""
 
     log: Path = Field(Path("../shared/data/7scenes_redkitchen"), description="A posed RGB-D log")
     weights: Path = Field(Path("../shared/data/detectors/yolox_nano.onnx"), description="Detector's weights")
@@ -126,45 +139,43 @@ def _processor_seconds() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def measure(arguments: ReconstructMeasurement) -> dict[str, float]:
-    """Return the figures of all backends and codes: `<code>/<backend>/<measure>`."""
-    frames = arguments.frames or (QUICK_FRAMES if arguments.quick else None)
-    codes = {"ours": HOME}
-    if arguments.before is not None:
-        if not (arguments.before / ".venv" / "bin" / "python").exists():
-            raise UsageError(f"{arguments.before}: no checkout with a .venv", hint="git worktree add, link .venv")
-        codes = {"before": arguments.before.resolve(), **codes}
-    out = (arguments.out or Path("outputs/speed-reconstruct")).resolve()
-    found: dict[str, float] = {}
-    for backend in ("geometric",) if arguments.quick else BACKENDS:
-        settings = {"log": str(arguments.log.resolve()), "backend": backend, "every": "1"}
-        if backend == "detector":
-            settings["weights"] = str(arguments.weights.resolve())
-        if frames is not None:
-            settings["max_frames"] = str(frames)
-        runs = {}
-        for name, code in codes.items():
-            _make_library(code, out / name)
-            print(f"{backend}, {name} ...", file=sys.stderr, flush=True)
-            run_once(code, out / name / "compiling", {**settings, "max_frames": str(FIRST_FRAMES)})
-            runs[name] = run = run_once(code, out / name / backend, settings)
-            used = run.steps["sequence"]["summary"]["frames"]
-            found |= {
-                f"{name}/{backend}/frames": used,
-                f"{name}/{backend}/whole": run.seconds,
-                f"{name}/{backend}/frames per s": used / run.seconds,
-                f"{name}/{backend}/processor time": run.processor_seconds,
-                f"{name}/{backend}/{PEAKS[0]}": run.peak_memory / 1e6,
-                f"{name}/{backend}/{PEAKS[1]}": run.peak_resident / 1e6,
-                **{f"{name}/{backend}/{step}": facts["seconds"] for step, facts in run.steps.items()},
-            }
-        if "before" in runs:
-            digests = [{step: facts["content_digest"] for step, facts in run.steps.items()} for run in runs.values()]
-            same = [step for step in digests[1] if digests[0].get(step) == digests[1][step]]
-            print(f"{backend}: other bytes: {sorted(set(digests[1]) - set(same)) or 'none'}", file=sys.stderr)
-            found[f"ours/{backend}/same artifacts"] = len(same)
-        (out / "metrics-so-far.json").write_text(json.dumps(found, indent=1))
-    return found
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterable[tuple[Trial, dict[str, float]]]:
+    """Yield what each code took with a backend."""
+    given, out = bench.parameters, bench.out.resolve()
+    settings = {"log": str(given.log.resolve()), "backend": trials[0].case, "every": "1"}
+    if trials[0].case == "detector":
+        settings["weights"] = str(given.weights.resolve())
+    if given.frames is not None:
+        settings["max_frames"] = str(given.frames)
+    before: Run | None = None
+    for trial in trials:
+        code = _code_of(given, trial.arm)
+        _make_library(code, out / trial.arm)
+        run_once(code, out / trial.arm / "compiling", {**settings, "max_frames": str(FIRST_FRAMES)})
+        run = run_once(code, out / trial.arm / trial.case, settings)
+        used = run.steps["sequence"]["summary"]["frames"]
+        values = {
+            "frames": used,
+            "whole": run.seconds,
+            "frames per s": used / run.seconds,
+            "processor time": run.processor_seconds,
+            PEAKS[0]: run.peak_memory / 1e6,
+            PEAKS[1]: run.peak_resident / 1e6,
+            **{step: facts["seconds"] for step, facts in run.steps.items()},
+        }
+        if before is not None:
+            pairs = ((facts, before.steps.get(step, {})) for step, facts in run.steps.items())
+            values["same artifacts"] = sum(ours["content_digest"] == old.get("content_digest") for ours, old in pairs)
+        before = run
+        yield trial, values
+
+
+def _code_of(given: ReconstructParameters, arm: str) -> Path:
+    """Return the checkout of an arm. Raises UsageError where there is none."""
+    code = HOME if arm == "ours" or given.before is None else given.before.resolve()
+    if not (code / ".venv" / "bin" / "python").exists():
+        raise UsageError(f"{code}: no checkout with a .venv", hint="git worktree add, link .venv")
+    return code
 
 
 def _make_library(code: Path, folder: Path) -> None:
@@ -180,35 +191,24 @@ def _make_library(code: Path, folder: Path) -> None:
     )
 
 
-def main() -> None:
-    """Measure, print the table, write metrics.json and table.md."""
-    arguments = asked(ReconstructMeasurement)
-    metrics = measure(arguments)
-    rows = tuple(metrics.items())
-    table = Table("reconstruct", "From a log to an interactive scene", ("", "value"), rows)
-    write_measured(arguments.out, metrics, as_markdown(table))
-    if arguments.out is not None:
-        text = json.dumps(published(metrics), indent=1, ensure_ascii=False)
-        (arguments.out / "figures.json").write_text(text + "\n", encoding="utf-8")
-
-
-def published(metrics: dict[str, float]) -> dict[str, Any]:
-    """Return the figures with what has to stand beside them (docs/results/index.md)."""
-    units = {"frames": "", "frames per s": "", "same artifacts": ""} | dict.fromkeys(PEAKS, "MB")
-    figures = {
-        name: vars(Figure(round(value, 2), None, None, 1, units.get(name.rpartition("/")[2], "s")))
-        for name, value in metrics.items()
-    }
-    return {
-        "experiment": "speed_reconstruct",
-        "title": "From a log to an interactive scene",
-        **circumstances(["python", "-m", "benchmarks.speed.reconstruct", "--out", "FOLDER", "--before", "CHECKOUT"]),
-        "simulated": "nothing: the kitchen is recorded",
-        "knows": "the log's poses",
-        "does_not_show": "Other machines, other logs. One run of each; seconds by step are of a step's whole process.",
-        "figures": figures,
-    }
-
-
-if __name__ == "__main__":
-    main()
+EXPERIMENT = Experiment(
+    name="speed_reconstruct",
+    title="From a log to an interactive scene",
+    simulated="Nothing: the kitchen is recorded.",
+    knows="The log's poses.",
+    does_not_show="Other machines, other logs. One run of each; seconds by step are of a step's whole process.",
+    arms={"before": "before", "ours": "ours"},
+    default_arms=lambda bench: ["ours"] if bench.parameters.before is None else ["before", "ours"],
+    cases=BACKENDS,
+    default_cases=lambda bench: ["geometric"] if bench.quick else BACKENDS,
+    reporting=("1",),
+    together=lambda trial: trial.case,
+    measure=measure,
+    record=dict[str, float],
+    measures={name: only(name, unit) for name, unit in UNITS.items()},
+    parameters=ReconstructParameters,
+    places=frozenset({"log", "weights"}),
+    inputs=lambda bench, trial: [bench.parameters.log],
+    quick={"frames": 20},
+    steps=("ingest", "segment", "articulate", "fuse", "graph", "library build", "cad", "urdf", "evaluate", "report"),
+)
