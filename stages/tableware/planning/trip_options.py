@@ -106,7 +106,7 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
         type_of,
         np.array([why_not_pulled(part.kinds, rules) is None for part in parts], np.bool_),
     )
-    choices = _Choices(rows, masks, signatures)
+    choices = _Choices(rows, np.array([len(choice) for choice in chosen], np.int64), masks, signatures)
     ways = _ways_of(choices, _Signatures(bases, two), columns, _pairs(table, rules, model, chances, worth), costs)
     return TripOptions(parts, tuple(chosen), masks, *ways)
 
@@ -268,9 +268,11 @@ def slip_cost(model: TimeModel) -> float:
 
 
 class _Choices(NamedTuple):
-    """Of each choice (C,): rows of its parts (C, P; -1: none), its items as bits, its signature (S of them)."""
+    """Of each choice (C,): rows of its parts (C, P; -1: none), their number, its items as bits, its signature (S of
+    them)."""
 
     rows: np.ndarray
+    counts: np.ndarray
     masks: np.ndarray
     signatures: np.ndarray
 
@@ -321,106 +323,103 @@ class _Costs(NamedTuple):
     worth: float
 
 
+class _Way(NamedTuple):
+    """One option, see TripOptions."""
+
+    seconds: float
+    lost: float
+    slips: float
+    stays: int
+    blockers: int
+    first: int
+    second: int
+    pulled: bool
+
+
 @njit(cache=True)
-def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-def]
-    """Return starts (C + 1,) and the options of all choices, see TripOptions; `kinds` are _Signatures."""
-    rows, masks, signatures = choices
-    bases, two = kinds
-    lowest, whole, length, part_mask, type_of, pullable = parts
-    pair_first, pair_second, pair_blockers, pair_seconds, pair_lost, pair_slips, pair_pulled = pairs
-    whole_trip, stack, drop_stack, drop_single, drop_two, drop_loaded, worth = costs
-    starts = np.zeros(len(rows) + 1, np.int64)
-    seconds, lost, slips = [0.0], [0.0], [0.0]
-    stays, blockers, first, second, pulled = [0], [0], [0], [0], [False]
-    for choice in range(len(rows)):
-        begin = len(seconds)
-        count = 0
-        while count < rows.shape[1] and rows[choice, count] >= 0:
-            count += 1
-        signature, mask = signatures[choice], masks[choice]
+def _base(rows: np.ndarray, kind: int, parts: _Parts) -> int:
+    """Return which of a choice's parts all others are stacked on, one of type `kind` on the table (-1: none)."""
+    if len(rows) == 1:
+        return rows[0]  # type: ignore[no-any-return]
+    for part in rows:
+        if parts.whole[part] and parts.types[part] == kind:
+            return part  # type: ignore[no-any-return]
+    return -1
+
+
+@njit(cache=True)
+def _standing_on(rows: np.ndarray, item: int, parts: _Parts) -> int:
+    """Return which of a choice's parts stands on the table by an item (-1: none)."""
+    for part in rows:
+        if parts.whole[part] and parts.lowest[part] == item:
+            return part  # type: ignore[no-any-return]
+    return -1
+
+
+@njit(cache=True)
+def _is_idle(way: _Way, ways: list[_Way], begin: int, worth: float) -> bool:
+    """Whether a grasp of two is no better in anything than one of the ways from `begin` on."""
+    for number in range(begin, len(ways)):
+        other = ways[number]
+        if (
+            other.second >= 0
+            and other.blockers & ~way.blockers == 0
+            and other.slips <= way.slips
+            and other.seconds + worth * other.lost <= way.seconds + worth * way.lost
+        ):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _ways_of(
+    choices: _Choices, kinds: _Signatures, parts: _Parts, pairs: _Pairs, costs: _Costs
+) -> tuple[np.ndarray, ...]:
+    """Return starts (C + 1,) and the columns of the options of all choices, see TripOptions."""
+    worth = costs.worth
+    starts = np.zeros(len(choices.rows) + 1, np.int64)
+    ways = [_Way(0.0, 0.0, 0.0, 0, 0, 0, 0, False)]  # is none: tells the types
+    for choice in range(len(choices.rows)):
+        begin, count, mask = len(ways), choices.counts[choice], choices.masks[choice]
+        rows, signature = choices.rows[choice, :count], choices.signatures[choice]
         alone = np.inf
-        if count == 1:
-            alone = whole_trip + worth * drop_single
-            seconds.append(whole_trip)
-            lost.append(drop_single)
-            slips.append(0.0)
-            stays.append(0)
-            blockers.append(0)
-            first.append(rows[choice, 0])
-            second.append(-1)
-            pulled.append(False)
-        elif bases[signature] >= 0:
-            for k in range(count):
-                part = rows[choice, k]
-                if whole[part] and type_of[part] == bases[signature]:
-                    chance = drop_single + (count - 1) * drop_stack
-                    alone = whole_trip + (count - 1) * stack + worth * chance
-                    seconds.append(whole_trip + (count - 1) * stack)
-                    lost.append(chance)
-                    slips.append(0.0)
-                    stays.append(0)
-                    blockers.append(0)
-                    first.append(part)
-                    second.append(-1)
-                    pulled.append(False)
-                    break
-        if count > 1 and two[signature].any():
-            start = whole_trip + (count - 2) * stack
-            risk = drop_two + (count - 2) * drop_stack
-            for pair in range(len(pair_first)):
-                if start + pair_seconds[pair] + worth * (risk + pair_lost[pair]) >= alone:
+        base = _base(rows, kinds.bases[signature], parts)
+        if base >= 0:
+            seconds = costs.whole_trip + (count - 1) * costs.stack
+            lost = costs.drop_single + (count - 1) * costs.drop_stack
+            alone = seconds + worth * lost
+            ways.append(_Way(seconds, lost, 0.0, 0, 0, base, -1, False))
+        if count > 1 and kinds.two[signature].any():
+            start = costs.whole_trip + (count - 2) * costs.stack
+            risk = costs.drop_two + (count - 2) * costs.drop_stack
+            for pair in range(len(pairs.first)):
+                seconds = start + pairs.seconds[pair]
+                if seconds + worth * (risk + pairs.lost[pair]) >= alone:
                     continue
-                both = 1 << pair_first[pair] | 1 << pair_second[pair]
-                if both & ~mask:
+                if (1 << pairs.first[pair] | 1 << pairs.second[pair]) & ~mask:
                     continue
-                pulled_part = waiting_part = -1
-                for k in range(count):
-                    part = rows[choice, k]
-                    if whole[part] and lowest[part] == pair_first[pair]:
-                        pulled_part = part
-                    if whole[part] and lowest[part] == pair_second[pair]:
-                        waiting_part = part
-                if (
-                    pulled_part < 0
-                    or waiting_part < 0
-                    or not two[signature, type_of[pulled_part], type_of[waiting_part]]
-                ):
+                first = _standing_on(rows, pairs.first[pair], parts)
+                second = _standing_on(rows, pairs.second[pair], parts)
+                if first < 0 or second < 0 or not kinds.two[signature, parts.types[first], parts.types[second]]:
                     continue
-                loaded = length[pulled_part] > 1
-                if pair_pulled[pair] and (pair_blockers[pair] & mask or not pullable[pulled_part]):
+                pulled, blockers = pairs.pulled[pair], pairs.blockers[pair]
+                if pulled and (blockers & mask or not parts.pullable[first]):
                     continue
-                block = pair_blockers[pair] & ~mask
-                time = start + pair_seconds[pair]
-                chance = risk + (drop_loaded if pair_pulled[pair] and loaded else pair_lost[pair])
-                idle = False
-                for option in range(begin, len(seconds)):
-                    if (
-                        second[option] >= 0
-                        and blockers[option] & ~block == 0
-                        and slips[option] <= pair_slips[pair]
-                        and seconds[option] + worth * lost[option] <= time + worth * chance
-                    ):
-                        idle = True
-                        break
-                if idle:
-                    continue
-                seconds.append(time)
-                lost.append(chance)
-                slips.append(pair_slips[pair])
-                stays.append(part_mask[waiting_part])
-                blockers.append(block)
-                first.append(pulled_part)
-                second.append(waiting_part)
-                pulled.append(pair_pulled[pair])
-        starts[choice + 1] = len(seconds) - 1
+                lost = risk + (costs.drop_loaded if pulled and parts.length[first] > 1 else pairs.lost[pair])
+                stays = parts.masks[second]
+                way = _Way(seconds, lost, pairs.slips[pair], stays, blockers & ~mask, first, second, pulled)
+                if not _is_idle(way, ways, begin, worth):
+                    ways.append(way)
+        starts[choice + 1] = len(ways) - 1
+    made = ways[1:]
     return (
         starts,
-        np.array(seconds[1:]),
-        np.array(lost[1:]),
-        np.array(slips[1:]),
-        np.array(stays[1:]),
-        np.array(blockers[1:]),
-        np.array(first[1:]),
-        np.array(second[1:]),
-        np.array(pulled[1:]),
+        np.array([way.seconds for way in made]),
+        np.array([way.lost for way in made]),
+        np.array([way.slips for way in made]),
+        np.array([way.stays for way in made]),
+        np.array([way.blockers for way in made]),
+        np.array([way.first for way in made]),
+        np.array([way.second for way in made]),
+        np.array([way.pulled for way in made]),
     )
