@@ -107,8 +107,9 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
         np.array([why_not_pulled(part.kinds, rules) is None for part in parts], np.bool_),
     )
     choices = _Choices(rows, np.array([len(choice) for choice in chosen], np.int64), masks, signatures)
-    ways = _ways_of(choices, _Signatures(bases, two), columns, _pairs(table, rules, model, chances, worth), costs)
-    return TripOptions(parts, tuple(chosen), masks, *ways)
+    pairs = _pairs(table, rules, model, chances, worth)
+    starts, ways = _ways_of(choices, _Signatures(bases, two), columns, pairs, costs)
+    return TripOptions(parts, tuple(chosen), masks, starts, *(np.ascontiguousarray(ways[name]) for name in WAY.fields))
 
 
 def _runs(table: Table, rules: Rules) -> list[list[Part]]:
@@ -323,49 +324,58 @@ class _Costs(NamedTuple):
     worth: float
 
 
-class _Way(NamedTuple):
-    """One option, see TripOptions."""
-
-    seconds: float
-    lost: float
-    slips: float
-    stays: int
-    blockers: int
-    first: int
-    second: int
-    pulled: bool
+WAY = np.dtype(
+    [
+        ("seconds", np.float64),
+        ("lost", np.float64),
+        ("slips", np.float64),
+        ("stays", np.int64),
+        ("blockers", np.int64),
+        ("first", np.int64),
+        ("second", np.int64),
+        ("pulled", np.bool_),
+    ],
+    align=True,
+)
+"""One option, see TripOptions."""
 
 
 @njit(cache=True)
-def _base(rows: np.ndarray, kind: int, parts: _Parts) -> int:
+def _base(rows: np.ndarray, count: int, kind: int, parts: _Parts) -> int:
     """Return which of a choice's parts all others are stacked on, one of type `kind` on the table (-1: none)."""
-    if len(rows) == 1:
+    if count == 1:
         return rows[0]  # type: ignore[no-any-return]
-    for part in rows:
-        if parts.whole[part] and parts.types[part] == kind:
-            return part  # type: ignore[no-any-return]
+    for k in range(count):
+        if parts.whole[rows[k]] and parts.types[rows[k]] == kind:
+            return rows[k]  # type: ignore[no-any-return]
     return -1
 
 
 @njit(cache=True)
-def _standing_on(rows: np.ndarray, item: int, parts: _Parts) -> int:
-    """Return which of a choice's parts stands on the table by an item (-1: none)."""
-    for part in rows:
-        if parts.whole[part] and parts.lowest[part] == item:
-            return part  # type: ignore[no-any-return]
-    return -1
+def _standing_on(rows: np.ndarray, count: int, one: int, other: int, parts: _Parts) -> tuple[int, int]:
+    """Return which of a choice's parts stand on the table by either of two items (-1: none)."""
+    first = second = -1
+    for k in range(count):
+        part = rows[k]
+        if parts.whole[part] and parts.lowest[part] == one:
+            first = part
+        if parts.whole[part] and parts.lowest[part] == other:
+            second = part
+    return first, second
 
 
 @njit(cache=True)
-def _is_idle(way: _Way, ways: list[_Way], begin: int, worth: float) -> bool:
-    """Whether a grasp of two is no better in anything than one of the ways from `begin` on."""
-    for number in range(begin, len(ways)):
+def _is_idle(ways: np.ndarray, begin: int, last: int, worth: float) -> bool:
+    """Whether way `last`, a grasp of two, is no better in anything than one of the ways from `begin` on."""
+    way = ways[last]
+    cost = way.seconds + worth * way.lost
+    for number in range(begin, last):
         other = ways[number]
         if (
             other.second >= 0
             and other.blockers & ~way.blockers == 0
             and other.slips <= way.slips
-            and other.seconds + worth * other.lost <= way.seconds + worth * way.lost
+            and other.seconds + worth * other.lost <= cost
         ):
             return True
     return False
@@ -374,52 +384,53 @@ def _is_idle(way: _Way, ways: list[_Way], begin: int, worth: float) -> bool:
 @njit(cache=True)
 def _ways_of(
     choices: _Choices, kinds: _Signatures, parts: _Parts, pairs: _Pairs, costs: _Costs
-) -> tuple[np.ndarray, ...]:
-    """Return starts (C + 1,) and the columns of the options of all choices, see TripOptions."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return starts (C + 1,) and the options of all choices, of type WAY."""
     worth = costs.worth
     starts = np.zeros(len(choices.rows) + 1, np.int64)
-    ways = [_Way(0.0, 0.0, 0.0, 0, 0, 0, 0, False)]  # is none: tells the types
+    ways, made = np.zeros(64, WAY), 0
     for choice in range(len(choices.rows)):
-        begin, count, mask = len(ways), choices.counts[choice], choices.masks[choice]
-        rows, signature = choices.rows[choice, :count], choices.signatures[choice]
+        begin, mask, signature = made, choices.masks[choice], choices.signatures[choice]
+        rows, count = choices.rows[choice], choices.counts[choice]
+        if made + len(pairs.first) + 1 >= len(ways):
+            more = np.zeros(2 * (len(ways) + len(pairs.first) + 1), WAY)
+            more[:made] = ways[:made]
+            ways = more
         alone = np.inf
-        base = _base(rows, kinds.bases[signature], parts)
+        base = _base(rows, count, kinds.bases[signature], parts)
         if base >= 0:
-            seconds = costs.whole_trip + (count - 1) * costs.stack
-            lost = costs.drop_single + (count - 1) * costs.drop_stack
-            alone = seconds + worth * lost
-            ways.append(_Way(seconds, lost, 0.0, 0, 0, base, -1, False))
+            way = ways[made]
+            way.seconds = costs.whole_trip + (count - 1) * costs.stack
+            way.lost = costs.drop_single + (count - 1) * costs.drop_stack
+            way.slips, way.stays, way.blockers = 0.0, 0, 0
+            way.first, way.second, way.pulled = base, -1, False
+            alone = way.seconds + worth * way.lost
+            made += 1
         if count > 1 and kinds.two[signature].any():
             start = costs.whole_trip + (count - 2) * costs.stack
             risk = costs.drop_two + (count - 2) * costs.drop_stack
             for pair in range(len(pairs.first)):
-                seconds = start + pairs.seconds[pair]
-                if seconds + worth * (risk + pairs.lost[pair]) >= alone:
+                if start + pairs.seconds[pair] + worth * (risk + pairs.lost[pair]) >= alone:
                     continue
                 if (1 << pairs.first[pair] | 1 << pairs.second[pair]) & ~mask:
                     continue
-                first = _standing_on(rows, pairs.first[pair], parts)
-                second = _standing_on(rows, pairs.second[pair], parts)
+                first, second = _standing_on(rows, count, pairs.first[pair], pairs.second[pair], parts)
                 if first < 0 or second < 0 or not kinds.two[signature, parts.types[first], parts.types[second]]:
                     continue
-                pulled, blockers = pairs.pulled[pair], pairs.blockers[pair]
-                if pulled and (blockers & mask or not parts.pullable[first]):
+                pulled = pairs.pulled[pair]
+                if pulled and (pairs.blockers[pair] & mask or not parts.pullable[first]):
                     continue
-                lost = risk + (costs.drop_loaded if pulled and parts.length[first] > 1 else pairs.lost[pair])
-                stays = parts.masks[second]
-                way = _Way(seconds, lost, pairs.slips[pair], stays, blockers & ~mask, first, second, pulled)
-                if not _is_idle(way, ways, begin, worth):
-                    ways.append(way)
-        starts[choice + 1] = len(ways) - 1
-    made = ways[1:]
-    return (
-        starts,
-        np.array([way.seconds for way in made]),
-        np.array([way.lost for way in made]),
-        np.array([way.slips for way in made]),
-        np.array([way.stays for way in made]),
-        np.array([way.blockers for way in made]),
-        np.array([way.first for way in made]),
-        np.array([way.second for way in made]),
-        np.array([way.pulled for way in made]),
-    )
+                loaded = pulled and parts.length[first] > 1
+                way = ways[made]
+                way.seconds = start + pairs.seconds[pair]
+                way.lost = risk + (costs.drop_loaded if loaded else pairs.lost[pair])
+                way.slips, way.stays, way.blockers = (
+                    pairs.slips[pair],
+                    parts.masks[second],
+                    pairs.blockers[pair] & ~mask,
+                )
+                way.first, way.second, way.pulled = first, second, pulled
+                if not _is_idle(ways, begin, made, worth):
+                    made += 1
+        starts[choice + 1] = made
+    return starts, ways[:made]
