@@ -25,6 +25,7 @@ def declared(stage: Stage) -> set[str]:
         chosen += [defaults.model_copy(update={name: value}) for value in get_args(field.annotation)]
     if "backend" in stage.parameters.model_fields:
         chosen += [defaults.model_copy(update={"backend": name}) for name in ("objects", "onnx", "network")]
+        chosen += [defaults.model_copy(update={"backend": "ground-truth", "lasting": "detector"})]
     return ALWAYS | {Path(file).name for one in chosen for file in stage.data_files(one)}
 
 

@@ -9,7 +9,7 @@ from scenewright.stages.agent.arms.ours import Mechanisms, OwnSkills
 from scenewright.stages.agent.arms.skills import CommonSkills
 from scenewright.stages.agent.arms.thesis import ThesisSkills
 from scenewright.stages.agent.body import Body
-from scenewright.stages.agent.brains.rules import Style
+from scenewright.stages.agent.brains.beliefs import Style
 
 ALL = Mechanisms()
 

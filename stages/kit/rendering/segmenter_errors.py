@@ -1,15 +1,17 @@
-"""What a segmenter gets wrong, drawn once for good per thing and region of views: missed, and taken for something else.
+"""What a segmenter gets wrong: draws that can be asked for again, and how long an error lasts.
 
-A second picture from the same place tells nothing new: an error stays until the thing lies anew or is looked at from
-another region. A false positive is a thing that is taken for one that was asked for. The defaults follow the failure
-table of Han 2024 (table 3.4: 8 false positives and 2 missed within 262 executions, of which we take 100.5 to be
-grasps): 5 other things in view, 3 of 8 false detections survived a look from near by.
+An error is drawn once for a thing, once for a thing and a region of views, or anew in every frame (`Alike`). Of
+`SegmenterErrors`, none is drawn anew: a second picture from the same place tells nothing new, and an error stays until
+the thing lies anew or is looked at from another region. A false positive is a thing that is taken for one that was
+asked for. The default rates follow the failure table of Han 2024 (table 3.4: 8 false positives and 2 missed within 262
+executions, of which we take 100.5 to be grasps): 5 other things in view, 3 of 8 false detections survived a look from
+near by.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import atan2, pi
 
@@ -60,6 +62,26 @@ class Luck:
     def happens(self, rate: float, *key: object) -> bool:
         """Return whether the number of a key is below a rate: what happens at a rate happens at every higher one."""
         return self.uniform(*key) < rate
+
+    def choice(self, weights: Mapping[str, float], *key: object) -> str:
+        """Return one of the names of `weights`, each as likely as its weight says; at least one is positive."""
+        reach = np.cumsum(list(weights.values()))
+        return list(weights)[int(np.searchsorted(reach, self.uniform(*key) * reach[-1], side="right"))]
+
+
+@dataclass(frozen=True)
+class Alike:
+    """How alike an error is in two sights of one thing: correlation from one region of views, and from two."""
+
+    same_region: float
+    other_region: float
+
+    def key(self, luck: Luck, error: str, thing: object, region: object, frame: int) -> tuple[object, ...]:
+        """Return what an error of a thing is drawn by: once for good, by region, or by frame."""
+        kind = luck.uniform("kind", error, thing)
+        if kind < self.other_region:
+            return error, thing
+        return (error, thing, region) if kind < self.same_region else (error, thing, region, "frame", frame)
 
 
 SECTORS = 8

@@ -16,12 +16,9 @@ from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRI
 def spoiled_mask(eye: Eye, random: np.random.Generator) -> np.ndarray:
     """Return a needle mask (H, W) bool of `eye` with the structured errors of a learned one."""
     mask = eye.mask(NEEDLE)
-    rows, columns = np.nonzero(mask)
-    if len(rows) == 0:
+    if not mask.any():
         return mask
-    top, bottom = max(rows.min() - 60, 0), min(rows.max() + 60, mask.shape[0])
-    left, right = max(columns.min() - 60, 0), min(columns.max() + 60, mask.shape[1])
-    window = np.s_[top:bottom, left:right]
+    window = _around(mask, 60)
     crop = mask[window].astype(np.uint8)
     near = cv2.dilate(crop, np.ones((51, 51), np.uint8)) > 0
     spoiled = _wandering_outline(crop, random)
@@ -39,6 +36,12 @@ def spoiled_mask(eye: Eye, random: np.random.Generator) -> np.ndarray:
     result = np.zeros_like(mask)
     result[window] = spoiled > 0
     return result
+
+
+def _around(mask: np.ndarray, margin: int) -> tuple[slice, slice]:
+    """Return the window of a mask and of `margin` pixels around it."""
+    (top, left), (bottom, right) = (end(np.argwhere(mask), axis=0) for end in (np.min, np.max))
+    return np.s_[max(top - margin, 0) : bottom + margin, max(left - margin, 0) : right + margin]
 
 
 def _wandering_outline(crop: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -86,12 +89,9 @@ def noisy_disparity(view: StereoView, noise: float, random: np.random.Generator)
     """
     disparity = view.disparity.copy()
     needle = view.left.mask(NEEDLE)
-    rows, columns = np.nonzero(needle)
-    if len(rows) == 0:
+    if not needle.any():
         return disparity
-    top, bottom = max(rows.min() - 40, 0), min(rows.max() + 40, needle.shape[0])
-    left, right = max(columns.min() - 40, 0), min(columns.max() + 40, needle.shape[1])
-    window = np.s_[top:bottom, left:right]
+    window = _around(needle, 40)
     crop, inside = disparity[window], needle[window]
     depth_behind = np.nanmedian(view.left.depth[needle]) + 0.012
     behind = view.rig.focal * view.rig.baseline / depth_behind

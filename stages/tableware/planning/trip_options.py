@@ -106,9 +106,10 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
         type_of,
         np.array([why_not_pulled(part.kinds, rules) is None for part in parts], np.bool_),
     )
-    choices = _Choices(rows, masks, signatures)
-    ways = _ways_of(choices, _Signatures(bases, two), columns, _pairs(table, rules, model, chances, worth), costs)
-    return TripOptions(parts, tuple(chosen), masks, *ways)
+    choices = _Choices(rows, np.array([len(choice) for choice in chosen], np.int64), masks, signatures)
+    pairs = _pairs(table, rules, model, chances, worth)
+    starts, ways = _ways_of(choices, _Signatures(bases, two), columns, pairs, costs)
+    return TripOptions(parts, tuple(chosen), masks, starts, *(np.ascontiguousarray(ways[name]) for name in WAY.fields))
 
 
 def _runs(table: Table, rules: Rules) -> list[list[Part]]:
@@ -268,9 +269,11 @@ def slip_cost(model: TimeModel) -> float:
 
 
 class _Choices(NamedTuple):
-    """Of each choice (C,): rows of its parts (C, P; -1: none), its items as bits, its signature (S of them)."""
+    """Of each choice (C,): rows of its parts (C, P; -1: none), their number, its items as bits, its signature (S of
+    them)."""
 
     rows: np.ndarray
+    counts: np.ndarray
     masks: np.ndarray
     signatures: np.ndarray
 
@@ -321,106 +324,113 @@ class _Costs(NamedTuple):
     worth: float
 
 
+WAY = np.dtype(
+    [
+        ("seconds", np.float64),
+        ("lost", np.float64),
+        ("slips", np.float64),
+        ("stays", np.int64),
+        ("blockers", np.int64),
+        ("first", np.int64),
+        ("second", np.int64),
+        ("pulled", np.bool_),
+    ],
+    align=True,
+)
+"""One option, see TripOptions."""
+
+
 @njit(cache=True)
-def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-def]
-    """Return starts (C + 1,) and the options of all choices, see TripOptions; `kinds` are _Signatures."""
-    rows, masks, signatures = choices
-    bases, two = kinds
-    lowest, whole, length, part_mask, type_of, pullable = parts
-    pair_first, pair_second, pair_blockers, pair_seconds, pair_lost, pair_slips, pair_pulled = pairs
-    whole_trip, stack, drop_stack, drop_single, drop_two, drop_loaded, worth = costs
-    starts = np.zeros(len(rows) + 1, np.int64)
-    seconds, lost, slips = [0.0], [0.0], [0.0]
-    stays, blockers, first, second, pulled = [0], [0], [0], [0], [False]
-    for choice in range(len(rows)):
-        begin = len(seconds)
-        count = 0
-        while count < rows.shape[1] and rows[choice, count] >= 0:
-            count += 1
-        signature, mask = signatures[choice], masks[choice]
+def _base(rows: np.ndarray, count: int, kind: int, parts: _Parts) -> int:
+    """Return which of a choice's parts all others are stacked on, one of type `kind` on the table (-1: none)."""
+    if count == 1:
+        return rows[0]  # type: ignore[no-any-return]
+    for k in range(count):
+        if parts.whole[rows[k]] and parts.types[rows[k]] == kind:
+            return rows[k]  # type: ignore[no-any-return]
+    return -1
+
+
+@njit(cache=True)
+def _standing_on(rows: np.ndarray, count: int, one: int, other: int, parts: _Parts) -> tuple[int, int]:
+    """Return which of a choice's parts stand on the table by either of two items (-1: none)."""
+    first = second = -1
+    for k in range(count):
+        part = rows[k]
+        if parts.whole[part] and parts.lowest[part] == one:
+            first = part
+        if parts.whole[part] and parts.lowest[part] == other:
+            second = part
+    return first, second
+
+
+@njit(cache=True)
+def _is_idle(ways: np.ndarray, begin: int, last: int, worth: float) -> bool:
+    """Whether way `last`, a grasp of two, is no better in anything than one of the ways from `begin` on."""
+    way = ways[last]
+    cost = way.seconds + worth * way.lost
+    for number in range(begin, last):
+        other = ways[number]
+        if (
+            other.second >= 0
+            and other.blockers & ~way.blockers == 0
+            and other.slips <= way.slips
+            and other.seconds + worth * other.lost <= cost
+        ):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _ways_of(
+    choices: _Choices, kinds: _Signatures, parts: _Parts, pairs: _Pairs, costs: _Costs
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return starts (C + 1,) and the options of all choices, of type WAY."""
+    worth = costs.worth
+    starts = np.zeros(len(choices.rows) + 1, np.int64)
+    ways, made = np.zeros(64, WAY), 0
+    for choice in range(len(choices.rows)):
+        begin, mask, signature = made, choices.masks[choice], choices.signatures[choice]
+        rows, count = choices.rows[choice], choices.counts[choice]
+        if made + len(pairs.first) + 1 >= len(ways):
+            more = np.zeros(2 * (len(ways) + len(pairs.first) + 1), WAY)
+            more[:made] = ways[:made]
+            ways = more
         alone = np.inf
-        if count == 1:
-            alone = whole_trip + worth * drop_single
-            seconds.append(whole_trip)
-            lost.append(drop_single)
-            slips.append(0.0)
-            stays.append(0)
-            blockers.append(0)
-            first.append(rows[choice, 0])
-            second.append(-1)
-            pulled.append(False)
-        elif bases[signature] >= 0:
-            for k in range(count):
-                part = rows[choice, k]
-                if whole[part] and type_of[part] == bases[signature]:
-                    chance = drop_single + (count - 1) * drop_stack
-                    alone = whole_trip + (count - 1) * stack + worth * chance
-                    seconds.append(whole_trip + (count - 1) * stack)
-                    lost.append(chance)
-                    slips.append(0.0)
-                    stays.append(0)
-                    blockers.append(0)
-                    first.append(part)
-                    second.append(-1)
-                    pulled.append(False)
-                    break
-        if count > 1 and two[signature].any():
-            start = whole_trip + (count - 2) * stack
-            risk = drop_two + (count - 2) * drop_stack
-            for pair in range(len(pair_first)):
-                if start + pair_seconds[pair] + worth * (risk + pair_lost[pair]) >= alone:
+        base = _base(rows, count, kinds.bases[signature], parts)
+        if base >= 0:
+            way = ways[made]
+            way.seconds = costs.whole_trip + (count - 1) * costs.stack
+            way.lost = costs.drop_single + (count - 1) * costs.drop_stack
+            way.slips, way.stays, way.blockers = 0.0, 0, 0
+            way.first, way.second, way.pulled = base, -1, False
+            alone = way.seconds + worth * way.lost
+            made += 1
+        if count > 1 and kinds.two[signature].any():
+            start = costs.whole_trip + (count - 2) * costs.stack
+            risk = costs.drop_two + (count - 2) * costs.drop_stack
+            for pair in range(len(pairs.first)):
+                if start + pairs.seconds[pair] + worth * (risk + pairs.lost[pair]) >= alone:
                     continue
-                both = 1 << pair_first[pair] | 1 << pair_second[pair]
-                if both & ~mask:
+                if (1 << pairs.first[pair] | 1 << pairs.second[pair]) & ~mask:
                     continue
-                pulled_part = waiting_part = -1
-                for k in range(count):
-                    part = rows[choice, k]
-                    if whole[part] and lowest[part] == pair_first[pair]:
-                        pulled_part = part
-                    if whole[part] and lowest[part] == pair_second[pair]:
-                        waiting_part = part
-                if (
-                    pulled_part < 0
-                    or waiting_part < 0
-                    or not two[signature, type_of[pulled_part], type_of[waiting_part]]
-                ):
+                first, second = _standing_on(rows, count, pairs.first[pair], pairs.second[pair], parts)
+                if first < 0 or second < 0 or not kinds.two[signature, parts.types[first], parts.types[second]]:
                     continue
-                loaded = length[pulled_part] > 1
-                if pair_pulled[pair] and (pair_blockers[pair] & mask or not pullable[pulled_part]):
+                pulled = pairs.pulled[pair]
+                if pulled and (pairs.blockers[pair] & mask or not parts.pullable[first]):
                     continue
-                block = pair_blockers[pair] & ~mask
-                time = start + pair_seconds[pair]
-                chance = risk + (drop_loaded if pair_pulled[pair] and loaded else pair_lost[pair])
-                idle = False
-                for option in range(begin, len(seconds)):
-                    if (
-                        second[option] >= 0
-                        and blockers[option] & ~block == 0
-                        and slips[option] <= pair_slips[pair]
-                        and seconds[option] + worth * lost[option] <= time + worth * chance
-                    ):
-                        idle = True
-                        break
-                if idle:
-                    continue
-                seconds.append(time)
-                lost.append(chance)
-                slips.append(pair_slips[pair])
-                stays.append(part_mask[waiting_part])
-                blockers.append(block)
-                first.append(pulled_part)
-                second.append(waiting_part)
-                pulled.append(pair_pulled[pair])
-        starts[choice + 1] = len(seconds) - 1
-    return (
-        starts,
-        np.array(seconds[1:]),
-        np.array(lost[1:]),
-        np.array(slips[1:]),
-        np.array(stays[1:]),
-        np.array(blockers[1:]),
-        np.array(first[1:]),
-        np.array(second[1:]),
-        np.array(pulled[1:]),
-    )
+                loaded = pulled and parts.length[first] > 1
+                way = ways[made]
+                way.seconds = start + pairs.seconds[pair]
+                way.lost = risk + (costs.drop_loaded if loaded else pairs.lost[pair])
+                way.slips, way.stays, way.blockers = (
+                    pairs.slips[pair],
+                    parts.masks[second],
+                    pairs.blockers[pair] & ~mask,
+                )
+                way.first, way.second, way.pulled = first, second, pulled
+                if not _is_idle(ways, begin, made, worth):
+                    made += 1
+        starts[choice + 1] = made
+    return starts, ways[:made]

@@ -16,7 +16,8 @@ from scenewright.stages.agent.arms.registry import ARMS
 from scenewright.stages.agent.brains.brain import Reply
 from scenewright.stages.agent.brains.language import LanguageBrain
 from scenewright.stages.agent.brains.prompt import feedback_text
-from scenewright.stages.agent.brains.rules import RulesBrain, Style
+from scenewright.stages.agent.brains.beliefs import Beliefs, Style
+from scenewright.stages.agent.brains.rules import RulesBrain
 from scenewright.stages.agent.brains.slips import Slips
 from scenewright.stages.agent.episodes import write_episode
 from scenewright.stages.agent.evaluate_stage import run as evaluate
@@ -365,21 +366,21 @@ def test_evaluation_counts_and_options_are_checked(tmp_path: Path) -> None:
 
 def test_what_may_be_of_either_class_is_brought_where_both_are_wanted() -> None:
     task = TASKS["fruit_among_cups"]
-    brain, goal = RulesBrain(task.words, Style(skilled=True), Slips(lambda _: None)), task.goals[0]
+    beliefs, goal = Beliefs(task.goals, Style(skilled=True)), task.goals[0]
     held = SceneObject("banana_0", "banana", "table_0")
-    assert brain._either_way(replace(held, doubt="orange"), goal)
-    assert not brain._either_way(replace(held, doubt="sponge"), goal)
+    assert beliefs.either_way(replace(held, doubt="orange"), goal)
+    assert not beliefs.either_way(replace(held, doubt="sponge"), goal)
 
 
 def test_what_got_lost_is_sought_where_that_was_so_often_and_not_for_ever() -> None:
     task = TASKS["tidy_table"]
     brain = RulesBrain(task.words, Style(skilled=True), Slips(lambda _: None))
-    brain._rooms = {key: SceneObject(key, "table") for key in ("table_0", "table_1")}
-    brain._at = "table_1"
-    lost = [SceneObject("duck_0", "duck", "table_0")]
+    brain.beliefs.rooms = {key: SceneObject(key, "table") for key in ("table_0", "table_1")}
+    brain.beliefs.at = "table_1"
+    lost = SceneObject("duck_0", "duck", "table_0")
     said = []
     for _ in range(4):
         reply = brain._where_is(lost)
         said.append(reply.code if reply else "")
-        brain._at = "table_0"
+        brain.beliefs.at = "table_0"
     assert said == ["navigate(rooms['table_0'])", *["on_table_0 = explore_local()"] * 2, ""]

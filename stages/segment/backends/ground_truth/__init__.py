@@ -20,6 +20,10 @@ class GroundTruthParameters(Parameters):
     )
 
 
+def _rates(parameters: GroundTruthParameters) -> tuple[str, ...]:
+    return () if parameters.lasting == "none" else ("errors/segmenters.toml",)
+
+
 BACKEND = BackendDeclaration(
     name="ground-truth",
     summary="the log's own labels",
@@ -27,5 +31,6 @@ BACKEND = BackendDeclaration(
     apart=True,
     needs=frozenset({"labels"}),
     parameters=GroundTruthParameters,
+    data_files=_rates,
     exclusive=("corruption", "lasting"),
 )

@@ -10,8 +10,7 @@ from scenewright.stages.kit.formats.frames import Frame
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.segment.backends.ground_truth import GroundTruthParameters
 from scenewright.stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
-from scenewright.stages.segment.backends.ground_truth.lasting import LastingErrors, View
-from scenewright.stages.segment.backends.ground_truth.lasting_rates import RATES
+from scenewright.stages.segment.backends.ground_truth.lasting import LastingErrors, View, measured_rates
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
@@ -60,9 +59,8 @@ class GroundTruthBackend:
             False: tuple(c.id for c in named if c.kind == "stuff"),
         }
         things = {entry.name: entry.id for entry in vocabulary.classes if entry.kind == "thing"}
-        self._lasting = (
-            None if lasting == "none" else LastingErrors(RATES[lasting], seed, things, max(self._masks, default=0) + 1)
-        )
+        first_free = max(self._masks, default=0) + 1
+        self._lasting = None if lasting == "none" else LastingErrors(measured_rates(lasting), seed, things, first_free)
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
         """Return the masks of a frame. Raises BadInput when the frame has no labels."""

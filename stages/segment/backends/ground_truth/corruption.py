@@ -7,18 +7,12 @@ merged with a neighbour with 0.3, is cut in two with 0.3, and boundaries wander 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import cv2
 import numpy as np
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
-FLIP_AT_ONE = 0.5
-MISS_AT_ONE = 0.3
-MERGE_AT_ONE = 0.3
-SPLIT_AT_ONE = 0.3
-BOUNDARY_AT_ONE = 8.0
-"""Pixels at a width of 640."""
 BOUNDARY_WAVELENGTH = 24
 """Pixels at a width of 640 between the points at which boundary displacement is drawn."""
 
@@ -34,15 +28,12 @@ class CorruptionRates:
     boundary: float = 0.0
 
 
+AT_ONE = CorruptionRates(flip=0.5, miss=0.3, merge=0.3, split=0.3, boundary=8.0)
+
+
 def rates_of_level(level: float) -> CorruptionRates:
     """Return the rates of a corruption level in 0..1; level 0 changes nothing."""
-    return CorruptionRates(
-        flip=FLIP_AT_ONE * level,
-        miss=MISS_AT_ONE * level,
-        merge=MERGE_AT_ONE * level,
-        split=SPLIT_AT_ONE * level,
-        boundary=BOUNDARY_AT_ONE * level,
-    )
+    return CorruptionRates(**{name: rate * level for name, rate in asdict(AT_ONE).items()})
 
 
 def corrupt(
@@ -61,7 +52,9 @@ def corrupt(
             del masks[mask_id]
     for mask_id in _things(masks):
         if random.random() < rates.merge and mask_id in masks:
-            _merge(ids, masks, mask_id, random)
+            beside = list(touching_things(ids, masks, mask_id))
+            if beside:
+                merge(ids, masks, mask_id, beside[int(random.integers(len(beside)))])
     for mask_id in _things(masks):
         if random.random() < rates.split:
             _split(ids, masks, mask_id, random)
@@ -78,14 +71,18 @@ def _things(masks: dict[int, PanopticMask]) -> list[int]:
     return sorted(mask_id for mask_id, mask in masks.items() if mask.is_thing)
 
 
-def _merge(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, random: np.random.Generator) -> None:
-    """Give the mask's pixels to a thing that touches it (within two pixels); nothing happens without one."""
+def touching_things(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int) -> dict[int, int]:
+    """Return the things that touch a mask (within two pixels), by rising id, each with its pixels there."""
     own = (ids == mask_id).astype(np.uint8)
-    around = cv2.dilate(own, np.ones((5, 5), np.uint8)) != 0
-    neighbours = [i for i in np.unique(ids[around]).tolist() if i != mask_id and i in masks and masks[i].is_thing]
-    if neighbours:
-        ids[ids == mask_id] = neighbours[int(random.integers(len(neighbours)))]
-        del masks[mask_id]
+    around = (cv2.dilate(own, np.ones((5, 5), np.uint8)) != 0) & (own == 0)
+    found = zip(*np.unique(ids[around], return_counts=True), strict=True)
+    return {int(i): int(count) for i, count in found if i in masks and masks[int(i)].is_thing}
+
+
+def merge(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, into: int) -> None:
+    """Give the pixels of a mask to another."""
+    ids[ids == mask_id] = into
+    del masks[mask_id]
 
 
 def _split(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, random: np.random.Generator) -> None:

@@ -5,20 +5,24 @@ error is drawn once for a thing, once for a thing and a region of views (`view_r
 which of the three a thing has is drawn too, in shares that give two sights of a thing the correlation that was
 measured: of two sights from one region, and from two. False masks lie on places of floor and walls, and stay there.
 
-Rates: `python -m benchmarks.segmenter_rates`, docs/results/mapping.md.
+Rates: data/errors/segmenters.toml, docs/results/mapping.md.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
-import cv2
 import numpy as np
-from scenewright.stages.kit.rendering.segmenter_errors import Luck, view_region
-from scenewright.stages.segment.backends.ground_truth.corruption import displace_boundaries
+from pydantic import TypeAdapter
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
+from scenewright.stages.kit.rendering.segmenter_errors import Alike, Luck, view_region
+from scenewright.stages.segment.backends.ground_truth.corruption import displace_boundaries, merge, touching_things
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
+RATES_FILE = Path(__file__).resolve().parents[4] / "data" / "errors" / "segmenters.toml"
 CELL = 0.5
 """Edge of the cubes of which each is one place for a false mask [m]."""
 FALSE_RADIUS = (0.1, 0.3)
@@ -30,21 +34,6 @@ BOUNDARY = 2.4
 NEVER_SEEN = 5.0
 """Weight of what all wrong names are, beside those of a class, in sights: a class that was rarely seen is confused as
 others are."""
-
-
-@dataclass(frozen=True)
-class Alike:
-    """How alike an error is in two sights of one thing: correlation from one region of views, and from two."""
-
-    same_region: float
-    other_region: float
-
-    def key(self, luck: Luck, error: str, thing: object, region: object, frame: int) -> tuple[object, ...]:
-        """Return what an error of a thing is drawn by: once for good, by region, or by frame."""
-        kind = luck.uniform("kind", error, thing)
-        if kind < self.other_region:
-            return error, thing
-        return (error, thing, region) if kind < self.same_region else (error, thing, region, "frame", frame)
 
 
 @dataclass(frozen=True)
@@ -62,6 +51,14 @@ class LastingRates:
     confusion: Mapping[str, Mapping[str, int]]
     """True class -> wrong class -> sights."""
     false_names: Mapping[str, int]
+
+
+def measured_rates(segmenter: str) -> LastingRates:
+    """Return the rates of a segmenter in data/errors/segmenters.toml. Raises BadInput or ValidationError for a file
+    that is damaged."""
+    told = TypeAdapter(dict[str, LastingRates]).validate_python(file_toml(RATES_FILE, LARGEST_SETTINGS))[segmenter]
+    merged, split = told.merged / (1 - told.missed), told.split / (1 - told.missed - told.merged)
+    return replace(told, merged=merged, split=split)
 
 
 @dataclass(frozen=True)
@@ -104,12 +101,14 @@ class LastingErrors:
             ids[ids == k] = 0
             del masks[k]
         for k in struck("merged", rates.merged, rates.missed_alike):
-            self._merge(ids, masks, k)
+            beside = touching_things(ids, masks, k)
+            if beside:  # that with the longest border takes its pixels
+                merge(ids, masks, k, max(beside, key=lambda other: (beside[other], other)))
         for k in struck("split", rates.split, rates.missed_alike):
             self._split(ids, masks, k, view)
         for k in struck("name", rates.wrong_name, rates.name_alike):
             key = rates.name_alike.key(self._luck, "name", k, regions[k], view.frame)
-            wrong = self._wrong_name(self._names[masks[k].class_id], self._luck.uniform("which", *key))
+            wrong = self._luck.choice(self._wrong_names(self._names[masks[k].class_id]), "which", *key)
             for part in {k, self._free + k} & set(masks):
                 masks[part] = replace(masks[part], class_id=self._classes[wrong])
         self._false_masks(ids, masks, true, view)
@@ -117,18 +116,6 @@ class LastingErrors:
         ids = displace_boundaries(ids, BOUNDARY * ids.shape[1] / 640, random)
         present = set(np.unique(ids).tolist())
         return PanopticFrame(ids=ids, masks={k: mask for k, mask in masks.items() if k in present})
-
-    def _merge(self, ids: np.ndarray, masks: dict[int, PanopticMask], number: int) -> None:
-        """Give the mask's pixels to the thing that it has most of its border with; nothing happens without one."""
-        own = (ids == number).astype(np.uint8)
-        around = ids[(cv2.dilate(own, np.ones((5, 5), np.uint8)) != 0) & (own == 0)]
-        values, counts = np.unique(around, return_counts=True)
-        beside = [
-            (int(n), int(v)) for v, n in zip(values, counts, strict=True) if v in masks and masks[int(v)].is_thing
-        ]
-        if beside:
-            ids[ids == number] = max(beside)[1]
-            del masks[number]
 
     def _split(self, ids: np.ndarray, masks: dict[int, PanopticMask], number: int, view: View) -> None:
         """Cut the mask by an upright plane of the room through the middle of what is seen of it."""
@@ -142,21 +129,17 @@ class LastingErrors:
         ids[far] = self._free + number
         masks[self._free + number] = masks[number]
 
-    def _wrong_name(self, true: str, chance: float) -> str:
-        """Return the class that a thing of class `true` is taken for, by a number in [0, 1)."""
-        every: dict[str, float] = {}
+    def _wrong_names(self, true: str) -> dict[str, float]:
+        """Return the classes that a thing of class `true` may be taken for, with their weights."""
+        every: Counter[str] = Counter()
         for row in self._rates.confusion.values():
-            for name, count in row.items():
-                every[name] = every.get(name, 0.0) + count
-        total = sum(every.values())
+            every.update(row)
         own = self._rates.confusion.get(true, {})
-        weights = {
-            name: own.get(name, 0) + NEVER_SEEN * every.get(name, 0.0) / total
+        return {
+            name: own.get(name, 0) + NEVER_SEEN * every[name] / every.total()
             for name in sorted(every)
             if name != true and name in self._classes
         }
-        reach = np.cumsum(list(weights.values()))
-        return list(weights)[int(np.searchsorted(reach, chance * reach[-1], side="right"))]
 
     def _false_masks(self, ids: np.ndarray, masks: dict[int, PanopticMask], true: PanopticFrame, view: View) -> None:
         """Put masks of things where floor and walls are: in places that every frame agrees on."""
@@ -165,8 +148,7 @@ class LastingErrors:
         cells, which = np.unique(np.floor(view.points[bare] / CELL).astype(int), axis=0, return_inverse=True)
         least = LEAST_CELL_PIXELS * (ids.shape[1] / 640) ** 2
         large = [k for k, count in enumerate(np.bincount(which.ravel(), minlength=len(cells))) if count >= least]
-        names = sorted(set(self._rates.false_names) & set(self._classes))
-        reach = np.cumsum([self._rates.false_names[name] for name in names])
+        names = {k: count for k, count in sorted(self._rates.false_names.items()) if k in self._classes}
         for k in large:
             cell = tuple(int(v) for v in cells[k])
             middle = np.median(view.points[bare][which.ravel() == k], axis=0)
@@ -177,7 +159,7 @@ class LastingErrors:
             low, high = FALSE_RADIUS
             radius = low + (high - low) * self._luck.uniform("radius", cell)
             near = bare & (np.linalg.norm(view.points - (np.array(cell) + 0.5) * CELL, axis=2) < radius + CELL / 2)
-            name = names[int(np.searchsorted(reach, self._luck.uniform("false name", cell) * reach[-1], side="right"))]
+            name = self._luck.choice(names, "false name", cell)
             number = 2 * self._free + int(self._luck.uniform("number", cell) * 2**20)
             ids[near] = number
             masks[number] = PanopticMask(self._classes[name], True)
