@@ -8,6 +8,7 @@ from typing import Any
 import typer
 from scenewright.cli import housekeeping
 from scenewright.cli.step_command import make_command
+from scenewright.cli.train_command import training_group
 from scenewright.stages.engine.discovery import all_stages
 
 HELP = """Turn robot logs into scenes a robot can act in, and act in them.
@@ -47,6 +48,7 @@ def build_application() -> Callable[..., Any]:
         for function in below:
             group_application.command()(function)
         application.add_typer(group_application, name=name, rich_help_panel=help_panel)
+    application.add_typer(training_group(), name="train", rich_help_panel="Training")
     application.callback()(housekeeping.root)
     table = typer.main.get_command(application)
 

@@ -32,7 +32,7 @@ from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.splat.build_stage import method_of, rasterizer_of
 from scenewright.stages.splat.building import placed_poses
 from scenewright.stages.splat.render_stage import figures_of
-from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.trainer import Trainer
 from scenewright.stages.splat.triangulation import with_points
 from scenewright.stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
 

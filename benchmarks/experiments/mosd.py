@@ -17,6 +17,16 @@ import cv2
 import numpy as np
 from pydantic import Field
 from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.mosd_frames import (
+    CAMERA,
+    FOLDER,
+    LabelledFrame,
+    frame_files,
+    frame_names,
+    kind_of,
+    read_frame,
+)
+from scenewright.stages.kit.measurement.object_masks import score_object_masks
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.segment.backends.objects.backend import BUNDLED
 from scenewright.stages.segment.backends.objects.boosting import read_trees
@@ -26,8 +36,6 @@ from scenewright.stages.segment.backends.objects.plain import segment_plain
 from scenewright.stages.segment.backends.objects.segmentation import segment_objects
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, median
-from benchmarks.mosd_frames import CAMERA, FOLDER, LabelledFrame, frame_files, frame_names, kind_of, read_frame
-from benchmarks.object_masks import score_object_masks
 
 QUICK_STEP = 5
 """Every how many-th frame with --quick."""

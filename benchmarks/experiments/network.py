@@ -25,6 +25,8 @@ from scenewright.schemas.sequence import Sequence as SequenceArtifact
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.drawing.palette import entity_color
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
+from scenewright.stages.kit.measurement.object_masks import score_object_masks
 from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.segment.backends.network.backend import Predictor, load_predictor
@@ -39,8 +41,6 @@ from scenewright.stages.segment.settings import fusion_settings, geometric_setti
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.mapping.figures_of_merit import summed_qualities
 from benchmarks.generated_rooms import FIRST_REPORTING, STEPS, make_room
-from benchmarks.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
-from benchmarks.object_masks import score_object_masks
 from benchmarks.steps import made, opened
 
 ROOMS, CLOUDS = "rooms", "mosd_test"

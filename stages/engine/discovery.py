@@ -1,4 +1,7 @@
-"""Finding the steps: every folder stages/<name>/ with a parameters.py is one, and nothing else has to be told."""
+"""Finding the steps: every folder stages/<name>/ with a parameters.py is one, and nothing else has to be told.
+
+So are their trainings: every folder stages/<name>/training/<training>/.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,9 @@ from functools import cache
 from pathlib import Path
 
 from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.declared import declared_in
 from scenewright.stages.kit.stage import Stage
+from scenewright.stages.kit.training.declaration import TrainingDeclaration
 
 STAGES_FOLDER = Path(__file__).resolve().parents[1]
 
@@ -31,3 +36,18 @@ def stage_by_name(name: str) -> Stage:
     if name not in stages:
         raise UsageError(f"no step {name!r}", hint=f"steps are: {', '.join(stages)}")
     return stages[name]
+
+
+@cache
+def all_trainings() -> dict[str, TrainingDeclaration]:
+    """Return every declared training by its name, step by step. Imports declarations only."""
+    found: dict[str, TrainingDeclaration] = {}
+    for folder in sorted({stage.folder for stage in all_stages().values()}):
+        package = f"scenewright.stages.{folder}.training"
+        if not (STAGES_FOLDER / folder / "training").is_dir():
+            continue
+        for training in declared_in(package, TrainingDeclaration, "TRAINING"):
+            if training.name in found:
+                raise RuntimeError(f"training {training.name!r} is declared twice: {package}")
+            found[training.name] = training
+    return found

@@ -23,6 +23,7 @@ from scenewright.stages.suture.needle.thesis import thesis_estimate
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
 from scenewright.stages.suture.segmentation.infer import Masks, Segmenter
+from scenewright.stages.suture.training.network.views import CALIBRATION_ERROR, EYES, kept_view, read_eye
 from scenewright.stages.suture.world.render import Eye
 from scenewright.stages.suture.world.sampling import seen_scene
 from scenewright.stages.suture.world.scene import NeedleScene
@@ -32,7 +33,7 @@ from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.experiment import MEASURES as POSES
 from benchmarks.experiments.stitch_needle.views import CASES, observe
 from benchmarks.reporting_seeds import Method, newest
-from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
+from benchmarks.stitch.kept_views import ViewParameters, views_of
 
 NEEDLES = "needles"
 """Group of the reporting seeds."""

@@ -16,6 +16,7 @@ from scenewright.stages.suture.rig import TWO_CAMERAS
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
 from scenewright.stages.suture.segmentation.infer import Segmenter
 from scenewright.stages.suture.thread.reconstruct import reconstruct_thread
+from scenewright.stages.suture.training.network.views import CALIBRATION_ERROR, EYES, kept_view, read_eye
 from scenewright.stages.suture.world.sampling import seen_scene
 from scenewright.stages.suture.world.tubes import THREAD
 
@@ -23,7 +24,7 @@ from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, co
 from benchmarks.experiments.stitch_thread.drawing import panel
 from benchmarks.experiments.stitch_thread.judging import ThreadRecord, judged
 from benchmarks.reporting_seeds import Method, newest
-from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
+from benchmarks.stitch.kept_views import ViewParameters, views_of
 
 TUNING, REPORTING = range(100), newest("needles").seeds[:100]
 VIEWS, ALL = "views", "thread_all"

@@ -15,12 +15,19 @@ from scenewright.stages.disparity.raft.architecture import SMALL
 from scenewright.stages.disparity.raft.checkpoint import load_network
 from scenewright.stages.disparity.raft.matching import moved_right, open_raft
 from scenewright.stages.disparity.raft.network import RaftStereo
+from scenewright.stages.disparity.training.raft_stereo.crops import (
+    HEIGHT,
+    WIDTH,
+    Sample,
+    counted,
+    kept_sample,
+    shapes_sample,
+)
+from scenewright.stages.disparity.training.raft_stereo.shapes import shapes_pair, texture_bank
+from scenewright.stages.disparity.training.raft_stereo.train import FILE, Plan, Run, Sources, loss_of, tensors_of
 from scenewright.stages.engine.chain import REPOSITORY
 
-from benchmarks.disparity.crops import HEIGHT, WIDTH, Sample, counted, kept_sample, shapes_sample
 from benchmarks.disparity.rendered_pairs import KeptPair, keep, kept
-from benchmarks.disparity.shapes import shapes_pair, texture_bank
-from benchmarks.disparity.train import FILE, Plan, Run, Sources, loss_of, tensors_of
 from tests.unit.disparity.pairs import pair
 
 PLAN = Plan(steps=4, shapes=1, rooms=0, needles=0, updates=2, seed=3, pairs=0)

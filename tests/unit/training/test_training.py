@@ -15,20 +15,20 @@ from hypothesis import strategies as st
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.training.run import rate_at
 from scenewright.stages.segment.backends.network.features import CHANNELS, Mount, features
 from scenewright.stages.segment.backends.network.model import Widths
+from scenewright.stages.segment.training.network.drawing import drawn
+from scenewright.stages.segment.training.network.drawn_colors import compressed
+from scenewright.stages.segment.training.network.drawn_features import CameraBatch, MountBatch, features_of
+from scenewright.stages.segment.training.network.drawn_targets import targets_of
+from scenewright.stages.segment.training.network.samples import LABELS, FrameSet, Store, as_sample
+from scenewright.stages.segment.training.network.targets import IGNORED, make_targets
+from scenewright.stages.segment.training.network.train import PEAK_RATE, WARM_UP, Clock, Feed, Plan, Run, class_weights
 
 from benchmarks.training.data import DEPTH_UNIT, HEIGHT, WIDTH, Sample, papered, write_shard
-from benchmarks.training.drawing import drawn
-from benchmarks.training.drawn_colors import compressed
-from benchmarks.training.drawn_features import CameraBatch, MountBatch, features_of
-from benchmarks.training.drawn_targets import targets_of
-from benchmarks.training.run import rate_at
-from benchmarks.training.samples import LABELS, FrameSet, Store, as_sample
 from benchmarks.training.sensors import coarse_depth, lose_things
 from benchmarks.training.shapes import MAKERS, SMALL_MAKERS, Maker
-from benchmarks.training.targets import IGNORED, make_targets
-from benchmarks.training.train import PEAK_RATE, WARM_UP, Clock, Feed, Plan, Run, class_weights
 
 TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
 CAMERA = Camera(width=WIDTH, height=HEIGHT, fx=260.0, fy=260.0, cx=159.5, cy=119.5)
@@ -216,7 +216,7 @@ def test_real_frames_are_a_share_of_a_batch(frames: FrameSet, monkeypatch: pytes
 
 def test_the_clock_ends_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("benchmarks.training.train.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("scenewright.stages.segment.training.network.train.time.monotonic", lambda: now[0])
     clock = Clock(10, 60.0)
     assert clock.progress(3) == pytest.approx(0.3)
     now[0] = 157.0
