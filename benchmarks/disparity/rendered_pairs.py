@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 from scenewright.stages.disparity.training.raft_stereo.kept_pairs import KeptPair, is_kept, keep
 from scenewright.stages.kit.formats.frames import FrameReader
-from scenewright.stages.suture.rig import TWO_CAMERAS, StereoRig
-from scenewright.stages.suture.world.render import render
-from scenewright.stages.suture.world.sampling import seen_scene
+from scenewright.stages.suture import TWO_CAMERAS, StereoRig, render, seen_scene
 
 from benchmarks.steps import made
 

@@ -7,7 +7,7 @@ Generated rooms (seeds 300 to 303) and the needle world (seeds 0 to 27, endoscop
 
 from __future__ import annotations
 
-from scenewright.stages.suture.rig import ENDOSCOPE
+from scenewright.stages.suture import ENDOSCOPE
 
 from benchmarks.disparity.rendered_pairs import needle_stem, room_stems
 from benchmarks.options import Recipe, asked

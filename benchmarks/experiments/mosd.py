@@ -28,12 +28,9 @@ from scenewright.stages.kit.formats.mosd_frames import (
 )
 from scenewright.stages.kit.measurement.object_masks import score_object_masks
 from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment import by_trees, read_trees, segment_objects, segment_plain
 from scenewright.stages.segment.backends.objects.backend import BUNDLED
-from scenewright.stages.segment.backends.objects.boosting import read_trees
-from scenewright.stages.segment.backends.objects.grouping import by_trees
 from scenewright.stages.segment.backends.objects.pairs import FEATURES
-from scenewright.stages.segment.backends.objects.plain import segment_plain
-from scenewright.stages.segment.backends.objects.segmentation import segment_objects
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, median
 

@@ -32,11 +32,17 @@ from scenewright.stages.kit.rendering.light_map import AreaLight
 from scenewright.stages.kit.rendering.patterns import PATTERNS, Material
 from scenewright.stages.kit.rendering.ray_casting import Rendering, SceneRenderer
 from scenewright.stages.kit.rendering.surfaces import TriangleSoup
-from scenewright.stages.segment.training.network.shards import DEPTH_UNIT, HEIGHT, WIDTH, Sample, write_shard
-from scenewright.stages.synthesize.arrangement import Arrangement, arrange, world_meshes
-from scenewright.stages.synthesize.furniture import Catalogue
-from scenewright.stages.synthesize.recipes import load_recipe, recipe_names
-from scenewright.stages.synthesize.shell import build_room
+from scenewright.stages.segment import Sample, write_shard
+from scenewright.stages.segment.training.network.shards import DEPTH_UNIT, HEIGHT, WIDTH
+from scenewright.stages.synthesize import (
+    Arrangement,
+    Catalogue,
+    arrange,
+    build_room,
+    load_recipe,
+    recipe_names,
+    world_meshes,
+)
 
 from benchmarks.options import Recipe, asked
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down

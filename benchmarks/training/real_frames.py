@@ -30,11 +30,10 @@ from scenewright.stages.kit.formats.mosd_frames import (
 )
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.segment.backends.network.features import input_camera, resized
-from scenewright.stages.segment.training.network.shards import DEPTH_UNIT, Sample, write_shard
+from scenewright.stages.segment import Sample, input_camera, resized, write_shard
+from scenewright.stages.segment.training.network.shards import DEPTH_UNIT
 from scenewright.stages.segment.training.network.targets import SOME_THING
-from scenewright.stages.truth.annotated_points import instances_of
-from scenewright.stages.truth.support_annotation import read_support_annotation
+from scenewright.stages.truth import instances_of, read_support_annotation
 
 from benchmarks.options import Recipe, asked
 from benchmarks.steps import made, opened

@@ -30,13 +30,9 @@ from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.open_words.answering import members_of
 from scenewright.stages.kit.open_words.vectors import read_vectors
-from scenewright.stages.splat.evaluate_stage import MARGIN
-from scenewright.stages.splat.language.looks import Sight
-from scenewright.stages.splat.strays import no_strays
-from scenewright.stages.splat.training.words.lexicon import FALSE, TRUE, Phrase, Thing, lexicon, truth_of
-from scenewright.stages.splat.views import PosedView, evenly, posed_frames, read_view
-from scenewright.stages.truth.annotated_points import instances_of
-from scenewright.stages.truth.support_annotation import read_support_annotation
+from scenewright.stages.splat import MARGIN, PosedView, Sight, evenly, lexicon, no_strays, posed_frames, read_view
+from scenewright.stages.splat.training.words.lexicon import FALSE, TRUE, Phrase, Thing, truth_of
+from scenewright.stages.truth import instances_of, read_support_annotation
 
 from benchmarks.generated_rooms import RoomFolder, make_room
 from benchmarks.perfect_maps import perfect_map

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pydantic import Field
-from scenewright.stages.splat.training.words.lexicon import lexicon
+from scenewright.stages.splat import lexicon
 from scenewright.stages.splat.training.words.samples import TRAINING_FILE, VALIDATION_FILE, write_samples
 
 from benchmarks.options import Recipe, asked

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from scenewright.stages.kit.measurement.bootstrap import Interval
-from scenewright.stages.tableware.training.thesis_times.printed import PRINTED
-from scenewright.stages.tableware.world.scenes import TIERS
+from scenewright.stages.tableware import PRINTED, TIERS
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, statistic
 from benchmarks.experiments.tidy_fast.arms import ARMS, DELAYS, DROPS_ON, OURS, SPILLS_ON, WORLDS, Run, trials
