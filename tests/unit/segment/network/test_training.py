@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
-from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.training.run import rate_at
 from scenewright.stages.segment.backends.network.features import CHANNELS, Mount, features
 from scenewright.stages.segment.backends.network.model import Widths
@@ -23,12 +22,9 @@ from scenewright.stages.segment.training.network.drawn_colors import compressed
 from scenewright.stages.segment.training.network.drawn_features import CameraBatch, MountBatch, features_of
 from scenewright.stages.segment.training.network.drawn_targets import targets_of
 from scenewright.stages.segment.training.network.samples import LABELS, FrameSet, Store, as_sample
+from scenewright.stages.segment.training.network.shards import DEPTH_UNIT, HEIGHT, WIDTH, Sample, write_shard
 from scenewright.stages.segment.training.network.targets import IGNORED, make_targets
 from scenewright.stages.segment.training.network.train import PEAK_RATE, WARM_UP, Clock, Feed, Plan, Run, class_weights
-
-from benchmarks.training.data import DEPTH_UNIT, HEIGHT, WIDTH, Sample, papered, write_shard
-from benchmarks.training.sensors import coarse_depth, lose_things
-from benchmarks.training.shapes import MAKERS, SMALL_MAKERS, Maker
 
 TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
 CAMERA = Camera(width=WIDTH, height=HEIGHT, fx=260.0, fy=260.0, cx=159.5, cy=119.5)
@@ -223,33 +219,3 @@ def test_the_clock_ends_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     assert clock.progress(3) == pytest.approx(0.95)
     now[0] = 400.0
     assert clock.progress(3) == 1.0
-
-
-@pytest.mark.parametrize("maker", {(m.class_name, m.make.__name__): m for m in (*MAKERS, *SMALL_MAKERS)}.values())
-def test_every_shape_is_of_a_class_and_can_be_drawn(maker: Maker) -> None:
-    assert load_vocabulary().by_name(maker.class_name)
-    for seed in range(5):
-        mesh = maker.make(np.random.default_rng(seed))
-        assert np.isfinite(mesh.vertices).all() and 0.01 < np.ptp(mesh.bounds, axis=0).max() < 7.0
-        again = maker.make(np.random.default_rng(seed))
-        assert np.array_equal(mesh.vertices, again.vertices)
-
-
-def test_prints_change_colours_of_things_alone() -> None:
-    instance = np.zeros((HEIGHT, WIDTH), np.int32)
-    instance[50:150, 60:200] = 4
-    color = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
-    printed = papered(color, instance, np.random.default_rng(2))
-    assert np.array_equal(printed[instance == 0], color[instance == 0]) and printed[instance == 4].std() > 5
-
-
-def test_other_sensors_lose_depth_and_never_invent_much() -> None:
-    true = np.full((HEIGHT, WIDTH), 2.0, np.float32)
-    true[:, 160:] = 1.2
-    instance = np.where(true < 1.5, 2, 1)
-    for seed in range(12):
-        random = np.random.default_rng(seed)
-        seen = coarse_depth(true, random)
-        assert seen.shape == true.shape and np.all((seen == 0) | ((seen > 1.1) & (seen < 2.1)))
-        lost = lose_things(true, instance, random)
-        assert np.all((lost == 0) | (lost == true))
