@@ -2,8 +2,8 @@
 
 Arms: `plain` (convex segments, one merging pass), `geometric` (patches over the table, geometry and colour, a table of
 rules), `ours` (the same patches, trained trees). Cases: `learn`, on which constants were set and trees trained, and
-`test`. Measures: stages/kit/measurement/object_masks.py; objects are label // 10 from 2 up, parts the raw labels. Draws frames.png,
-the worst and the best frames.
+`test`. Measures: stages/kit/measurement/object_masks.py; objects are label // 10 from 2 up, parts the raw labels. Draws
+frames.png, the worst and the best frames.
 """
 
 from __future__ import annotations
