@@ -91,6 +91,7 @@ clean: ## Remove everything that runs made (outputs/*)
 # `python -m benchmarks` lists the experiments. What is measured already is kept, trial by trial, until the code that it
 # was measured with changes. QUICK=1: fewer seeds, smaller trials; FRESH=1 measures again; OPTIONS="--arms ours --count 5".
 EXPERIMENT := $(PYTHON) -m benchmarks
+TRAIN := $(PYTHON) -m scenewright train
 ASKED = $(if $(QUICK),--quick) $(if $(FRESH),--fresh) $(OPTIONS)
 
 # The folder that holds the real logs (see docs/DATA.md); none of it is part of the project.
@@ -129,11 +130,14 @@ interpret: setup ## Words learned from corrections (InterPreT): the thesis's set
 # Six minutes of a GPU (DEVICE=cuda), about a day of one core (not run), rooms not counted; stands in data/words/two_towers.safetensors.
 # calibration.toml is fitted after it.
 .PHONY: words-train words-calibrate legs
+WORDS = $(OUTPUTS)/experiments/words-train$(if $(QUICK),-quick)
 words-train: setup ## Train the embedded encoder of pictures and words anew (QUICK=1: proves the recipe)
-	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.words.train $(if $(QUICK),--quick) $(if $(DEVICE),--device $(DEVICE)) --out $(OUTPUTS)/experiments/words-train$(if $(QUICK),-quick)
+	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.words.making $(if $(QUICK),--quick) --out $(WORDS)/samples
+	OMP_NUM_THREADS=1 $(TRAIN) words $(if $(QUICK),--quick) $(if $(DEVICE),--device $(DEVICE)) --samples $(WORDS)/samples --out $(WORDS)
 
 words-calibrate: setup ## Fit the probabilities of answers on tuning rooms (QUICK=1: one room; printed, not kept)
-	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.words.calibrate $(if $(QUICK),--quick,--write) --out $(OUTPUTS)/experiments/legs-words-tuning
+	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.words.asking $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/legs-words-tuning
+	OMP_NUM_THREADS=1 $(TRAIN) word-probabilities $(if $(QUICK),,--write) --places $(OUTPUTS)/experiments/legs-words-tuning --out $(OUTPUTS)/experiments/legs-words-tuning
 
 legs: setup ## Rooms as Gaussians, learned while pictures arrive, beside the thesis's method (QUICK=1: seconds, one room)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) legs --data $(REAL_DATA) --out $(OUTPUTS)/experiments/legs$(if $(QUICK),-quick) $(ASKED)
@@ -193,11 +197,11 @@ mosd-supports: setup ## Which object rests on which on real tabletop frames (QUI
 
 # About a quarter of an hour on one core; stands in data/networks/tabletop_pairs.safetensors.
 train-pairs: setup ## Train the trees of `segment --backend objects` anew (QUICK=1: few generated frames)
-	$(PYTHON) -m benchmarks.training.tabletop_pairs $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-pairs$(if $(QUICK),-quick)
+	$(TRAIN) tabletop-pairs $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-pairs$(if $(QUICK),-quick)
 
 # About a quarter of an hour on one core; prints what stands in stages/segment/backends/objects/rules.py.
 pair-rules: setup ## Fit the rules of `segment --backend objects` anew (QUICK=1: few generated frames)
-	$(PYTHON) -m benchmarks.training.pair_rules $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/pair-rules$(if $(QUICK),-quick)
+	$(TRAIN) pair-rules $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/pair-rules$(if $(QUICK),-quick)
 
 bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(EXPERIMENT) speed_fusion --out $(OUTPUTS)/experiments/bench-speed-fusion$(if $(QUICK),-quick) $(ASKED)
@@ -279,10 +283,10 @@ stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the the
 # Rendered views are kept in one folder for all three: 206 to train on and to validate with, 100 to report on.
 STITCH_VIEWS := $(OUTPUTS)/experiments/stitch-views
 stitch-train: setup ## Train the needle and thread network anew, an hour of a core with rendering (QUICK=1: 40 steps)
-	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)
-	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --steps 3000 --start $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)
-	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --cluttered --start $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-cluttered$(if $(QUICK),-quick)
-	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --cluttered --trials --steps 3000 --start $(OUTPUTS)/experiments/stitch-train-cluttered$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-trials$(if $(QUICK),-quick)
+	$(TRAIN) suture-network $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)
+	$(TRAIN) suture-network $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --steps 3000 --start $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)
+	$(TRAIN) suture-network $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --cluttered --start $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-cluttered$(if $(QUICK),-quick)
+	$(TRAIN) suture-network $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --cluttered --trials --steps 3000 --start $(OUTPUTS)/experiments/stitch-train-cluttered$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-trials$(if $(QUICK),-quick)
 
 stitch-segmentation: setup ## The network's masks on held-out views, and the needle's pose from them (QUICK=1: four views)
 	$(EXPERIMENT) stitch_segmentation --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-segmentation$(if $(QUICK),-quick) $(ASKED)
@@ -320,7 +324,8 @@ bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a de
 
 # Half an hour of one core with rendering; stop it and start it again at will.
 train-stereo: setup ## Train the small RAFT-Stereo on our own renderings (QUICK=1: 10 steps)
-	$(PYTHON) -m benchmarks.disparity.train $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-stereo$(if $(QUICK),-quick)
+	$(PYTHON) -m benchmarks.disparity.training_pairs $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-stereo$(if $(QUICK),-quick)/pairs
+	$(TRAIN) raft-stereo $(if $(QUICK),--quick) --pairs $(OUTPUTS)/experiments/train-stereo$(if $(QUICK),-quick)/pairs --out $(OUTPUTS)/experiments/train-stereo$(if $(QUICK),-quick)
 
 .PHONY: figures
 figures: setup ## Write every figure of README and docs anew from docs/results/*.json
@@ -335,10 +340,12 @@ pictures: setup ## Take the pictures of README and gallery out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo
 
 .PHONY: train-network bench-network
-# Hours for the frames and more for the training, on one core each; minutes with OPTIONS="--device cuda --workers 12". Stop it and start
-# it again at will.
+# Hours for the frames and more for the training, on one core each; minutes with OPTIONS="--device cuda" WORKERS=12. Stop it and
+# start it again at will. To ship it: cp NETWORK/run/panoptic.safetensors data/networks.
+NETWORK = $(OUTPUTS)/experiments/train-network$(if $(QUICK),-quick)
 train-network: setup ## Train a network for `segment --backend network` (QUICK=1: proves the recipe in a minute or two)
-	$(PYTHON) -m benchmarks.training $(if $(QUICK),--quick) $(OPTIONS) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-network$(if $(QUICK),-quick)
+	$(PYTHON) -m benchmarks.training $(if $(QUICK),--quick) $(if $(WORKERS),--workers $(WORKERS)) --data $(REAL_DATA) --out $(NETWORK)
+	$(TRAIN) network $(if $(QUICK),--quick) $(OPTIONS) --frames $(NETWORK)/data $$(if test -d $(NETWORK)/real; then echo --real $(NETWORK)/real; fi) --out $(NETWORK)/run
 
 bench-network: setup ## Our own network on rooms held back, real clouds and real logs (QUICK=1: fewer frames)
 	$(EXPERIMENT) network --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-network$(if $(QUICK),-quick) $(ASKED)

@@ -8,9 +8,14 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.ground_truth import GroundTruth
-from scenewright.stages.evaluate.graph_measures import GraphComparison, compare_graphs, optional_nodes
-from scenewright.stages.evaluate.parameters import EvaluateParameters
-from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.evaluate import (
+    EvaluateParameters,
+    GraphComparison,
+    TrueRoom,
+    compare_graphs,
+    load_truth,
+    optional_nodes,
+)
 from scenewright.stages.kit.measurement.edge_agreement import BESIDE_THE_TREE, DIRECTED, EdgeAgreement, edge_agreement
 
 from benchmarks.steps import opened

@@ -9,6 +9,7 @@ from typing import Any
 import typer
 from scenewright.cli import housekeeping
 from scenewright.cli.step_command import make_command
+from scenewright.cli.train_command import training_group
 from scenewright.stages.engine.discovery import all_stages, package_of
 
 logger = logging.getLogger("scenewright")
@@ -53,6 +54,7 @@ def build_application() -> Callable[..., Any]:
         for function in below:
             group_application.command()(function)
         application.add_typer(group_application, name=name, rich_help_panel=help_panel)
+    application.add_typer(training_group(), name="train", rich_help_panel="Training")
     application.callback()(housekeeping.root)
     table = typer.main.get_command(application)
 

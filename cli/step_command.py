@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
 from pathlib import Path
 from types import NoneType, UnionType
@@ -22,7 +22,7 @@ from scenewright.stages.engine.memory_limit import parse_limit
 from scenewright.stages.engine.runner import RunResult, run_stage
 from scenewright.stages.kit.configuration import parameters_for, read_config
 from scenewright.stages.kit.progress import progress_for
-from scenewright.stages.kit.stage import External, Optionally, Stage
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 _BOUNDS = (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below"))
 
@@ -94,9 +94,10 @@ def _input_options(stage: Stage) -> list[inspect.Parameter]:
     return options
 
 
-def _parameter_options(stage: Stage) -> list[inspect.Parameter]:
+def parameter_options(parameters: type[Parameters]) -> list[inspect.Parameter]:
+    """Return the options that typer reads, named `parameter_<name>`: None where one is not given."""
     options = []
-    for name, field in stage.parameters.model_fields.items():
+    for name, field in parameters.model_fields.items():
         annotation, extra = _option_type(field.annotation)
         flag = "--" + name.replace("_", "-")
         flags = [f"{flag}/--no-{flag[2:]}"] if _bare_type(field.annotation) is bool else [flag]
@@ -185,14 +186,18 @@ def report_result(result: RunResult, stage: Stage, accept: tuple[str, ...], json
     return 0
 
 
+def given_flags(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters that the command line gave, by name."""
+    flags = {name.removeprefix("parameter_"): value for name, value in options.items() if name.startswith("parameter_")}
+    return {name: value for name, value in flags.items() if value not in (None, [])}
+
+
 def make_command(stage: Stage) -> Callable[..., int]:
     """Return a function with the signature that typer reads for this step."""
 
     def command(**options: Any) -> int:
         config = read_config(options["config"]) if options["config"] else {}
-        flags = {name: options[f"parameter_{name}"] for name in stage.parameters.model_fields}
-        flags = {name: value for name, value in flags.items() if value not in (None, [])}
-        parameters = parameters_for(stage, flags, config, str(options["config"]))
+        parameters = parameters_for(stage, given_flags(options), config, str(options["config"]))
         if options.get("argument") is not None:
             if options[f"input_{stage.argument}"] is not None:
                 raise UsageError(f"{stage.name}: {stage.argument} is given twice", hint="see --help")
@@ -214,9 +219,14 @@ def make_command(stage: Stage) -> Callable[..., int]:
         )
         return report_result(result, stage, tuple(options["accept"] or ()), options["json_output"])
 
-    parameters = [*_input_options(stage), *_parameter_options(stage), *_common_options(stage)]
+    parameters = [*_input_options(stage), *parameter_options(stage.parameters), *_common_options(stage)]
+    text = f"{stage.summary}\n\nExample: {stage.example}" if stage.example else stage.summary
+    return named(command, stage.name, text, parameters)
+
+
+def named(command: Callable[..., int], name: str, text: str, parameters: list[inspect.Parameter]) -> Callable[..., int]:
+    """Give a function the name, the help and the signature that typer reads, and return it."""
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    command.__name__ = stage.name.replace(" ", "_")
-    command.__doc__ = f"{stage.summary}\n\nExample: {stage.example}" if stage.example else stage.summary
+    command.__name__, command.__doc__ = name.replace(" ", "_"), text
     return command

@@ -24,7 +24,7 @@ from scenewright.schemas.contact_graph import ContactGraph, GraphNode
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
-from scenewright.stages.cad.built_ins import is_built_in, may_be_built_in
+from scenewright.stages.cad import is_built_in, may_be_built_in
 from scenewright.stages.kit.formats.cad_models import load_collision_parts, part_transforms, posed_collision, read_model
 from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
 from scenewright.stages.kit.geometry.box_cover import cover_with_boxes

@@ -6,12 +6,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scenewright.stages.agent.arms.registry import ARMS
-from scenewright.stages.agent.judging import CAUSES, Score, score
-from scenewright.stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
-from scenewright.stages.agent.trials import Setting, run_trial
-from scenewright.stages.agent.world.failures import TABLE_3_4, Rates
-from scenewright.stages.agent.world.floor import Floor
+from scenewright.stages.agent import (
+    ARMS,
+    CAUSES,
+    TABLE_3_4,
+    TASKS,
+    THESIS_TASKS,
+    Floor,
+    Rates,
+    Score,
+    Setting,
+    make_apartment,
+    run_trial,
+    score,
+)
 
 from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Share, Trial, count, mean, pooled
 from benchmarks.tabulation import Figure, markdown

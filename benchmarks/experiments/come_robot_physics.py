@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from scenewright.stages.agent.judging import score
-from scenewright.stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
-from scenewright.stages.agent.trials import Setting, run_trial
-from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent import TASKS, THESIS_TASKS, Rates, Setting, make_apartment, run_trial, score
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.experiments.come_robot import MEASURES, Record, of_groups, record_of

@@ -7,14 +7,8 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
-from scenewright.stages.cutting.board import Board
-from scenewright.stages.cutting.demonstrations.recipes import CELLS
-from scenewright.stages.cutting.measure.scores import score
-from scenewright.stages.cutting.sight.laying import Hand
-from scenewright.stages.cutting.sight.seeing import see
-from scenewright.stages.cutting.sight.views import EYES, look
-from scenewright.stages.cutting.trying import goal_trial
-from scenewright.stages.cutting.world.body import Body
+from scenewright.stages.cutting import CELLS, Board, Body, Hand, goal_trial, look, score, see
+from scenewright.stages.cutting.sight.views import EYES
 from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
 

@@ -15,12 +15,11 @@ from pydantic import Field
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.scene_parts import TREE_RELATIONS
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
-from scenewright.stages.edit.map_state import read_state
-from scenewright.stages.evaluate.point_labels import nearest_labels
+from scenewright.stages.edit import read_state
+from scenewright.stages.evaluate import nearest_labels
 from scenewright.stages.kit.geometry.boxes import upright_box
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.truth.annotated_points import instances_of
-from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
+from scenewright.stages.truth import SupportAnnotation, instances_of, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean
 from benchmarks.experiments.edits.effort import Told, TrueNode, is_layout, put_room_right

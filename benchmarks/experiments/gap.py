@@ -22,10 +22,8 @@ from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
-from scenewright.stages.evaluate.graph_measures import ANY_CLASS, box_candidates, upright
-from scenewright.stages.evaluate.model_shapes import PlacedShape
-from scenewright.stages.evaluate.shape_loading import true_shapes
-from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.evaluate import PlacedShape, TrueRoom, box_candidates, load_truth, true_shapes
+from scenewright.stages.evaluate.graph_measures import ANY_CLASS, upright
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.geometry.boxes import box_from_bounds, box_iou

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.scene_parts import Relation
-from scenewright.stages.evaluate.graph_measures import GraphComparison, optional_nodes
-from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.evaluate import GraphComparison, TrueRoom, optional_nodes
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.generated_rooms import STEPS, make_room

@@ -18,8 +18,7 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.segments import Segments
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
-from scenewright.stages.evaluate.correspondence import point_overlaps
-from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.evaluate import TrueRoom, point_overlaps
 from scenewright.stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
 from scenewright.stages.kit.formats.ply_files import read_ply
 from scenewright.stages.kit.stage import Parameters

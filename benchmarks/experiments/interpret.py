@@ -18,31 +18,41 @@ from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.kit.tasks.pddl import domain_text
 from scenewright.stages.kit.tasks.strips import Atom, Domain
 from scenewright.stages.kit.tasks.task_planner import TaskPlan
-from scenewright.stages.predicates.execution import (
+from scenewright.stages.predicates import (
+    DOMAINS,
+    KITCHEN_GIVEN,
+    SETS,
+    STAND_IN,
     Abstraction,
     Attempt,
+    Done,
+    Memory,
+    OursLearner,
     Planner,
+    RandomLearner,
     Replayed,
     Replays,
+    SimulatedTeacher,
+    Task,
+    ThesisLearner,
+    ThesisMemory,
+    Training,
+    Wording,
     World,
+    allowed_accuracy,
     attempt,
+    balanced_accuracy,
+    drawn_cases,
+    expected_share,
+    kitchen_file,
     oracle,
+    stand_in,
+    tasks_of,
     timed_plan,
+    train,
+    true_domain,
+    truth_of,
 )
-from scenewright.stages.predicates.learning.memory import Memory
-from scenewright.stages.predicates.learning.opening import STAND_IN
-from scenewright.stages.predicates.learning.ours import OursLearner
-from scenewright.stages.predicates.learning.random_exploration import RandomLearner
-from scenewright.stages.predicates.learning.setting import KITCHEN_GIVEN
-from scenewright.stages.predicates.learning.thesis import ThesisLearner, stand_in
-from scenewright.stages.predicates.learning.thesis_memory import ThesisMemory
-from scenewright.stages.predicates.measure.accuracy import balanced_accuracy, drawn_cases
-from scenewright.stages.predicates.measure.operators import Done, allowed_accuracy, expected_share
-from scenewright.stages.predicates.tasks import SETS, Task, tasks_of
-from scenewright.stages.predicates.teacher.simulated import SimulatedTeacher, Wording
-from scenewright.stages.predicates.training import Training, train
-from scenewright.stages.predicates.truth import true_domain, truth_of
-from scenewright.stages.predicates.world.catalogue import DOMAINS, kitchen_file
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.tabulation import markdown

@@ -29,12 +29,10 @@ from scenewright.stages.kit.formats.frames import CAMERA_FRAME, FrameReader
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.rendering.splatting.rasterizer import View
 from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.splat import PosedView, Trainer, evenly, held_out, posed_frames, read_view, with_points
 from scenewright.stages.splat.build_stage import method_of, rasterizer_of
 from scenewright.stages.splat.building import placed_poses
 from scenewright.stages.splat.render_stage import figures_of
-from scenewright.stages.splat.training import Trainer
-from scenewright.stages.splat.triangulation import with_points
-from scenewright.stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
 
 from benchmarks.experiment import Bench, Experiment, Interval, Results, Trial, mean, ratio
 from benchmarks.experiments.mapping.drift import drifting_poses

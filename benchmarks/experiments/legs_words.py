@@ -33,9 +33,8 @@ from scenewright.stages.kit.open_words.relevancy import margins, query_rows, rel
 from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from scenewright.stages.kit.rendering.splatting.rasterizer import View
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.splat.asked_figures import calibration_error, recall_at_rejection
+from scenewright.stages.splat import calibration_error, read_gaussians, recall_at_rejection
 from scenewright.stages.splat.language.pyramid import pyramid
-from scenewright.stages.splat.ply import read_gaussians
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.experiments.real import EXPECTED

@@ -2,8 +2,8 @@
 
 Arms: `plain` (convex segments, one merging pass), `geometric` (patches over the table, geometry and colour, a table of
 rules), `ours` (the same patches, trained trees). Cases: `learn`, on which constants were set and trees trained, and
-`test`. Measures: benchmarks/object_masks.py; objects are label // 10 from 2 up, parts the raw labels. Draws frames.png,
-the worst and the best frames.
+`test`. Measures: stages/kit/measurement/object_masks.py; objects are label // 10 from 2 up, parts the raw labels. Draws
+frames.png, the worst and the best frames.
 """
 
 from __future__ import annotations
@@ -17,17 +17,22 @@ import cv2
 import numpy as np
 from pydantic import Field
 from scenewright.stages.kit.drawing.palette import instance_color
+from scenewright.stages.kit.formats.mosd_frames import (
+    CAMERA,
+    FOLDER,
+    LabelledFrame,
+    frame_files,
+    frame_names,
+    kind_of,
+    read_frame,
+)
+from scenewright.stages.kit.measurement.object_masks import score_object_masks
 from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment import by_trees, read_trees, segment_objects, segment_plain
 from scenewright.stages.segment.backends.objects.backend import BUNDLED
-from scenewright.stages.segment.backends.objects.boosting import read_trees
-from scenewright.stages.segment.backends.objects.grouping import by_trees
 from scenewright.stages.segment.backends.objects.pairs import FEATURES
-from scenewright.stages.segment.backends.objects.plain import segment_plain
-from scenewright.stages.segment.backends.objects.segmentation import segment_objects
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, median
-from benchmarks.mosd_frames import CAMERA, FOLDER, LabelledFrame, frame_files, frame_names, kind_of, read_frame
-from benchmarks.object_masks import score_object_masks
 
 QUICK_STEP = 5
 """Every how many-th frame with --quick."""

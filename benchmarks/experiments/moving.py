@@ -19,8 +19,8 @@ from scenewright.schemas.articulations import Articulation
 from scenewright.schemas.cad_library import CadLibrary, CadModel
 from scenewright.schemas.ground_truth import GroundTruth, TrueObject
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
+from scenewright.stages.articulate import ArticulateParameters
 from scenewright.stages.articulate.joints import Cloud
-from scenewright.stages.articulate.parameters import ArticulateParameters
 from scenewright.stages.articulate.stage import Used, gather, grid_of, regions_of, run, watch
 from scenewright.stages.kit.formats.cad_models import load_collision_parts, model_folder, part_transforms
 from scenewright.stages.kit.formats.frames import FrameReader

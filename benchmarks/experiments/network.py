@@ -25,22 +25,26 @@ from scenewright.schemas.sequence import Sequence as SequenceArtifact
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.drawing.palette import entity_color
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
+from scenewright.stages.kit.measurement.object_masks import score_object_masks
 from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.segment.backends.network.backend import Predictor, load_predictor
-from scenewright.stages.segment.backends.network.features import mount_of_pose
+from scenewright.stages.segment import (
+    PanopticFrame,
+    Predictor,
+    SegmentParameters,
+    fuse,
+    fusion_settings,
+    geometric_settings,
+    load_predictor,
+    mount_of_pose,
+    segment_depth,
+)
 from scenewright.stages.segment.backends.network.weights import BUNDLED
-from scenewright.stages.segment.fusion_ours import fuse
-from scenewright.stages.segment.geometric import segment_depth
-from scenewright.stages.segment.panoptic import PanopticFrame
-from scenewright.stages.segment.parameters import SegmentParameters
-from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.mapping.figures_of_merit import summed_qualities
 from benchmarks.generated_rooms import FIRST_REPORTING, STEPS, make_room
-from benchmarks.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
-from benchmarks.object_masks import score_object_masks
 from benchmarks.steps import made, opened
 
 ROOMS, CLOUDS = "rooms", "mosd_test"

@@ -33,7 +33,7 @@ from scenewright.stages.kit.measurement.relative_pose_error import trajectory_dr
 from scenewright.stages.kit.registration.alignment import judge
 from scenewright.stages.kit.registration.pyramid import build_pyramid
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.poses.world import laid_onto
+from scenewright.stages.poses import laid_onto
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial, only
 from benchmarks.experiments.mapping.drift import drifting_poses

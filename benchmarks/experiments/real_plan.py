@@ -21,7 +21,7 @@ from scenewright.schemas.sequence import Sequence as SequenceArtifact
 from scenewright.stages.kit.formats.trajectories import read_tum
 from scenewright.stages.kit.geometry.boxes import transform_points_to_box, upright_box
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.truth.support_annotation import AnnotatedNode, read_support_annotation
+from scenewright.stages.truth import AnnotatedNode, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.steps import made, opened

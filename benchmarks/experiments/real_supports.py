@@ -21,8 +21,7 @@ from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.truth.annotated_points import instances_of
-from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
+from scenewright.stages.truth import SupportAnnotation, instances_of, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.perfect_maps import write_map

@@ -19,8 +19,7 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.truth.annotated_points import instances_of
-from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
+from scenewright.stages.truth import SupportAnnotation, instances_of, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Trial, only
 from benchmarks.steps import opened, step

@@ -21,10 +21,16 @@ from pydantic import Field
 from scenewright.schemas.cad_scene import CadScene
 from scenewright.schemas.outside import file_json
 from scenewright.schemas.panoptic_map import PanopticMap
-from scenewright.stages.evaluate.alignment_errors import alignment_error
-from scenewright.stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape, sample_triangles
-from scenewright.stages.evaluate.replacement_measures import retrieval_rank
-from scenewright.stages.evaluate.shape_loading import model_shape, placed_candidate
+from scenewright.stages.evaluate import (
+    ModelShape,
+    PartShape,
+    PlacedShape,
+    alignment_error,
+    model_shape,
+    placed_candidate,
+    retrieval_rank,
+    sample_triangles,
+)
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.stage import Parameters
 from scipy.spatial import cKDTree

@@ -20,7 +20,7 @@ from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, Raste
 from scenewright.stages.kit.rendering.splatting.reference import ReferenceRasterizer
 from scenewright.stages.splat.build_stage import method_of
 from scenewright.stages.splat.seeding import Seeds
-from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.trainer import Trainer
 from scenewright.stages.splat.views import PosedView
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial, mean, median

@@ -21,16 +21,23 @@ from scenewright.schemas.suture_needle import SutureNeedle
 from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.kit.measurement.proportions import wilson_interval
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.suture.evaluation.judgement import judged
-from scenewright.stages.suture.masks import learned_masks, spoiled_masks
-from scenewright.stages.suture.needle.estimate import estimate
-from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from scenewright.stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
+from scenewright.stages.suture import (
+    ENDOSCOPE,
+    TWO_CAMERAS,
+    NeedleEstimate,
+    NeedleObservation,
+    Segmenter,
+    StereoView,
+    cluttered,
+    estimate,
+    false_masks,
+    judged,
+    learned_masks,
+    render,
+    seen_scene,
+    spoiled_masks,
+)
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
-from scenewright.stages.suture.segmentation.infer import Segmenter
-from scenewright.stages.suture.world.clutter import cluttered, false_masks
-from scenewright.stages.suture.world.render import StereoView, render
-from scenewright.stages.suture.world.sampling import seen_scene
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count
 from benchmarks.reporting_seeds import Method, newest

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pydantic import Field
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.suture.options import ARM_NAMES
+from scenewright.stages.suture import ARM_NAMES
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.steps import made

@@ -16,14 +16,23 @@ from tempfile import TemporaryDirectory
 import cv2
 import numpy as np
 import torch
-from scenewright.stages.suture.evaluation.judgement import judged
-from scenewright.stages.suture.following import Follower, growing_pairs, name_of
-from scenewright.stages.suture.masks import masks_in, network_masks
-from scenewright.stages.suture.needle.observation import NeedleEstimate
-from scenewright.stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, NeedlePose
-from scenewright.stages.suture.world.render import StereoView, render
-from scenewright.stages.suture.world.sampling import seen_scene
-from scenewright.stages.suture.world.scene import moved_scene, random_motions
+from scenewright.stages.suture import (
+    ENDOSCOPE,
+    NEEDLE_RADIUS,
+    Follower,
+    NeedleEstimate,
+    NeedlePose,
+    StereoView,
+    growing_pairs,
+    judged,
+    masks_in,
+    moved_scene,
+    network_masks,
+    random_motions,
+    render,
+    seen_scene,
+)
+from scenewright.stages.suture.following import name_of
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 

@@ -12,13 +12,18 @@ from collections.abc import Iterator, Sequence
 
 import cv2
 from scenewright.schemas.suture_trial import SutureRun
-from scenewright.stages.suture.options import ARM_NAMES
+from scenewright.stages.suture import (
+    ARM_NAMES,
+    POLICIES,
+    Looked,
+    LookingEyes,
+    PerceptionModel,
+    perception_model,
+    run_of,
+    run_trial,
+)
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
-from scenewright.stages.suture.trials.machine import run_trial
-from scenewright.stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
-from scenewright.stages.suture.trials.policies import POLICIES
-from scenewright.stages.suture.trials.records import run_of
-from scenewright.stages.suture.trials.sight import Looked, LookingEyes
+from scenewright.stages.suture.trials.perception import FOLDER
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.experiments.stitch_trials.arms import NETWORK_EYES

@@ -25,20 +25,32 @@ from pydantic import Field
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.measurement.bootstrap import Interval, figure_interval
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.tableware.actions.stack import Stack
-from scenewright.stages.tableware.dishes_file import estimated_setting
-from scenewright.stages.tableware.planning.choice import make_policy
-from scenewright.stages.tableware.planning.time_model import EXACT, fitted
-from scenewright.stages.tableware.sight import setting_seen, understood
-from scenewright.stages.tableware.simulation.fast import FastWorld
-from scenewright.stages.tableware.simulation.trial import Done, run_in
-from scenewright.stages.tableware.vision.image_files import read_image
-from scenewright.stages.tableware.vision.overlay import draw_outlines, draw_sight
-from scenewright.stages.tableware.vision.photographs import Outline, find_outlines
-from scenewright.stages.tableware.vision.seeing import Sight, Sizes, see, seen_from_the_side
-from scenewright.stages.tableware.vision.size_estimation import Limits, estimated_dishes
-from scenewright.stages.tableware.world.items import Table
-from scenewright.stages.tableware.world.setting import Gripper, Setting
+from scenewright.stages.tableware import (
+    EXACT,
+    FastWorld,
+    Gripper,
+    Limits,
+    Outline,
+    Setting,
+    Sight,
+    Sizes,
+    Stack,
+    Table,
+    draw_outlines,
+    draw_sight,
+    estimated_dishes,
+    estimated_setting,
+    find_outlines,
+    make_policy,
+    read_image,
+    run_in,
+    see,
+    seen_from_the_side,
+    setting_seen,
+    understood,
+)
+from scenewright.stages.tableware.planning.time_model import fitted
+from scenewright.stages.tableware.simulation.trial import Done
 from scipy.optimize import linear_sum_assignment
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial

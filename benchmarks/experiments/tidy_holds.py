@@ -12,10 +12,17 @@ from dataclasses import dataclass, replace
 from math import cos, hypot, pi, sin
 
 import numpy as np
-from scenewright.stages.tableware.actions.grasp import grasp, grasp_two
-from scenewright.stages.tableware.simulation.physics import PhysicsTable
-from scenewright.stages.tableware.world.footprints import footprint
-from scenewright.stages.tableware.world.items import Item, Kind, Table, make_item, stand_height
+from scenewright.stages.tableware import (
+    Item,
+    Kind,
+    PhysicsTable,
+    Table,
+    footprint,
+    grasp,
+    grasp_two,
+    make_item,
+    stand_height,
+)
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean, median, share
 

@@ -14,13 +14,15 @@ from dataclasses import dataclass, replace
 
 from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.kit.measurement.proportions import wilson_interval
-from scenewright.stages.tableware.planning.choice import make_policy
-from scenewright.stages.tableware.planning.joint import JointPolicy
-from scenewright.stages.tableware.planning.policy import Policy
-from scenewright.stages.tableware.planning.time_model import EXACT
-from scenewright.stages.tableware.simulation.arm_times import arm_times
-from scenewright.stages.tableware.simulation.physics_trial import run_physics_trial
-from scenewright.stages.tableware.world.scenes import make_table
+from scenewright.stages.tableware import (
+    EXACT,
+    JointPolicy,
+    Policy,
+    arm_times,
+    make_policy,
+    make_table,
+    run_physics_trial,
+)
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.experiments.tidy_fast.arms import DELAYS, OURS

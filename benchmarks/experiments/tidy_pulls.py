@@ -14,12 +14,19 @@ from functools import partial
 from math import cos, hypot, pi, sin
 
 import numpy as np
-from scenewright.stages.tableware.actions.pull import Pull
-from scenewright.stages.tableware.actions.pull_grasp import pull_grasp
-from scenewright.stages.tableware.planning.rules import Rules
+from scenewright.stages.tableware import (
+    STANDARD,
+    Kind,
+    PhysicsTable,
+    Pull,
+    Rules,
+    Speeds,
+    Table,
+    make_item,
+    pull_grasp,
+    stand_height,
+)
 from scenewright.stages.tableware.simulation.holds import PAD, PAD_WIDTH
-from scenewright.stages.tableware.simulation.physics import PhysicsTable, Speeds
-from scenewright.stages.tableware.world.items import STANDARD, Kind, Table, make_item, stand_height
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, share
 

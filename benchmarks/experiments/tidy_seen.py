@@ -10,12 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from scenewright.stages.tableware.planning.choice import make_policy
+from scenewright.stages.tableware import TIERS, Eyes, FastWorld, make_policy, make_table, run_in
 from scenewright.stages.tableware.planning.time_model import fitted
-from scenewright.stages.tableware.sight import Eyes
-from scenewright.stages.tableware.simulation.fast import FastWorld
-from scenewright.stages.tableware.simulation.trial import run_in
-from scenewright.stages.tableware.world.scenes import TIERS, make_table
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean
 from benchmarks.experiments.tidy_detect.experiment import conditions

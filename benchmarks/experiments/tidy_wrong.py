@@ -13,13 +13,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.kit.measurement.bootstrap import Interval
-from scenewright.stages.tableware.planning.joint import JointPolicy, plan
-from scenewright.stages.tableware.planning.policy import Policy
-from scenewright.stages.tableware.planning.time_model import Chances, TimeModel, fitted
-from scenewright.stages.tableware.policies.pull import PullPolicy
-from scenewright.stages.tableware.policies.stack import StackPolicy
-from scenewright.stages.tableware.simulation.fast import run_trial
-from scenewright.stages.tableware.world.scenes import make_table
+from scenewright.stages.tableware import (
+    Chances,
+    JointPolicy,
+    Policy,
+    PullPolicy,
+    StackPolicy,
+    TimeModel,
+    make_table,
+    plan,
+    run_trial,
+)
+from scenewright.stages.tableware.planning.time_model import fitted
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, ratio
 from benchmarks.experiments.tidy_fast.arms import OURS, WORLDS

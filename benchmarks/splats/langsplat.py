@@ -21,7 +21,7 @@ from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.open_words.encoder import Encoder
 from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
 from scenewright.stages.kit.rendering.splatting.rasterizer import Picture, Rasterizer, View
-from scenewright.stages.splat.language.looks import Sight
+from scenewright.stages.splat import Sight
 from scenewright.stages.splat.language.pieces import pieces
 from scipy.spatial import cKDTree
 from torch import nn

@@ -17,10 +17,10 @@ import numpy as np
 import torch
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.geometry.transforms import inverse
-from scenewright.stages.splat.language.field import ENTRIES, HashGrid, LanguageField, Space
+from scenewright.stages.splat import HashGrid, LanguageField, PosedView
+from scenewright.stages.splat.language.field import ENTRIES, Space
 from scenewright.stages.splat.language.pyramid import Level
 from scenewright.stages.splat.methods.method import Rate
-from scenewright.stages.splat.views import PosedView
 from torch import nn
 
 RAYS, FIRST_SAMPLES, SAMPLES, LANGUAGE_SAMPLES = 512, 48, 32, 24

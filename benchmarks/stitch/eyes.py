@@ -10,12 +10,17 @@ from contextlib import suppress
 import cv2
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.suture.motion.needle import ARC_POINTS
-from scenewright.stages.suture.rig import TWO_CAMERAS
-from scenewright.stages.suture.trials.machine import run_trial
-from scenewright.stages.suture.trials.perception import FOLDER, Seen, perception_model
-from scenewright.stages.suture.trials.policies import POLICIES
-from scenewright.stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes
+from scenewright.stages.suture import (
+    ARC_POINTS,
+    PICTURED_FROM_TRIAL,
+    POLICIES,
+    TWO_CAMERAS,
+    LookingEyes,
+    Seen,
+    perception_model,
+    run_trial,
+)
+from scenewright.stages.suture.trials.perception import FOLDER
 
 ACROSS, STATES, SHOWN = 3, 9, (640, 480)
 YELLOW, WHITE = (60, 220, 250), (255, 255, 255)

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.tableware.simulation.arm_times import FILE, ArmTimes
+from scenewright.stages.tableware import ArmTimes
+from scenewright.stages.tableware.simulation.arm_times import FILE
 from scipy.optimize import nnls
 
 from benchmarks.experiments.tidy_physics import Run, delay_of

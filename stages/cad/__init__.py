@@ -1,0 +1,26 @@
+"""Step `cad`: models of a library take the places of what a map found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from scenewright.stages.kit.exports import exported
+
+if TYPE_CHECKING:
+    from scenewright.stages.cad.built_ins import is_built_in, may_be_built_in
+    from scenewright.stages.cad.candidates import Shortlist
+    from scenewright.stages.cad.model_surfaces import ModelSurface
+    from scenewright.stages.cad.parameters import CadParameters
+    from scenewright.stages.cad.stage import choose_and_write, find_candidates
+
+_MODULES = {
+    "is_built_in": "scenewright.stages.cad.built_ins",
+    "may_be_built_in": "scenewright.stages.cad.built_ins",
+    "Shortlist": "scenewright.stages.cad.candidates",
+    "ModelSurface": "scenewright.stages.cad.model_surfaces",
+    "CadParameters": "scenewright.stages.cad.parameters",
+    "choose_and_write": "scenewright.stages.cad.stage",
+    "find_candidates": "scenewright.stages.cad.stage",
+}
+
+__getattr__ = exported(__name__, _MODULES)

@@ -1,6 +1,7 @@
 """Finding the steps: every folder stages/<name>/ with a parameters.py is one, and nothing else has to be told.
 
-So is every package that an installed distribution names in the entry points of `STEPS`.
+So is every package that an installed distribution names in the entry points of `STEPS`. The trainings of ours are found
+alike: every folder stages/<name>/training/<training>/.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ from pathlib import Path
 
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.plugins import installed, taken
+from scenewright.stages.kit.declared import declared_in
 from scenewright.stages.kit.stage import Stage
+from scenewright.stages.kit.training.declaration import TrainingDeclaration
 
 STAGES_FOLDER = Path(__file__).resolve().parents[1]
 OURS = "scenewright.stages"
@@ -67,3 +70,18 @@ def stage_by_name(name: str) -> Stage:
     if name not in stages:
         raise UsageError(f"no step {name!r}", hint=f"steps are: {', '.join(stages)}")
     return stages[name]
+
+
+@cache
+def all_trainings() -> dict[str, TrainingDeclaration]:
+    """Return every declared training by its name, step by step. Imports declarations only."""
+    found: dict[str, TrainingDeclaration] = {}
+    for folder in sorted({stage.folder for stage in all_stages().values()}):
+        package = f"scenewright.stages.{folder}.training"
+        if not (STAGES_FOLDER / folder / "training").is_dir():
+            continue
+        for training in declared_in(package, TrainingDeclaration, "TRAINING"):
+            if training.name in found:
+                raise RuntimeError(f"training {training.name!r} is declared twice: {package}")
+            found[training.name] = training
+    return found

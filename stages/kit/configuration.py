@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from pydantic import ValidationError
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.outside import file_toml
-from scenewright.stages.kit.stage import NOT_SHOWN, Parameters, Stage
+from scenewright.stages.kit.stage import NOT_SHOWN, Parameters
+
+Kind = TypeVar("Kind", bound=Parameters, covariant=True)
 
 LARGEST_TOML = 16 * 2**20
 """Largest configuration file [bytes]."""
@@ -25,10 +27,27 @@ def read_toml(path: Path, *, hint: str) -> dict[str, Any]:
     return file_toml(path, LARGEST_TOML, error=UsageError, hint=hint)
 
 
+class WithParameters(Protocol[Kind]):
+    """A step or a training."""
+
+    @property
+    def name(self) -> str:
+        """Its command."""
+        ...
+
+    @property
+    def parameters(self) -> type[Kind]:
+        """The kind of its options."""
+        ...
+
+
 def parameters_for(
-    stage: Stage, flags: Mapping[str, Any], config: Mapping[str, Any] | None = None, config_name: str = "config"
-) -> Parameters:
-    """Build the parameters of a step. Raises UsageError naming the option and the allowed range."""
+    stage: WithParameters[Kind],
+    flags: Mapping[str, Any],
+    config: Mapping[str, Any] | None = None,
+    config_name: str = "config",
+) -> Kind:
+    """Build the parameters of a step or a training. Raises UsageError naming the option and the allowed range."""
     values = dict(config or {})
     unknown = sorted(set(values) - set(stage.parameters.model_fields))
     if unknown:

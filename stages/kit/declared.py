@@ -75,6 +75,6 @@ def load_beside(package: str, module: str) -> ModuleType:
     return importlib.import_module(f"{package}.{module}")
 
 
-def declared_in(package: str, kind: type[Declared], attribute: str, group: str) -> tuple[Declared, ...]:
+def declared_in(package: str, kind: type[Declared], attribute: str, group: str = "") -> tuple[Declared, ...]:
     """Return the declarations of `found_in`."""
     return tuple(one.declaration for one in found_in(package, kind, attribute, group))

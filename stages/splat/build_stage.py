@@ -19,7 +19,7 @@ from scenewright.stages.splat.checkpoints import read_checkpoint, write_checkpoi
 from scenewright.stages.splat.methods.method import Method
 from scenewright.stages.splat.parameters import BuildParameters
 from scenewright.stages.splat.ply import write_gaussians
-from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.trainer import Trainer
 from scenewright.stages.splat.triangulation import with_points
 from scenewright.stages.splat.views import evenly, held_out, posed_frames, read_view
 from scipy.spatial.transform import Rotation

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.registration.rigid_motion import fraction
-from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.trainer import Trainer
 from scenewright.stages.splat.views import PosedView
 
 LAST = 100

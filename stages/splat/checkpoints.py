@@ -14,7 +14,7 @@ from scenewright.stages.kit.formats.numpy_files import read_all_arrays
 from scenewright.stages.kit.registration.pose_graph import Edge
 from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
 from scenewright.stages.splat.building import Arrival
-from scenewright.stages.splat.training import Learned, Trainer, TrainerState
+from scenewright.stages.splat.trainer import Learned, Trainer, TrainerState
 
 FILE = "checkpoint.npz"
 FACTS = ("steps", "rounds", "was_reset")

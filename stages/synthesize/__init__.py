@@ -1,1 +1,35 @@
 """Rooms from seeded recipes, rendered as RGB-D logs with everything that is true of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from scenewright.stages.kit.exports import exported
+
+if TYPE_CHECKING:
+    from scenewright.stages.synthesize.arrangement import Arrangement, arrange, world_meshes
+    from scenewright.stages.synthesize.furniture import Catalogue
+    from scenewright.stages.synthesize.placement import PlacedObject
+    from scenewright.stages.synthesize.recipes import load_recipe, recipe_names
+    from scenewright.stages.synthesize.seen_surface import SeenSurface
+    from scenewright.stages.synthesize.shell import build_room
+    from scenewright.stages.synthesize.truth import object_boxes, scene_bodies, true_graph
+    from scenewright.stages.synthesize.viewpoints import blocked_floor
+
+_MODULES = {
+    "Arrangement": "scenewright.stages.synthesize.arrangement",
+    "arrange": "scenewright.stages.synthesize.arrangement",
+    "world_meshes": "scenewright.stages.synthesize.arrangement",
+    "Catalogue": "scenewright.stages.synthesize.furniture",
+    "PlacedObject": "scenewright.stages.synthesize.placement",
+    "load_recipe": "scenewright.stages.synthesize.recipes",
+    "recipe_names": "scenewright.stages.synthesize.recipes",
+    "SeenSurface": "scenewright.stages.synthesize.seen_surface",
+    "build_room": "scenewright.stages.synthesize.shell",
+    "object_boxes": "scenewright.stages.synthesize.truth",
+    "scene_bodies": "scenewright.stages.synthesize.truth",
+    "true_graph": "scenewright.stages.synthesize.truth",
+    "blocked_floor": "scenewright.stages.synthesize.viewpoints",
+}
+
+__getattr__ = exported(__name__, _MODULES)

@@ -253,6 +253,35 @@ for step in refinement.refine_plan(model, state, actions, Budgets(1, 1, 1, 1), r
     assert "wipe(table) table" in printed and "table is dirty" in printed and "shines" in printed
 
 
+def test_a_training(tmp_path: Path) -> None:
+    write(
+        tmp_path / "spots",
+        __init__="""
+from pydantic import Field
+from scenewright.stages.kit.training.declaration import TrainingDeclaration, TrainingParameters
+class SpotsTraining(TrainingParameters):
+    rounds: int = Field(3, ge=1, description="Rounds")
+TRAINING = TrainingDeclaration("spots", "spots of a kind", __name__, SpotsTraining)
+""",
+        train="def train(options, out):\n    (out / 'spots').write_text(f'{options.rounds} {options.quick}')\n",
+    )
+    made = tmp_path / "made"
+    printed = with_plugin(
+        "scenewright.stages.segment.training",
+        tmp_path,
+        f"""
+import sys
+from scenewright.cli.main import run
+run(["train"]); run(["train", "spots", "--help"])
+print([name for name in sys.modules if name.endswith(".train")])
+assert run(["train", "spots", "--rounds", "0", "--out", {str(made)!r}]) == 2
+assert run(["train", "spots", "--rounds", "5", "--quick", "--out", {str(made)!r}]) == 0
+""",
+    )
+    assert "spots of a kind" in printed and "--rounds" in printed and "\n[]\n" in printed
+    assert (made / "spots").read_text() == "5 True"
+
+
 def test_what_declares_nothing_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import scenewright.stages.segment.backends as package
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
+import re
 import sys
 import tempfile
 from functools import cache
@@ -13,7 +15,7 @@ import networkx
 import pytest
 from scenewright.stages.engine.discovery import all_stages
 
-from tests.wheel_layout import link_packages
+from tests.wheel_layout import REPOSITORY, link_packages
 
 PACKAGES = ("scenewright", "benchmarks")
 
@@ -155,6 +157,52 @@ def test_cores_that_others_will_drive_need_no_stage(core: str) -> None:
     """An agent that maps while it acts takes the mapper without the step around it."""
     module = f"scenewright.stages.{core}"
     assert graph().find_shortest_chain(module, f"scenewright.stages.{floor(module)}.stage") is None
+
+
+TRAINED = re.compile(r"scenewright\.stages\.(\w+)\.training\.\w")
+
+
+def test_nothing_that_a_step_runs_imports_a_training() -> None:
+    """A training is not part of what a step's `run` reaches. A step's package may export what experiments share with
+    its training."""
+    wrong = [
+        f"{module} imports {imported}"
+        for module in ours()
+        if floor(module) in steps() and module.count(".") > 2 and not TRAINED.match(module)
+        for imported in sorted(graph().find_modules_directly_imported_by(module))
+        if TRAINED.match(imported) and floor(imported) in steps()
+    ]
+    assert not wrong
+
+
+MOST_DEEP_LINES = 120
+"""Import lines of benchmarks into the inside of steps; the others are of names that a step's package exports."""
+
+
+def test_experiments_reach_steps_through_names_that_they_export() -> None:
+    deep = []
+    for file in sorted((REPOSITORY / "benchmarks").rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            named = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            named += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            deep += [f"{file.name}: {name}" for name in named if name.count(".") > 2 and floor(name) in steps()]
+    assert len(deep) < MOST_DEEP_LINES, "import from the step's package; export there what experiments need of it"
+
+
+@pytest.mark.parametrize("step", sorted(steps()))
+def test_what_type_checkers_see_of_a_package_is_what_it_exports(step: str) -> None:
+    package = importlib.import_module(f"scenewright.stages.{step}")
+    tree = ast.parse(Path(str(package.__file__)).read_text())
+    seen = {
+        alias.name: node.module
+        for block in tree.body
+        if isinstance(block, ast.If)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert seen == getattr(package, "_MODULES", {})
+    assert not [name for name in seen if (REPOSITORY / "stages" / step / f"{name}.py").exists()], "a module's own name"
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scenewright.stages.cutting.demonstrations.recipes import CELLS, TRAINING_SHARE
-from scenewright.stages.cutting.demonstrations.trials import make_trial
-from scenewright.stages.cutting.evaluate_stage import attempt
-from scenewright.stages.cutting.methods import Learned, learn_methods
-from scenewright.stages.cutting.ours.imagining import imagine
-from scenewright.stages.cutting.policy import carry_out
-from scenewright.stages.cutting.world.foods import make_food
+from scenewright.stages.cutting import CELLS, Learned, attempt, carry_out, imagine, learn_methods, make_food, make_trial
+from scenewright.stages.cutting.demonstrations.recipes import TRAINING_SHARE
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.tabulation import markdown

@@ -7,10 +7,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scenewright.stages.disparity.parameters import DisparityParameters
-from scenewright.stages.disparity.raft.checkpoint import load_network
-from scenewright.stages.disparity.raft.matching import estimated, larger, moved_right, open_raft, smaller, start_of
-from scenewright.stages.disparity.semi_global import SemiGlobalSettings, gray_of, match
+from scenewright.stages.disparity import (
+    DisparityParameters,
+    SemiGlobalSettings,
+    gray_of,
+    load_network,
+    match,
+    moved_right,
+    open_raft,
+)
+from scenewright.stages.disparity.raft.matching import estimated, larger, smaller, start_of
 from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 
 Arm = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]

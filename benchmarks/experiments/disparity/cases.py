@@ -9,12 +9,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scenewright.stages.disparity.rectification import matched_features
-from scenewright.stages.disparity.semi_global import gray_of
+from scenewright.stages.disparity import gray_of, matched_features
+from scenewright.stages.disparity.training.raft_stereo.kept_pairs import kept
 from scenewright.stages.kit.formats.frames import FrameReader
-from scenewright.stages.suture.world.tubes import NEEDLE, THREAD
+from scenewright.stages.suture import NEEDLE, THREAD
 
-from benchmarks.disparity.rendered_pairs import kept, needle_stem, room_stems
+from benchmarks.disparity.rendered_pairs import needle_stem, room_stems
 from benchmarks.steps import made
 
 ROOM_SEEDS = (1000,)

@@ -12,9 +12,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pydantic import Field
-from scenewright.stages.disparity.raft.matching import SMALL_UPDATES
+from scenewright.stages.disparity import SMALL_UPDATES, gray_of
 from scenewright.stages.disparity.search_range import search_range
-from scenewright.stages.disparity.semi_global import gray_of
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 from scenewright.stages.kit.stereo.pictures import confidence_colors, disparity_colors

@@ -16,14 +16,12 @@ from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph, ContactG
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.scene_parts import Box
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
-from scenewright.stages.edit.anchoring import written_box
+from scenewright.stages.edit import MapState, written_box
 from scenewright.stages.edit.graph_edits import and_below
-from scenewright.stages.edit.map_state import MapState
 from scenewright.stages.kit.geometry.boxes import box_yaw, gravity_aligned_box, points_in_box
 from scenewright.stages.kit.simulation.engine import engine
 from scenewright.stages.kit.simulation.world import load_scene
-from scenewright.stages.urdf.scene_penetration import resting_overlaps
-from scenewright.stages.urdf.settle_report import COLLISION_DEPTH
+from scenewright.stages.urdf import COLLISION_DEPTH, resting_overlaps
 
 from benchmarks.experiments.edits.making import WIDER
 from benchmarks.steps import opened, step

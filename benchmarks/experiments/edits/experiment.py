@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
-from scenewright.stages.edit.map_state import MapState, read_state
+from scenewright.stages.edit import MapState, read_state
 from scenewright.stages.kit.measurement.bootstrap import Interval, figure_interval
 from scenewright.stages.kit.stage import Parameters
 

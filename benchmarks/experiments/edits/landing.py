@@ -8,12 +8,8 @@ from typing import Literal
 
 import numpy as np
 from scenewright.schemas.edits import Add, Anchor, Merge, SetFloor, SetGravity
-from scenewright.stages.edit.anchoring import Fitting
-from scenewright.stages.edit.applying import apply_edits
-from scenewright.stages.edit.map_edits import MAP_EDITS
-from scenewright.stages.edit.map_state import MapState
-from scenewright.stages.edit.parameters import EditMapParameters
-from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.edit import MAP_EDITS, EditMapParameters, Fitting, MapState, apply_edits
+from scenewright.stages.evaluate import TrueRoom
 
 from benchmarks.experiments.edits.making import Asked
 from benchmarks.experiments.edits.truth import MapTruth, true_object

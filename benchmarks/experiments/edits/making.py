@@ -12,9 +12,9 @@ import numpy as np
 from pydantic import TypeAdapter
 from scenewright.schemas.edits import MapEdit
 from scenewright.schemas.scene_parts import Box
-from scenewright.stages.edit.anchoring import anchor_of, written_box
-from scenewright.stages.edit.map_state import MapState, Thing
-from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.edit import MapState, anchor_of, written_box
+from scenewright.stages.edit.map_state import Thing
+from scenewright.stages.evaluate import TrueRoom
 from scenewright.stages.kit.geometry.boxes import box_rotation, box_yaw, gravity_aligned_box
 
 from benchmarks.experiments.edits.truth import MapTruth

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scenewright.stages.edit.map_state import MapState
-from scenewright.stages.evaluate.point_labels import nearest_labels
-from scenewright.stages.evaluate.truth import TrueRoom
+from scenewright.stages.edit import MapState
+from scenewright.stages.evaluate import TrueRoom, nearest_labels
 
 NEAR = 0.05
 """A vertex belongs to the true surface at most this far [m]."""

@@ -11,11 +11,16 @@ import numpy as np
 import trimesh
 from scenewright.schemas.cad_library import CadLibrary
 from scenewright.schemas.cad_scene import CadScene, Replacement
-from scenewright.stages.evaluate.alignment_errors import alignment_error
-from scenewright.stages.evaluate.joint_errors import joint_errors, placed_joints
-from scenewright.stages.evaluate.model_shapes import ModelShape, PlacedShape
-from scenewright.stages.evaluate.replacement_measures import retrieval_rank
-from scenewright.stages.evaluate.shape_loading import model_shape, placed_candidate
+from scenewright.stages.evaluate import (
+    ModelShape,
+    PlacedShape,
+    alignment_error,
+    model_shape,
+    placed_candidate,
+    placed_joints,
+    retrieval_rank,
+)
+from scenewright.stages.evaluate.joint_errors import joint_errors
 from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh, read_model
 
 from benchmarks.experiments.house.furnishing import House

@@ -17,7 +17,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import look_at
-from scenewright.stages.synthesize.seen_surface import SeenSurface
+from scenewright.stages.synthesize import SeenSurface
 from scipy.ndimage import distance_transform_edt, label
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree

@@ -12,9 +12,8 @@ from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.sequence import Sequence
-from scenewright.stages.evaluate.map_measures import ANY_CLASS, load_map
-from scenewright.stages.evaluate.point_labels import nearest_labels
-from scenewright.stages.evaluate.truth import stuff_classes
+from scenewright.stages.evaluate import load_map, nearest_labels, stuff_classes
+from scenewright.stages.evaluate.map_measures import ANY_CLASS
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality, intersection_over_union, panoptic_quality
 

@@ -5,15 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from scenewright.stages.pack.backtracking import Backtracking, CornerBacktracking
-from scenewright.stages.pack.hard_suites import HARD_CELLS, hard_instance
-from scenewright.stages.pack.instances import PUBLISHED_CELLS, Instance, published_instance
-from scenewright.stages.pack.language_proposer import LanguageProposer, SymbolicProposer
-from scenewright.stages.pack.language_scripted import scripted_chat
-from scenewright.stages.pack.loop import Budget
-from scenewright.stages.pack.own_proposer import OwnProposer, placement_solver
-from scenewright.stages.pack.records import Proposer
-from scenewright.stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler
+from scenewright.stages.pack import (
+    HARD_CELLS,
+    PUBLISHED_CELLS,
+    Backtracking,
+    Budget,
+    CornerBacktracking,
+    FixedLayout,
+    Instance,
+    LanguageProposer,
+    OwnProposer,
+    Proposer,
+    RandomRestarts,
+    RandomSampler,
+    SymbolicProposer,
+    hard_instance,
+    placement_solver,
+    published_instance,
+    scripted_chat,
+)
 
 PUBLISHED = tuple(f"published/{cell}" for cell in PUBLISHED_CELLS)
 HARD = tuple(f"hard/{cell}" for cell in HARD_CELLS)

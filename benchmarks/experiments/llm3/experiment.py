@@ -7,9 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from scenewright.stages.kit.measurement.bootstrap import Interval
-from scenewright.stages.pack.environment import PackingWorld
-from scenewright.stages.pack.loop import run_loop
-from scenewright.stages.pack.motion import MotionPlanner
+from scenewright.stages.pack import MotionPlanner, PackingWorld, run_loop
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, only, ratio
 from benchmarks.experiments.llm3.arms import ARMS, EVERYWHERE, make_instance

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from scenewright.stages.fuse.parameters import FuseParameters
-from scenewright.stages.graph.parameters import GraphParameters
-from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.fuse import FuseParameters
+from scenewright.stages.graph import GraphParameters
+from scenewright.stages.segment import SegmentParameters
 
 LEVELS = {"clean": 0.0, "low": 0.15, "middle": 0.3, "high": 0.5}
 """Corruption of the true masks by case (stages/segment/backends/ground_truth/corruption.py)."""

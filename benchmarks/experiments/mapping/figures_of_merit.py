@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scenewright.stages.evaluate.truth import stuff_classes
+from scenewright.stages.evaluate import stuff_classes
 from scenewright.stages.kit.measurement.average_precision import (
     PrecisionRecall,
     average_precision,
@@ -18,7 +18,7 @@ from scenewright.stages.kit.measurement.panoptic_quality import (
     average_quality,
     average_quality_thesis_code,
 )
-from scenewright.stages.synthesize.recipes import load_recipe
+from scenewright.stages.synthesize import load_recipe
 
 from benchmarks.experiment import Measure, Results
 from benchmarks.experiments.mapping.arms import SHOWN

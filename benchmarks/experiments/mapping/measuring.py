@@ -16,30 +16,35 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
 from scenewright.schemas.vocabulary import load_vocabulary
-from scenewright.stages.evaluate.graph_measures import box_candidates
-from scenewright.stages.evaluate.map_measures import (
+from scenewright.stages.evaluate import (
+    EvaluateParameters,
+    Part,
     PredictedMap,
+    TrueRoom,
+    box_candidates,
     instance_candidates,
     label_true_points,
     load_map,
+    load_truth,
     measure_quality,
     quality_thesis_code,
 )
-from scenewright.stages.evaluate.parameters import EvaluateParameters
-from scenewright.stages.evaluate.results import Part
-from scenewright.stages.evaluate.truth import TrueRoom, load_truth
-from scenewright.stages.fuse.closing import MaskSource
-from scenewright.stages.fuse.mapping import PanopticMapper
-from scenewright.stages.fuse.stage import new_mapper, write_map
+from scenewright.stages.fuse import MaskSource, PanopticMapper, new_mapper, write_map
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
 from scenewright.stages.kit.measurement.average_precision import Candidates, match_greedily
 from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.segment.choice import BackendRequest, choose_backend
-from scenewright.stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
+from scenewright.stages.segment import (
+    BackendRequest,
+    GeometricFrame,
+    GeometricSettings,
+    SegmentParameters,
+    choose_backend,
+    fusion_settings,
+    geometric_settings,
+    segment_depth,
+)
 from scenewright.stages.segment.one_frame import FUSION, describe
-from scenewright.stages.segment.parameters import SegmentParameters
-from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 
 from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.mapping.arms import (

@@ -18,13 +18,13 @@ import cv2
 import numpy as np
 from pydantic import Field
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.mosd_frames import CAMERA, DEPTH_UNIT, FOLDER, frame_files, kind_of
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
+from scenewright.stages.truth import SupportAnnotation, read_support_annotation
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, median
 from benchmarks.experiments.mosd_supports.support_score import SupportScore, f1, score_graph
 from benchmarks.experiments.mosd_supports.tabletop_maps import LabelledView, build_map, nodes_of_entities, upright_pose
-from benchmarks.mosd_frames import CAMERA, DEPTH_UNIT, FOLDER, frame_files, kind_of
 from benchmarks.steps import unrecorded
 from benchmarks.tabulation import markdown
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from scenewright.schemas.contact_graph import ContactGraphFile
-from scenewright.stages.truth.support_annotation import SupportAnnotation
+from scenewright.stages.truth import SupportAnnotation
 
 SECOND = ("second", "also_supports", "leans_on")
 

@@ -26,7 +26,7 @@ from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.tasks.pddl import parse_domain, parse_problem
 from scenewright.stages.kit.tasks.strips import positive_task
 from scenewright.stages.kit.tasks.task_planner import plan_task
-from scenewright.stages.plan.tasks import TaskName
+from scenewright.stages.plan import TaskName
 
 from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Bench, Experiment, Results, Trial
 from benchmarks.experiments.planning_tamp.rooms import exact_room

@@ -12,12 +12,16 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.scene_parts import SurfacePlane
 from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
-from scenewright.stages.synthesize.arrangement import arrange
-from scenewright.stages.synthesize.furniture import Catalogue
-from scenewright.stages.synthesize.placement import PlacedObject
-from scenewright.stages.synthesize.recipes import load_recipe
-from scenewright.stages.synthesize.truth import object_boxes, scene_bodies, true_graph
-from scenewright.stages.synthesize.viewpoints import blocked_floor
+from scenewright.stages.synthesize import (
+    Catalogue,
+    PlacedObject,
+    arrange,
+    blocked_floor,
+    load_recipe,
+    object_boxes,
+    scene_bodies,
+    true_graph,
+)
 
 
 def shut_furniture(things: Sequence[PlacedObject], catalogue: Catalogue) -> tuple[PlacedObject, ...]:

@@ -13,10 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from pydantic import Field
-from scenewright.stages.ingest.detection import open_log
-from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.preflight.inspection import inspect_source
-from scenewright.stages.ingest.preflight.report import InspectionReport
+from scenewright.stages.ingest import IngestParameters, InspectionReport, inspect_source, open_log
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Parameters
 

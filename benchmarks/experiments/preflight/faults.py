@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest import CameraReport, LoadedFrame, LogSource
 from scenewright.stages.ingest.pose_conventions import BODY_FROM_OPTICAL, MIRROR_Y, OPENGL_AXES
-from scenewright.stages.ingest.preflight.report import CameraReport
-from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource
+from scenewright.stages.ingest.source import Entry
 from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 
 Fault = Callable[[LogSource], LogSource]

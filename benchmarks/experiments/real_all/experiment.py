@@ -17,7 +17,7 @@ from scenewright.schemas.places import HOME
 from scenewright.stages.engine.chain import command_prefix
 from scenewright.stages.engine.reading import read_manifest
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.segment.registry import all_backends
+from scenewright.stages.segment import all_backends
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.real_all.made_logs import MADE

@@ -11,8 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from scenewright.schemas.errors import BadInput
-
-from benchmarks.mosd_frames import CAMERA, DEPTH_UNIT, read_frames
+from scenewright.stages.kit.formats.mosd_frames import CAMERA, DEPTH_UNIT, read_frames
 
 TABLETOP = "test40"
 """Which of the reporting frames: cups and a can, one behind the other."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from scenewright.stages.cad.parameters import CadParameters
-from scenewright.stages.graph.parameters import GraphParameters
+from scenewright.stages.cad import CadParameters
+from scenewright.stages.graph import GraphParameters
 
 from benchmarks.experiments.mapping.arms import DRIFTING as DRIFTING_POSES
 from benchmarks.experiments.mapping.arms import ESTIMATED as ESTIMATED_POSES

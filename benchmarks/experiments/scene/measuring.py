@@ -17,17 +17,21 @@ from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, Grap
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
-from scenewright.stages.cad.candidates import Shortlist
-from scenewright.stages.cad.model_surfaces import ModelSurface
-from scenewright.stages.cad.stage import METHODS, choose_and_write, find_candidates
-from scenewright.stages.evaluate.correspondence import point_overlaps
-from scenewright.stages.evaluate.map_measures import label_true_points, load_map
-from scenewright.stages.evaluate.replacement_measures import ObjectResult, replacements_of
-from scenewright.stages.evaluate.shape_loading import true_shapes
-from scenewright.stages.evaluate.truth import TrueRoom, load_truth
+from scenewright.stages.cad import ModelSurface, Shortlist, choose_and_write, find_candidates
+from scenewright.stages.cad.stage import METHODS
+from scenewright.stages.evaluate import (
+    ObjectResult,
+    TrueRoom,
+    label_true_points,
+    load_map,
+    load_truth,
+    point_overlaps,
+    replacements_of,
+    true_shapes,
+)
 from scenewright.stages.kit.formats.mobility import BUILT_IN, STANDS
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.urdf.mujoco_settle import mujoco_motions
+from scenewright.stages.urdf import mujoco_motions
 from scenewright.stages.urdf.settle_report import BodyMotion, SettleReport, settle_report
 
 from benchmarks.experiment import Bench, Trial

@@ -7,11 +7,14 @@ from collections import Counter
 import numpy as np
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
 from scenewright.stages.kit.formats.frames import FrameReader
-from scenewright.stages.segment.choice import BackendRequest, choose_backend
-from scenewright.stages.segment.geometric import segment_depth
-from scenewright.stages.segment.panoptic import PanopticFrame
-from scenewright.stages.segment.parameters import SegmentParameters
-from scenewright.stages.segment.settings import geometric_settings
+from scenewright.stages.segment import (
+    BackendRequest,
+    PanopticFrame,
+    SegmentParameters,
+    choose_backend,
+    geometric_settings,
+    segment_depth,
+)
 
 from benchmarks.experiments.mapping.measuring import masks_of
 from benchmarks.generated_rooms import error_seed

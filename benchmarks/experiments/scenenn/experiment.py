@@ -18,9 +18,7 @@ from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.panoptic_map import PanopticMap
-from scenewright.stages.evaluate.map_measures import PredictedMap, load_map
-from scenewright.stages.evaluate.parameters import EvaluateParameters
-from scenewright.stages.evaluate.truth import load_truth
+from scenewright.stages.evaluate import EvaluateParameters, PredictedMap, load_map, load_truth
 from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial

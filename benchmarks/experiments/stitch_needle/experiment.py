@@ -7,13 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 import cv2
 import numpy as np
 from scenewright.stages.kit.drawing.plots import STYLE, plt, save
-from scenewright.stages.suture.evaluation.judgement import Estimate
+from scenewright.stages.suture import Estimate, draw_eyes, estimate, render, seen_scene
 from scenewright.stages.suture.evaluation.needle_figures import MEASURES as FIGURES
 from scenewright.stages.suture.evaluation.plots import COLORS
-from scenewright.stages.suture.needle.drawing import draw_eyes
-from scenewright.stages.suture.needle.estimate import estimate
-from scenewright.stages.suture.world.render import render
-from scenewright.stages.suture.world.sampling import seen_scene
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.views import CASES, TWO_CAMERAS_NOISE, observe, run

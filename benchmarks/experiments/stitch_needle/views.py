@@ -13,19 +13,32 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import inverse
-from scenewright.stages.suture.evaluation.judgement import Estimate, judged
-from scenewright.stages.suture.masks import spoiled_masks
-from scenewright.stages.suture.motion_reports import motions_to_last, reported_motion
-from scenewright.stages.suture.needle.estimate import estimate
-from scenewright.stages.suture.needle.filter import fuse
-from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from scenewright.stages.suture.needle.thesis import thesis_average, thesis_estimate
-from scenewright.stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, NeedlePose, StereoRig
-from scenewright.stages.suture.world.corruption import noisy_disparity
-from scenewright.stages.suture.world.render import StereoView, render
-from scenewright.stages.suture.world.sampling import seen_scene
-from scenewright.stages.suture.world.scene import NeedleScene, moved_scene, random_motions
-from scenewright.stages.suture.world.tubes import USUAL_NEEDLE, NeedleShape
+from scenewright.stages.suture import (
+    ENDOSCOPE,
+    TWO_CAMERAS,
+    USUAL_NEEDLE,
+    Estimate,
+    NeedleEstimate,
+    NeedleObservation,
+    NeedlePose,
+    NeedleScene,
+    NeedleShape,
+    StereoRig,
+    StereoView,
+    estimate,
+    fuse,
+    judged,
+    motions_to_last,
+    moved_scene,
+    noisy_disparity,
+    random_motions,
+    render,
+    reported_motion,
+    seen_scene,
+    spoiled_masks,
+    thesis_average,
+    thesis_estimate,
+)
 
 CALIBRATION_ERROR = 0.15
 FRAMES = 10

@@ -15,24 +15,34 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from scenewright.stages.suture.evaluation.judgement import Estimate, judged
-from scenewright.stages.suture.masks import learned_masks
-from scenewright.stages.suture.needle.estimate import estimate
-from scenewright.stages.suture.needle.radius_fit import estimate_without_radius
-from scenewright.stages.suture.needle.thesis import thesis_estimate
-from scenewright.stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from scenewright.stages.suture import (
+    CALIBRATION_ERROR,
+    NEEDLE,
+    NEEDLE_RADIUS,
+    THREAD,
+    TWO_CAMERAS,
+    Estimate,
+    Eye,
+    Masks,
+    NeedleScene,
+    Segmenter,
+    estimate,
+    estimate_without_radius,
+    judged,
+    kept_view,
+    learned_masks,
+    read_eye,
+    seen_scene,
+    thesis_estimate,
+)
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
-from scenewright.stages.suture.segmentation.infer import Masks, Segmenter
-from scenewright.stages.suture.world.render import Eye
-from scenewright.stages.suture.world.sampling import seen_scene
-from scenewright.stages.suture.world.scene import NeedleScene
-from scenewright.stages.suture.world.tubes import NEEDLE, THREAD
+from scenewright.stages.suture.training.network.views import EYES
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.experiment import MEASURES as POSES
 from benchmarks.experiments.stitch_needle.views import CASES, observe
 from benchmarks.reporting_seeds import Method, newest
-from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
+from benchmarks.stitch.kept_views import ViewParameters, views_of
 
 NEEDLES = "needles"
 """Group of the reporting seeds."""

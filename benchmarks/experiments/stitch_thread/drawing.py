@@ -11,12 +11,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.suture.rig import TWO_CAMERAS
-from scenewright.stages.suture.segmentation.infer import Segmenter
-from scenewright.stages.suture.thread.reconstruct import reconstruct_thread
-from scenewright.stages.suture.world.sampling import seen_scene
-
-from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, kept_view, read_eye
+from scenewright.stages.suture import (
+    CALIBRATION_ERROR,
+    TWO_CAMERAS,
+    Segmenter,
+    kept_view,
+    read_eye,
+    reconstruct_thread,
+    seen_scene,
+)
+from scenewright.stages.suture.training.network.views import EYES
 
 SIDE, STRIP, BESIDE = 520, 130, 3.0
 BLACK, YELLOW, RED, WHITE = (0, 0, 0), (255, 225, 40), (255, 40, 40), (255, 255, 255)

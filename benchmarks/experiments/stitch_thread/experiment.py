@@ -12,18 +12,24 @@ from collections.abc import Callable, Iterator, Sequence
 import cv2
 import numpy as np
 import torch
-from scenewright.stages.suture.rig import TWO_CAMERAS
+from scenewright.stages.suture import (
+    CALIBRATION_ERROR,
+    THREAD,
+    TWO_CAMERAS,
+    Segmenter,
+    kept_view,
+    read_eye,
+    reconstruct_thread,
+    seen_scene,
+)
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED
-from scenewright.stages.suture.segmentation.infer import Segmenter
-from scenewright.stages.suture.thread.reconstruct import reconstruct_thread
-from scenewright.stages.suture.world.sampling import seen_scene
-from scenewright.stages.suture.world.tubes import THREAD
+from scenewright.stages.suture.training.network.views import EYES
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count
 from benchmarks.experiments.stitch_thread.drawing import panel
 from benchmarks.experiments.stitch_thread.judging import ThreadRecord, judged
 from benchmarks.reporting_seeds import Method, newest
-from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
+from benchmarks.stitch.kept_views import ViewParameters, views_of
 
 TUNING, REPORTING = range(100), newest("needles").seeds[:100]
 VIEWS, ALL = "views", "thread_all"

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.suture.rig import StereoRig
-from scenewright.stages.suture.thread.reconstruct import ThreadCurve
-from scenewright.stages.suture.world.scene import NeedleScene
+from scenewright.stages.suture import NeedleScene, StereoRig, ThreadCurve
 from scipy.spatial import cKDTree
 
 FINE = 0.0001

@@ -6,11 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from scenewright.stages.suture.trials.ours.pose_correction import BySeenEnds, latest
-from scenewright.stages.suture.trials.perception import FOLDER, PerceptionModel, Shares
-from scenewright.stages.suture.trials.policies import OURS, POLICIES, THESIS
-from scenewright.stages.suture.trials.thesis.extraction import NoSweep
-from scenewright.stages.suture.trials.thesis.handover import NormalUnchanged
+from scenewright.stages.suture import OURS, POLICIES, THESIS, BySeenEnds, NormalUnchanged, NoSweep, PerceptionModel
+from scenewright.stages.suture.trials.ours.pose_correction import latest
+from scenewright.stages.suture.trials.perception import FOLDER, Shares
 
 ARMS = {
     **POLICIES,

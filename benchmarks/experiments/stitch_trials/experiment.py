@@ -17,13 +17,9 @@ from pydantic import Field
 from scenewright.schemas.suture_trial import SutureRun
 from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.suture import THROWS, Recorder, perception_model, run_of, run_trial
 from scenewright.stages.suture.evaluation.trial_figures import KINDS, ratios
 from scenewright.stages.suture.evaluation.trial_figures import PAIRS as PAIRS_OF_ARMS
-from scenewright.stages.suture.motion.constants import THROWS
-from scenewright.stages.suture.trials.machine import run_trial
-from scenewright.stages.suture.trials.perception import perception_model
-from scenewright.stages.suture.trials.recording import Recorder
-from scenewright.stages.suture.trials.records import run_of
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, statistic
 from benchmarks.experiments.stitch_trials.arms import ARMS, CHANGES, WITHOUT, eyes_of
@@ -138,8 +134,8 @@ def errors_of(kind: str) -> Measure:
 
 def pictures(results: Results) -> None:
     """Write the histogram of figure 4.1, the key frames (npz) of a trial of ours and a strip of its first motions."""
+    from scenewright.stages.suture import draw_strip
     from scenewright.stages.suture.evaluation.plots import histogram
-    from scenewright.stages.suture.trials.drawing import draw_strip
 
     if CASE not in results.cases:
         return

@@ -14,11 +14,7 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 from pydantic import Field
-from scenewright.stages.fuse.integration import integrate
-from scenewright.stages.fuse.parameters import FuseParameters
-from scenewright.stages.fuse.smoothing import smoothed_tsdf
-from scenewright.stages.fuse.surface import extract_surface
-from scenewright.stages.fuse.voxel_blocks import VoxelBlocks
+from scenewright.stages.fuse import FuseParameters, VoxelBlocks, extract_surface, integrate, smoothed_tsdf
 from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean, median, statistic

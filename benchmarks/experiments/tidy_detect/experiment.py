@@ -13,10 +13,17 @@ from collections.abc import Callable, Iterator, Sequence
 import cv2
 from pydantic import Field
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.tableware.vision.detection import detect
-from scenewright.stages.tableware.vision.thesis_detection import detect_thesis
-from scenewright.stages.tableware.world.overhead import LEVELS, SCHEMES, Scheme, overhead_camera, render_overhead
-from scenewright.stages.tableware.world.scenes import TIERS, make_table
+from scenewright.stages.tableware import (
+    LEVELS,
+    SCHEMES,
+    TIERS,
+    Scheme,
+    detect,
+    detect_thesis,
+    make_table,
+    overhead_camera,
+    render_overhead,
+)
 
 from benchmarks.experiment import Bench, Experiment, Trial
 from benchmarks.experiments.tidy_detect.figures import MEASURES, doubts, more_figures

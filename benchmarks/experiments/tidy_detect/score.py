@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scenewright.schemas.base import Model
-from scenewright.stages.tableware.vision.detections import Detection
-from scenewright.stages.tableware.world.items import STANDARD, UTENSILS, Table
+from scenewright.stages.tableware import STANDARD, UTENSILS, Detection, Table
 from scipy.optimize import linear_sum_assignment
 
 NEAR = 0.020

@@ -7,28 +7,27 @@ from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
-from scenewright.stages.tableware.planning.action import Action
-from scenewright.stages.tableware.planning.choice import declared_policy
-from scenewright.stages.tableware.planning.joint import JointPolicy, plan, rules_in
-from scenewright.stages.tableware.planning.optimum import Optimum
-from scenewright.stages.tableware.planning.policy import Policy
-from scenewright.stages.tableware.planning.time_model import (
+from scenewright.stages.tableware import (
     EXACT,
+    Action,
     Chances,
+    JointPolicy,
+    Optimum,
+    Policy,
+    PullPolicy,
+    RandomOne,
+    RandomPile,
+    StackPolicy,
+    Table,
     TimeModel,
-    fitted,
-    measured,
-    with_spills,
-    with_thesis_failures,
+    Trial,
+    declared_policy,
+    make_table,
+    plan,
+    run_trial,
 )
-from scenewright.stages.tableware.policies.pull import PullPolicy
-from scenewright.stages.tableware.policies.random import RandomOne
-from scenewright.stages.tableware.policies.random_piles import RandomPile
-from scenewright.stages.tableware.policies.stack import StackPolicy
-from scenewright.stages.tableware.simulation.fast import run_trial
-from scenewright.stages.tableware.simulation.trial import Trial
-from scenewright.stages.tableware.world.items import Table
-from scenewright.stages.tableware.world.scenes import make_table
+from scenewright.stages.tableware.planning.joint import rules_in
+from scenewright.stages.tableware.planning.time_model import fitted, measured, with_spills, with_thesis_failures
 
 OURS = {name: declared_policy(name).rules for name in ("ours", "ours_without_loaded_pulls", "ours_bold")}
 SIMPLE = ("random", "random_piles", "stack", "pull")

@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from scenewright.stages.kit.measurement.bootstrap import Interval
-from scenewright.stages.tableware.world.scenes import TIERS
+from scenewright.stages.tableware import PRINTED, TIERS
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, statistic
 from benchmarks.experiments.tidy_fast.arms import ARMS, DELAYS, DROPS_ON, OURS, SPILLS_ON, WORLDS, Run, trials
 from benchmarks.tabulation import Figure
-from benchmarks.tidy.printed import PRINTED
 from benchmarks.tidy.rivals import against, faster, no_slower
 
 TUNING, REPORTING = range(200), range(2200, 2230)

@@ -1,6 +1,6 @@
 """Relevancies as probabilities: a logistic function fitted to right and wrong answers in tuning rooms.
 
-data/words/calibration.toml holds one for each source and encoder; benchmarks/words/calibrate.py fits it.
+data/words/calibration.toml holds one for each source and encoder; `scenewright train word-probabilities` fits it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The embedded encoder's network: a small convolutional tower for crops, a small transformer for words.
 
 Words are sums of their parts (all runs of 3 to 5 letters, hashed; Bojanowski et al. 2017), so that a word that was
-never read still stands near those it is made of. Training: benchmarks/words; a picture's and a text's vectors give the
-probability that they belong together, sigmoid(scale * cosine + bias) (SigLIP, Zhai et al. 2023).
+never read still stands near those it is made of. Training: `scenewright train words`; a picture's and a text's vectors
+give the probability that they belong together, sigmoid(scale * cosine + bias) (SigLIP, Zhai et al. 2023).
 """
 
 from __future__ import annotations

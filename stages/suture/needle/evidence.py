@@ -2,7 +2,7 @@
 
 Log-weights are linear in a few counts; their factors were fitted by conditional logistic regression (which of a view's
 outlines is the right one) on 300 tuning views of spoiled masks, those of thread on others and on states of trials,
-of the network's masks too (benchmarks/training/needle_evidence.py), so that the shares they give are probabilities.
+of the network's masks too (`scenewright train needle-evidence`), so that the shares they give are probabilities.
 """
 
 from __future__ import annotations

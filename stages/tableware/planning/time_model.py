@@ -1,7 +1,8 @@
 """What actions cost, and what goes wrong in them: times and chances that were fitted to tables of the thesis.
 
 A table is cleared in `trips x trip + stackings x stack + pulls x pull` seconds; a bin farther away adds its delay to
-each trip twice. The file is written by `python -m benchmarks.tidy.thesis_fit`, which has the tables.
+each trip twice. The file is written by
+`scenewright train thesis-times`, which has the tables.
 """
 
 from __future__ import annotations

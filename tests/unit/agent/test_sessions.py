@@ -13,10 +13,10 @@ from scenewright.schemas.apartment import Apartment, Furniture, Room, Thing
 from scenewright.schemas.errors import UsageError
 from scenewright.stages.agent import body
 from scenewright.stages.agent.arms.registry import ARMS
+from scenewright.stages.agent.brains.beliefs import Beliefs, Style
 from scenewright.stages.agent.brains.brain import Reply
 from scenewright.stages.agent.brains.language import LanguageBrain
 from scenewright.stages.agent.brains.prompt import feedback_text
-from scenewright.stages.agent.brains.beliefs import Beliefs, Style
 from scenewright.stages.agent.brains.rules import RulesBrain
 from scenewright.stages.agent.brains.slips import Slips
 from scenewright.stages.agent.episodes import write_episode

@@ -16,11 +16,19 @@ from scenewright.stages.disparity.raft.architecture import SMALL
 from scenewright.stages.disparity.raft.checkpoint import load_network
 from scenewright.stages.disparity.raft.matching import moved_right, open_raft
 from scenewright.stages.disparity.raft.network import RaftStereo
+from scenewright.stages.disparity.training.raft_stereo.crops import (
+    HEIGHT,
+    WIDTH,
+    Sample,
+    counted,
+    kept_sample,
+    shapes_sample,
+)
+from scenewright.stages.disparity.training.raft_stereo.kept_pairs import NEEDLE, KeptPair, keep, kept, stems
+from scenewright.stages.disparity.training.raft_stereo.shapes import shapes_pair, texture_bank
+from scenewright.stages.disparity.training.raft_stereo.train import FILE, Plan, Run, Sources, loss_of, tensors_of
+from scenewright.stages.suture.world import tubes
 
-from benchmarks.disparity.crops import HEIGHT, WIDTH, Sample, counted, kept_sample, shapes_sample
-from benchmarks.disparity.rendered_pairs import KeptPair, keep, kept
-from benchmarks.disparity.shapes import shapes_pair, texture_bank
-from benchmarks.disparity.train import FILE, Plan, Run, Sources, loss_of, tensors_of
 from tests.unit.disparity.pairs import pair
 
 PLAN = Plan(steps=4, shapes=1, rooms=0, needles=0, updates=2, seed=3, pairs=0)
@@ -167,3 +175,14 @@ def test_the_checkpoint_that_comes_with_it_finds_a_wall() -> None:
     error = np.abs(found.disparity - truth)[found.known & seen]
     assert "5 updates at 1/4" in detail and found.known.mean() > 0.6
     assert np.median(error) < 0.5 and np.mean(error > 2) < 0.1
+
+
+def test_kept_pairs_are_found_by_kind_in_their_order(tmp_path: Path) -> None:
+    assert NEEDLE == tubes.NEEDLE, "pairs of the needle world keep its bodies"
+    with pytest.raises(BadInput, match="no kept pairs of room"):
+        stems(tmp_path, "room")
+    blank = np.zeros((4, 6, 3), np.uint8)
+    for name in ("needle_00002", "endoscope_00001", "needle_00001"):
+        keep(tmp_path / name, KeptPair(blank, blank, np.ones((4, 6), np.float32), blank[..., 0]))
+    found = [stem.name for stem in stems(tmp_path, "needle", "endoscope")]
+    assert found == ["needle_00001", "needle_00002", "endoscope_00001"]

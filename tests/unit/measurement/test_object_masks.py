@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from benchmarks.object_masks import boundary_of, disk_kernel, score_object_masks
+from scenewright.stages.kit.measurement.object_masks import boundary_of, disk_kernel, score_object_masks
 
 SHAPE = (120, 160)
 """Diagonal 200: boundaries are dilated by one pixel."""

@@ -12,7 +12,7 @@ from scenewright.stages.kit.rendering.splatting.compiled import CompiledRasteriz
 from scenewright.stages.splat.adjustment import Adjustment
 from scenewright.stages.splat.building import arrivals, placed_poses, train
 from scenewright.stages.splat.methods import ours, thesis
-from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.trainer import Trainer
 from scenewright.stages.splat.views import PosedView
 
 from tests.unit.poses.textured_room import CAMERA, render, round_walk

@@ -12,7 +12,7 @@ from scenewright.stages.engine.runner import run_stage
 from scenewright.stages.splat import build_stage
 from scenewright.stages.splat.checkpoints import FILE, write_checkpoint
 from scenewright.stages.splat.parameters import BUILD, BuildParameters
-from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.trainer import Trainer
 
 from tests.unit.poses.textured_room import round_walk, write_sequence
 from tests.unit.viewing.artifacts import seal

@@ -16,7 +16,7 @@ from scenewright.stages.splat.density import Density, grown, useless
 from scenewright.stages.splat.losses import LossWeights, loss_of, signal_to_noise, structural_similarity
 from scenewright.stages.splat.methods import ours, thesis
 from scenewright.stages.splat.seeding import filled, seen_through
-from scenewright.stages.splat.training import Trainer
+from scenewright.stages.splat.trainer import Trainer
 from scenewright.stages.splat.views import PosedView
 from scipy.spatial.transform import Rotation
 

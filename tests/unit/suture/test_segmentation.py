@@ -15,13 +15,13 @@ from scenewright.stages.kit.formats.safetensors_file import read_safetensors, wr
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED, load_network, save_network
 from scenewright.stages.suture.segmentation.infer import Segmenter, without_specks
 from scenewright.stages.suture.segmentation.model import SutureNetwork
+from scenewright.stages.suture.training.network.samples import CROP, Views, _cluttered, masks_of, sample
+from scenewright.stages.suture.training.network.train import Plan, Run, loss_of
 from scenewright.stages.suture.world.render import render
 from scenewright.stages.suture.world.sampling import seen_scene
 from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
 from benchmarks.stitch import segmentation_samples
-from benchmarks.stitch.segmentation_samples import CROP, Views, _cluttered, masks_of, sample
-from benchmarks.stitch.segmentation_train import Plan, Run, loss_of
 
 SMALL = (4, 4, 8, 8, 8)
 
@@ -190,8 +190,8 @@ def test_the_loss_is_small_for_the_truth_only():
 
 
 def test_a_training_that_was_stopped_ends_with_the_same_bytes(tmp_path, monkeypatch):
-    monkeypatch.setattr("benchmarks.stitch.segmentation_train.SutureNetwork", lambda: SutureNetwork(SMALL))
-    monkeypatch.setattr("benchmarks.stitch.segmentation_samples.CROP", 64)
+    monkeypatch.setattr("scenewright.stages.suture.training.network.train.SutureNetwork", lambda: SutureNetwork(SMALL))
+    monkeypatch.setattr("scenewright.stages.suture.training.network.samples.CROP", 64)
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

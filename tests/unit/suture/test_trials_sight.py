@@ -9,6 +9,7 @@ from scenewright.cli.main import run
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.suture.motion.needle import point_at
 from scenewright.stages.suture.robot.arms import REMOTE_CENTRES
+from scenewright.stages.suture.training.network.trial_views import PLACES, Keeping, trial_scenes
 from scenewright.stages.suture.trials.bench import CORNER, Bench, loaded
 from scenewright.stages.suture.trials.machine import run_trial
 from scenewright.stages.suture.trials.perception import FOLDER, perception_model
@@ -17,8 +18,6 @@ from scenewright.stages.suture.trials.settings import World
 from scenewright.stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes, driver, pictured
 from scenewright.stages.suture.trials.thread import Thread
 from scenewright.stages.suture.world.scene import make_scene
-
-from benchmarks.stitch.trial_views import PLACES, Keeping, trial_scenes
 
 MODEL = perception_model(FOLDER / "perception_ours.toml")
 

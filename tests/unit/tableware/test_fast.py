@@ -48,12 +48,17 @@ from scenewright.stages.tableware.policies.random_piles import RandomPile
 from scenewright.stages.tableware.policies.stack import StackPolicy
 from scenewright.stages.tableware.simulation.fast import FastWorld, run_trial
 from scenewright.stages.tableware.simulation.pieces import solid
+from scenewright.stages.tableware.training.thesis_times.train import (
+    TABLE_7_2,
+    expected_trips,
+    fit,
+    fitted_hold,
+    trips_of,
+)
 from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap
 from scenewright.stages.tableware.world.items import STANDARD, Item, Table, make_item, rise
 from scenewright.stages.tableware.world.scenes import TIERS, make_table
 from scenewright.stages.tableware.world.setting import Gripper, Setting
-
-from benchmarks.tidy.thesis_fit import TABLE_7_2, expected_trips, fit, fitted_hold, trips_of
 
 MODEL = TimeModel(trip=10.1, stack=8.45, pull=5.7)
 DISHES = st.sampled_from(["cup", "bowl", "plate"])

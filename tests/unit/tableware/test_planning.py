@@ -45,13 +45,12 @@ from scenewright.stages.tableware.sight import named_as, understood, without_pla
 from scenewright.stages.tableware.simulation.fast import FastWorld, run_trial
 from scenewright.stages.tableware.simulation.trial import run_in
 from scenewright.stages.tableware.table_pictures import draw_strip, draw_table
+from scenewright.stages.tableware.training.thesis_times.train import FAILED_TRIALS, TABLE_7_2, trips_of
 from scenewright.stages.tableware.vision.detections import Detection
 from scenewright.stages.tableware.world.footprints import Footprint, footprint, gap, overlapped
 from scenewright.stages.tableware.world.items import Table, make_item
 from scenewright.stages.tableware.world.scenes import make_table
 from scenewright.stages.tableware.world.setting import Setting
-
-from benchmarks.tidy.thesis_fit import FAILED_TRIALS, TABLE_7_2, trips_of
 
 MODEL = TimeModel(trip=10.0, stack=8.0, pull=5.0)
 RULES, BOLD = Rules(), ours_bold.RULES

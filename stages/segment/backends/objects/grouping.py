@@ -2,7 +2,7 @@
 
 Agglomeration with a scorer that sees whole groups (after Nunez-Iglesias et al. 2013, "Machine learning of hierarchical
 clustering to segment 2D and 3D images"): a hull, a histogram or a common plane says more of three faces of a box than
-of two of their pixels. benchmarks/training drives the same `Agglomeration` to see which pairs it meets.
+of two of their pixels. Training (tabletop-pairs) drives the same `Agglomeration` to see which pairs it meets.
 """
 
 from __future__ import annotations

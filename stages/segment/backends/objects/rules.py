@@ -3,7 +3,7 @@
 Every rule adds `weight` for each unit by which a feature of the pair is over, or under, its `bound`; over 0 in all they
 are one object. What a rule may say is set by hand: like colours, a convex border, a well-filled hull and something that
 hides the gap can only join; other colours, background inside the hull, other heights and a large union can only part.
-Which of these rules are in the table, their bounds and weights were fitted by benchmarks/training/pair_rules.py on
+Which of these rules are in the table, their bounds and weights were fitted by `scenewright train pair-rules` on
 generated tabletops and mOSD's `learn` frames; those marked with "by hand" were not.
 """
 

@@ -10,8 +10,7 @@ from scenewright.stages.segment.backends.network.grouping import (
     group,
     raise_to_depth,
 )
-
-from benchmarks.training.targets import IGNORED, make_targets
+from scenewright.stages.segment.training.network.targets import IGNORED, make_targets
 
 CLASSES = (Named(1, False), Named(2, False), Named(4, True), Named(5, True))
 

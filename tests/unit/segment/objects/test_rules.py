@@ -19,8 +19,7 @@ from scenewright.stages.segment.backends.objects.rules import (
     rule_score,
     rule_table,
 )
-
-from benchmarks.training.pair_rules import JOINS, choose_rules, fit_weights
+from scenewright.stages.segment.training.pair_rules.train import JOINS, choose_rules, fit_weights
 
 
 def features(**values: float) -> np.ndarray:

@@ -22,8 +22,8 @@ from scenewright.stages.segment.backends.objects.segmentation import (
     cut_pieces,
     segment_objects,
 )
+from scenewright.stages.segment.training.tabletop_pairs.pair_recording import record_pairs
 
-from benchmarks.training.pair_recording import record_pairs
 from tests.unit.segment.scenes import best_overlap, box_depth, combine, plane_depth, rays
 
 CAMERA = Camera(width=320, height=240, fx=262.5, fy=262.5, cx=159.5, cy=119.5)

@@ -1,0 +1,1 @@
+"""What `disparity` is trained by."""

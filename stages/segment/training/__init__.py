@@ -1,0 +1,1 @@
+"""What the backends of `segment` are trained and fitted by."""

@@ -1,0 +1,1 @@
+"""What the words of `splat language` are trained and fitted by."""

@@ -1,0 +1,1 @@
+"""What `suture` is trained and fitted by."""

@@ -1,0 +1,1 @@
+"""What `tableware` is fitted by."""
