@@ -24,7 +24,7 @@ from scenewright.stages.predicates.truth import truth_of
 
 Kind = Literal["objects", "scene", "preconditions"]
 REPLANS = 3
-"""Times that a step which the learned operators don't allow is asked for anew."""
+"""Most times that a step which the learned operators don't allow is asked for anew."""
 
 
 class NextStep(Model):

@@ -28,9 +28,9 @@ PER_VIEW = 2
 PLACED_BY = 4
 """Adjusted views, the nearest in time, that a picture that was not learned is aligned with."""
 GIVEN_STILL = np.array([0.01] * 3 + [0.01] * 3)
-"""Standard deviation of a motion between neighbours as the log gives it [rad, m] ..."""
+"""Standard deviation of a motion between neighbours as the log gives it [rad, m], without its own length."""
 GIVEN_SHARE = 0.05
-"""... and what is added for its own length."""
+"""Standard deviation that is added for a motion's own length, as a share of it."""
 SWITCHES = (1e4, 1e2, SWITCH)
 """Weights from believing all alignments to dropping those that contradict the others: far drift is no reason to drop
 one."""

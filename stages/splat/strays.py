@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 MIDDLE = (2.0, 98.0)
-"""Percentiles of each axis between which a Gaussian is none ..."""
+"""Percentiles of each axis between which a Gaussian is no stray."""
 FEW = 50
-"""... but of so few all count."""
+"""Number of Gaussians up to which all count."""
 
 
 def no_strays(points: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from scenewright.stages.predicates.learning.phrases import Phrase
 from scenewright.stages.predicates.learning.setting import KITCHEN, OWN_NUMBER, Measure, Setting
 
 BOTH_SAID = 2.0
-"""Taken off a relation with a condition, whose words are many: it costs little where a phrase speaks of both."""
+"""Discount of a relation with a condition, whose words are many: it costs little where a phrase speaks of both."""
 UNMENTIONED, LEFT_OUT, OTHER_SIDE = 3.0, 4.0, 7.0
 """Costs: of a perception that is not spoken of, of one that is and is not used, of the wrong side."""
 

@@ -16,7 +16,7 @@ EXTRACTION_TURN = radians(80.0)
 MOVED = 0.020
 """An end that moved less than this [m] was not extracted."""
 RETRIES = 5
-"""Most retries of a handover."""
+"""Most retries of an extraction and of a handover."""
 HANDOVER_OFFSET = 0.005
 """Random horizontal offsets of handover retries stay below this [m]."""
 NORMAL_SAMPLES = 10

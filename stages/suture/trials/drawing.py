@@ -29,7 +29,8 @@ COLORS = {
     "holes": "#8a5a44",
 }
 MILLIMETRES = np.array([-1000.0, -1000.0, 1000.0])
-"""Seen as by one who stands at the cameras, which look along -y: x runs to the left, away is up."""
+"""Factors of x, y and z as drawn [mm/m]: seen as by one who stands at the cameras, which look along -y. So x runs to
+the left, away is up."""
 VIEWS = ((0, 2, "from the cameras"), (0, 1, "from above"))
 """Axis across, axis up, and name of each view."""
 LIMITS = {0: (-72, 72), 1: (-76, 56), 2: (-4, 102)}

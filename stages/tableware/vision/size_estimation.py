@@ -20,7 +20,7 @@ LEAST_HEIGHT, LEAST_AREA = 0.010, 0.0006
 LEVELS = (0.110, 0.085, 0.065, 0.045, 0.030, LEAST_HEIGHT)
 """Heights [m] over which pieces are looked at."""
 ROUGH = 3.0
-"""Times the table's roughness: less is a wave in the depth."""
+"""Multiple of the table's roughness: less is a wave in the depth."""
 AROUND = 0.012
 """What is this near to a dish belongs to it: handles, what flies about its edge [m]."""
 DRAWS = 200

@@ -36,7 +36,7 @@ LEAST_RELIEF = 0.0008
 FLAT = 0.0020
 """What looks unlike the table and rises less than this [m] is a shadow or a mark, and nothing to clear."""
 ROUGH = 3.0
-"""Times a table's measured roughness: less is a wave in the depth."""
+"""Multiple of a table's measured roughness: less is a wave in the depth."""
 UNKNOWN_AREA = 0.00035
 """What stands out on more than this [m^2] without being an item is unknown."""
 MOST_CUT = 3

@@ -143,7 +143,7 @@ def make_item(
 
 
 FOOT_SHARE, WALL = 0.65, 0.004
-"""Taken for the foot's radius over the rim's, and for the wall [m], which an image from above does not show."""
+"""Foot's radius over the rim's, and thickness of the wall [m]: assumed, as an image from above does not show them."""
 
 
 def dish_measures(height: float, rim_radius: float) -> Measures:

@@ -41,7 +41,7 @@ INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.
 WIDEST = 0.5
 """Largest width of what lies about on furniture or in it [m]; by eye."""
 PICTURE_SECONDS = 0.5
-"""**Assumed**: of a picture."""
+"""Time that a picture takes [s]. **Assumed.**"""
 
 
 class Looking:

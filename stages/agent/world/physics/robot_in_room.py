@@ -29,7 +29,7 @@ from scenewright.stages.kit.simulation.robot_description import load_robot
 TOOL_FROM_CAMERA = np.array([[0, -1, 0, 0.06], [1, 0, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]], float)
 """Pose (4, 4) of the wrist camera in the tool's frame [m]; by eye."""
 LOOK_SECONDS = 3.0
-"""**Assumed**: of a motion of the arm to a view."""
+"""Time that the arm takes to move to a view [s]. **Assumed.**"""
 ROOM_IN_HAND = 0.04
 """What is held may have turned or slid so far between the fingers [m]."""
 NEARER = 0.1
