@@ -16,7 +16,8 @@ from tests.contract.installed_package import (
     write_broken_package,
     write_package_of_alternatives,
     write_package_of_the_tutorial,
-)from tests.unit.ingest.folder_writers import write_tum
+)
+from tests.unit.ingest.folder_writers import write_tum
 from tests.unit.ingest.tiny_room import frames
 
 REPOSITORY = Path(__file__).resolve().parents[2]
