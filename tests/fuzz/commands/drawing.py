@@ -105,13 +105,14 @@ def commands() -> dict[str, Callable[[str, random.Random, Path], tuple[list[str]
 
 @cache
 def _housekeeping() -> dict[str, Any]:
-    """Return the commands that are no steps: name -> click's command."""
+    """Return the commands that are no steps: name -> click's command. `demo` is `run demo` and takes minutes."""
     import typer
     from scenewright.cli import housekeeping
 
     application = typer.Typer()
     for function, _ in housekeeping.COMMANDS:
-        application.command()(function)
+        if function is not housekeeping.demo:
+            application.command()(function)
     for name, alone, _, _ in housekeeping.GROUPS:
         application.command(name=name)(alone)
     return dict(typer.main.get_command(application).commands)  # type: ignore[attr-defined]
