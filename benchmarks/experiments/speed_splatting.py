@@ -134,6 +134,7 @@ EXPERIMENT = Experiment(
     cases=(*PICTURES, *TRAINED),
     seeds_of=lambda bench, case: ("1",) if case in TRAINED else [str(k) for k in range(1, 16)],
     quick_seeds=3,
+    runs=runs,
     together=lambda trial: (trial.arm, trial.case),
     measure=measure,
     record=dict[str, float],
