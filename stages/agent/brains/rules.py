@@ -35,7 +35,7 @@ class RulesBrain:
 
     def __init__(self, words: str, style: Style, slips: Slips) -> None:
         self._style, self._slips, self._turn = style, slips, 0
-        self._refusal, goals = "", ()
+        self._refusal, goals = "", tuple[Goal, ...]()
         try:
             goals = understood(words)
         except NotUnderstood as error:

@@ -107,9 +107,11 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
         np.array([why_not_pulled(part.kinds, rules) is None for part in parts], np.bool_),
     )
     choices = _Choices(rows, np.array([len(choice) for choice in chosen], np.int64), masks, signatures)
-    pairs = _pairs(table, rules, model, chances, worth)
-    starts, ways = _ways_of(choices, _Signatures(bases, two), columns, pairs, costs)
-    return TripOptions(parts, tuple(chosen), masks, starts, *(np.ascontiguousarray(ways[name]) for name in WAY.fields))
+    neighbours = _pairs(table, rules, model, chances, worth)
+    starts, ways = _ways_of(choices, _Signatures(bases, two), columns, neighbours, costs)
+    return TripOptions(
+        parts, tuple(chosen), masks, starts, *(np.ascontiguousarray(ways[name]) for name in WAY.names or ())
+    )
 
 
 def _runs(table: Table, rules: Rules) -> list[list[Part]]:
