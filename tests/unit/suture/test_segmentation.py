@@ -15,13 +15,12 @@ from scenewright.stages.kit.formats.safetensors_file import read_safetensors, wr
 from scenewright.stages.suture.segmentation.checkpoint import BUNDLED, load_network, save_network
 from scenewright.stages.suture.segmentation.infer import Segmenter, without_specks
 from scenewright.stages.suture.segmentation.model import SutureNetwork
+from scenewright.stages.suture.training.network import samples as segmentation_samples
 from scenewright.stages.suture.training.network.samples import CROP, Views, _cluttered, masks_of, sample
 from scenewright.stages.suture.training.network.train import Plan, Run, loss_of
 from scenewright.stages.suture.world.render import render
 from scenewright.stages.suture.world.sampling import seen_scene
 from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
-
-from benchmarks.stitch import segmentation_samples
 
 SMALL = (4, 4, 8, 8, 8)
 
