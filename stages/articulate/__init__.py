@@ -9,6 +9,4 @@ from scenewright.stages.kit.exports import exported
 if TYPE_CHECKING:
     from scenewright.stages.articulate.parameters import ArticulateParameters
 
-_MODULES = {"ArticulateParameters": "scenewright.stages.articulate.parameters"}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -13,14 +13,4 @@ if TYPE_CHECKING:
     from scenewright.stages.cad.parameters import CadParameters
     from scenewright.stages.cad.stage import choose_and_write, find_candidates
 
-_MODULES = {
-    "is_built_in": "scenewright.stages.cad.built_ins",
-    "may_be_built_in": "scenewright.stages.cad.built_ins",
-    "Shortlist": "scenewright.stages.cad.candidates",
-    "ModelSurface": "scenewright.stages.cad.model_surfaces",
-    "CadParameters": "scenewright.stages.cad.parameters",
-    "choose_and_write": "scenewright.stages.cad.stage",
-    "find_candidates": "scenewright.stages.cad.stage",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

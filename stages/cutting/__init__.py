@@ -22,22 +22,4 @@ if TYPE_CHECKING:
     from scenewright.stages.cutting.world.body import Body
     from scenewright.stages.cutting.world.foods import make_food
 
-_MODULES = {
-    "Board": "scenewright.stages.cutting.board",
-    "CELLS": "scenewright.stages.cutting.demonstrations.recipes",
-    "make_trial": "scenewright.stages.cutting.demonstrations.trials",
-    "attempt": "scenewright.stages.cutting.evaluate_stage",
-    "score": "scenewright.stages.cutting.measure.scores",
-    "Learned": "scenewright.stages.cutting.methods",
-    "learn_methods": "scenewright.stages.cutting.methods",
-    "imagine": "scenewright.stages.cutting.ours.imagining",
-    "carry_out": "scenewright.stages.cutting.policy",
-    "Hand": "scenewright.stages.cutting.sight.laying",
-    "see": "scenewright.stages.cutting.sight.seeing",
-    "look": "scenewright.stages.cutting.sight.views",
-    "goal_trial": "scenewright.stages.cutting.trying",
-    "Body": "scenewright.stages.cutting.world.body",
-    "make_food": "scenewright.stages.cutting.world.foods",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -32,36 +32,4 @@ if TYPE_CHECKING:
     from scenewright.stages.evaluate.shape_loading import model_shape, placed_candidate, true_shapes
     from scenewright.stages.evaluate.truth import TrueRoom, load_truth, stuff_classes
 
-_MODULES = {
-    "alignment_error": "scenewright.stages.evaluate.alignment_errors",
-    "point_overlaps": "scenewright.stages.evaluate.correspondence",
-    "GraphComparison": "scenewright.stages.evaluate.graph_measures",
-    "box_candidates": "scenewright.stages.evaluate.graph_measures",
-    "compare_graphs": "scenewright.stages.evaluate.graph_measures",
-    "optional_nodes": "scenewright.stages.evaluate.graph_measures",
-    "placed_joints": "scenewright.stages.evaluate.joint_errors",
-    "PredictedMap": "scenewright.stages.evaluate.map_measures",
-    "instance_candidates": "scenewright.stages.evaluate.map_measures",
-    "label_true_points": "scenewright.stages.evaluate.map_measures",
-    "load_map": "scenewright.stages.evaluate.map_measures",
-    "measure_quality": "scenewright.stages.evaluate.map_measures",
-    "quality_thesis_code": "scenewright.stages.evaluate.map_measures",
-    "ModelShape": "scenewright.stages.evaluate.model_shapes",
-    "PartShape": "scenewright.stages.evaluate.model_shapes",
-    "PlacedShape": "scenewright.stages.evaluate.model_shapes",
-    "sample_triangles": "scenewright.stages.evaluate.model_shapes",
-    "EvaluateParameters": "scenewright.stages.evaluate.parameters",
-    "nearest_labels": "scenewright.stages.evaluate.point_labels",
-    "ObjectResult": "scenewright.stages.evaluate.replacement_measures",
-    "replacements_of": "scenewright.stages.evaluate.replacement_measures",
-    "retrieval_rank": "scenewright.stages.evaluate.replacement_measures",
-    "Part": "scenewright.stages.evaluate.results",
-    "model_shape": "scenewright.stages.evaluate.shape_loading",
-    "placed_candidate": "scenewright.stages.evaluate.shape_loading",
-    "true_shapes": "scenewright.stages.evaluate.shape_loading",
-    "TrueRoom": "scenewright.stages.evaluate.truth",
-    "load_truth": "scenewright.stages.evaluate.truth",
-    "stuff_classes": "scenewright.stages.evaluate.truth",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -18,18 +18,4 @@ if TYPE_CHECKING:
     from scenewright.stages.fuse.surface import extract_surface
     from scenewright.stages.fuse.voxel_blocks import VoxelBlocks
 
-_MODULES = {
-    "MaskSource": "scenewright.stages.fuse.closing",
-    "integrate": "scenewright.stages.fuse.integration",
-    "Listings": "scenewright.stages.fuse.listings",
-    "PanopticMapper": "scenewright.stages.fuse.mapping",
-    "Ours": "scenewright.stages.fuse.ours",
-    "FuseParameters": "scenewright.stages.fuse.parameters",
-    "smoothed_tsdf": "scenewright.stages.fuse.smoothing",
-    "new_mapper": "scenewright.stages.fuse.stage",
-    "write_map": "scenewright.stages.fuse.stage",
-    "extract_surface": "scenewright.stages.fuse.surface",
-    "VoxelBlocks": "scenewright.stages.fuse.voxel_blocks",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -13,14 +13,4 @@ if TYPE_CHECKING:
     from scenewright.stages.ingest.preflight.report import CameraReport, InspectionReport
     from scenewright.stages.ingest.source import LoadedFrame, LogSource
 
-_MODULES = {
-    "open_log": "scenewright.stages.ingest.detection",
-    "IngestParameters": "scenewright.stages.ingest.parameters",
-    "inspect_source": "scenewright.stages.ingest.preflight.inspection",
-    "CameraReport": "scenewright.stages.ingest.preflight.report",
-    "InspectionReport": "scenewright.stages.ingest.preflight.report",
-    "LoadedFrame": "scenewright.stages.ingest.source",
-    "LogSource": "scenewright.stages.ingest.source",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -19,27 +19,4 @@ if TYPE_CHECKING:
     from scenewright.stages.pack.records import Proposer
     from scenewright.stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler
 
-_MODULES = {
-    "Backtracking": "scenewright.stages.pack.backtracking",
-    "CornerBacktracking": "scenewright.stages.pack.backtracking",
-    "PackingWorld": "scenewright.stages.pack.environment",
-    "HARD_CELLS": "scenewright.stages.pack.hard_suites",
-    "hard_instance": "scenewright.stages.pack.hard_suites",
-    "Instance": "scenewright.stages.pack.instances",
-    "PUBLISHED_CELLS": "scenewright.stages.pack.instances",
-    "published_instance": "scenewright.stages.pack.instances",
-    "LanguageProposer": "scenewright.stages.pack.language_proposer",
-    "SymbolicProposer": "scenewright.stages.pack.language_proposer",
-    "scripted_chat": "scenewright.stages.pack.language_scripted",
-    "Budget": "scenewright.stages.pack.loop",
-    "run_loop": "scenewright.stages.pack.loop",
-    "MotionPlanner": "scenewright.stages.pack.motion",
-    "OwnProposer": "scenewright.stages.pack.own_proposer",
-    "placement_solver": "scenewright.stages.pack.own_proposer",
-    "Proposer": "scenewright.stages.pack.records",
-    "FixedLayout": "scenewright.stages.pack.sampling",
-    "RandomRestarts": "scenewright.stages.pack.sampling",
-    "RandomSampler": "scenewright.stages.pack.sampling",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -9,6 +9,4 @@ from scenewright.stages.kit.exports import exported
 if TYPE_CHECKING:
     from scenewright.stages.plan.tasks import TaskName
 
-_MODULES = {"TaskName": "scenewright.stages.plan.tasks"}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -9,6 +9,4 @@ from scenewright.stages.kit.exports import exported
 if TYPE_CHECKING:
     from scenewright.stages.poses.world import laid_onto
 
-_MODULES = {"laid_onto": "scenewright.stages.poses.world"}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

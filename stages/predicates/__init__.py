@@ -33,40 +33,4 @@ if TYPE_CHECKING:
     from scenewright.stages.predicates.truth import true_domain, truth_of
     from scenewright.stages.predicates.world.catalogue import DOMAINS, kitchen_file
 
-_MODULES = {
-    "Abstraction": "scenewright.stages.predicates.execution",
-    "Attempt": "scenewright.stages.predicates.execution",
-    "Planner": "scenewright.stages.predicates.execution",
-    "Replayed": "scenewright.stages.predicates.execution",
-    "Replays": "scenewright.stages.predicates.execution",
-    "World": "scenewright.stages.predicates.execution",
-    "attempt": "scenewright.stages.predicates.execution",
-    "oracle": "scenewright.stages.predicates.execution",
-    "timed_plan": "scenewright.stages.predicates.execution",
-    "Memory": "scenewright.stages.predicates.learning.memory",
-    "STAND_IN": "scenewright.stages.predicates.learning.opening",
-    "OursLearner": "scenewright.stages.predicates.learning.ours",
-    "RandomLearner": "scenewright.stages.predicates.learning.random_exploration",
-    "KITCHEN_GIVEN": "scenewright.stages.predicates.learning.setting",
-    "ThesisLearner": "scenewright.stages.predicates.learning.thesis",
-    "stand_in": "scenewright.stages.predicates.learning.thesis",
-    "ThesisMemory": "scenewright.stages.predicates.learning.thesis_memory",
-    "balanced_accuracy": "scenewright.stages.predicates.measure.accuracy",
-    "drawn_cases": "scenewright.stages.predicates.measure.accuracy",
-    "Done": "scenewright.stages.predicates.measure.operators",
-    "allowed_accuracy": "scenewright.stages.predicates.measure.operators",
-    "expected_share": "scenewright.stages.predicates.measure.operators",
-    "SETS": "scenewright.stages.predicates.tasks",
-    "Task": "scenewright.stages.predicates.tasks",
-    "tasks_of": "scenewright.stages.predicates.tasks",
-    "SimulatedTeacher": "scenewright.stages.predicates.teacher.simulated",
-    "Wording": "scenewright.stages.predicates.teacher.simulated",
-    "Training": "scenewright.stages.predicates.training",
-    "train": "scenewright.stages.predicates.training",
-    "true_domain": "scenewright.stages.predicates.truth",
-    "truth_of": "scenewright.stages.predicates.truth",
-    "DOMAINS": "scenewright.stages.predicates.world.catalogue",
-    "kitchen_file": "scenewright.stages.predicates.world.catalogue",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

@@ -19,24 +19,4 @@ if TYPE_CHECKING:
     from scenewright.stages.splat.triangulation import with_points
     from scenewright.stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
 
-_MODULES = {
-    "calibration_error": "scenewright.stages.splat.asked_figures",
-    "recall_at_rejection": "scenewright.stages.splat.asked_figures",
-    "MARGIN": "scenewright.stages.splat.evaluate_stage",
-    "HashGrid": "scenewright.stages.splat.language.field",
-    "LanguageField": "scenewright.stages.splat.language.field",
-    "Sight": "scenewright.stages.splat.language.looks",
-    "read_gaussians": "scenewright.stages.splat.ply",
-    "Seeds": "scenewright.stages.splat.seeding",
-    "no_strays": "scenewright.stages.splat.strays",
-    "Trainer": "scenewright.stages.splat.trainer",
-    "lexicon": "scenewright.stages.splat.training.words.lexicon",
-    "with_points": "scenewright.stages.splat.triangulation",
-    "PosedView": "scenewright.stages.splat.views",
-    "evenly": "scenewright.stages.splat.views",
-    "held_out": "scenewright.stages.splat.views",
-    "posed_frames": "scenewright.stages.splat.views",
-    "read_view": "scenewright.stages.splat.views",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

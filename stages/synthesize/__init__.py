@@ -16,20 +16,4 @@ if TYPE_CHECKING:
     from scenewright.stages.synthesize.truth import object_boxes, scene_bodies, true_graph
     from scenewright.stages.synthesize.viewpoints import blocked_floor
 
-_MODULES = {
-    "Arrangement": "scenewright.stages.synthesize.arrangement",
-    "arrange": "scenewright.stages.synthesize.arrangement",
-    "world_meshes": "scenewright.stages.synthesize.arrangement",
-    "Catalogue": "scenewright.stages.synthesize.furniture",
-    "PlacedObject": "scenewright.stages.synthesize.placement",
-    "load_recipe": "scenewright.stages.synthesize.recipes",
-    "recipe_names": "scenewright.stages.synthesize.recipes",
-    "SeenSurface": "scenewright.stages.synthesize.seen_surface",
-    "build_room": "scenewright.stages.synthesize.shell",
-    "object_boxes": "scenewright.stages.synthesize.truth",
-    "scene_bodies": "scenewright.stages.synthesize.truth",
-    "true_graph": "scenewright.stages.synthesize.truth",
-    "blocked_floor": "scenewright.stages.synthesize.viewpoints",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

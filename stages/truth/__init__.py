@@ -10,11 +10,4 @@ if TYPE_CHECKING:
     from scenewright.stages.truth.annotated_points import instances_of
     from scenewright.stages.truth.support_annotation import AnnotatedNode, SupportAnnotation, read_support_annotation
 
-_MODULES = {
-    "instances_of": "scenewright.stages.truth.annotated_points",
-    "AnnotatedNode": "scenewright.stages.truth.support_annotation",
-    "SupportAnnotation": "scenewright.stages.truth.support_annotation",
-    "read_support_annotation": "scenewright.stages.truth.support_annotation",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)

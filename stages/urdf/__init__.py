@@ -11,10 +11,4 @@ if TYPE_CHECKING:
     from scenewright.stages.urdf.scene_penetration import resting_overlaps
     from scenewright.stages.urdf.settle_report import COLLISION_DEPTH
 
-_MODULES = {
-    "mujoco_motions": "scenewright.stages.urdf.mujoco_settle",
-    "resting_overlaps": "scenewright.stages.urdf.scene_penetration",
-    "COLLISION_DEPTH": "scenewright.stages.urdf.settle_report",
-}
-
-__getattr__ = exported(__name__, _MODULES)
+__getattr__ = exported(__name__)
