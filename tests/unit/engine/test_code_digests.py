@@ -76,6 +76,22 @@ def test_a_new_file_in_a_folder_that_is_listed_counts(package: Path) -> None:
     assert digest() != first
 
 
+def test_what_an_installed_package_declares_counts_where_its_group_is_asked_for(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(digests, "_plugins", lambda: {"scenewright.backends": ["toyplugin.hues"]})
+    write(package.parent / "toyplugin" / "__init__.py", "")
+    write(package.parent / "toyplugin" / "hues.py", "from toyplugin.more import VALUE\n\nBACKEND = VALUE\n")
+    write(package.parent / "toyplugin" / "more.py", "VALUE = 1\n")
+    before = digest()
+    write(package / "core.py", 'def core():\n    return every("scenewright.backends")\n')
+    asked = digest()
+    write(package.parent / "toyplugin" / "more.py", "VALUE = 2\n")
+    assert len({before, asked, digest()}) == 3
+    write(package.parent / "toyplugin" / "hues.py", "def broken(:\n")
+    digest()
+
+
 def test_what_was_read_is_kept_and_not_read_again(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = digest()
 
