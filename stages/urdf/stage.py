@@ -120,8 +120,6 @@ def _settle(context: Context, parameters: UrdfParameters) -> SettleReport:
         )
     for joint in report.blocked:
         context.logger.warning("%s meets %s at the start of its motion", joint.joint, joint.hit_link)
-    for name in report.marginal:
-        context.logger.warning("%s is marginal: a tenth of a millimetre may turn what is said of it", name)
     return report
 
 
