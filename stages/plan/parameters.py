@@ -96,7 +96,7 @@ def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
 
 STAGE = Stage(
     name="plan",
-    version=17,
+    version=18,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={

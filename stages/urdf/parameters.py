@@ -26,7 +26,7 @@ class UrdfParameters(Parameters):
 
 STAGE = Stage(
     name="urdf",
-    version=11,
+    version=12,
     summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots; MJCF, SRDF, GLB, MCAP",
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},

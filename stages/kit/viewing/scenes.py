@@ -106,7 +106,7 @@ def draw_settling(scene: InteractiveScene, canvas: Canvas, prefix: str = "scene"
     canvas.moment(0.0, "let go")
     for name, margin in settling.margins.items():
         if is_marginal(margin):
-            canvas.moment(0.0, f"{name} is marginal: {margin:.1f} standard deviations to its limit", bad=True)
+            canvas.moment(0.0, f"{name} is marginal: {margin:.1f} standard deviations to its limit")
     for trouble in settling.troubles:
         canvas.moment(0.0, trouble, bad=True)
     if settling.times:
