@@ -22,6 +22,8 @@ LOOKS = 4
 """Runs end early when nothing moved in this many looks (`WATCHED`): most things rest after half a second."""
 DEPTH_REACH = 0.001
 """A depth is near its limit when it is closer [m]: the runs change depths by some 0.1 mm."""
+COST, SHORTEST = 0.5, 0.5
+"""All runs together take this share of the settle test's own simulation, as far as each still lasts so long [s]."""
 BESIDE = 0.05
 """What comes closer [m] to a body may touch it while that moves."""
 
@@ -38,7 +40,9 @@ def with_margins(report: SettleReport, scene_folder: Path) -> SettleReport:
         of_joints = {joint: _joint_margin(world, joint, random) for joint in joints}
         of_pairs = {pair: _pair_margin(world, pair, random) for pair in pairs}
         involved = _involved(world, {body.name for body in bodies})
-    of_bodies = _body_margins(scene_folder, involved, bodies, report.seconds, random) if bodies else {}
+    share = len(involved & {body.name for body in report.bodies}) / max(len(report.bodies), 1)
+    seconds = min(report.seconds, max(SHORTEST, COST * report.seconds / (RUNS * share))) if bodies else 0.0
+    of_bodies = _body_margins(scene_folder, involved, bodies, seconds, random) if bodies else {}
     return replace(
         report,
         bodies=tuple(replace(body, margin=of_bodies.get(body.name)) for body in report.bodies),
