@@ -1,5 +1,5 @@
-"""What physics says of a few scenes, to the bit: `python -m tests.unit.simulation.verdicts FOLDER [fork]` writes
-FOLDER/verdicts.json, from a fork of itself where asked."""
+"""What physics says of a few scenes, to the bit: `python -m tests.unit.simulation.verdicts FOLDER [execute] [fork]`
+writes FOLDER/verdicts.json, from a fork of itself where asked."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.plan.parameters import PlanParameters
-from scenewright.stages.plan.stage import run
 from scenewright.stages.urdf.settle_report import settle_report
 from scipy.spatial.transform import Rotation
 
@@ -40,8 +39,8 @@ def rocking() -> list[HandmadeBody]:
     return [floor(), table(0.0, 0.0), first, second]
 
 
-def verdicts(folder: Path) -> Verdicts:
-    """Settle, sweep and carry out in scenes written below a folder."""
+def verdicts(folder: Path, *, execute: bool) -> Verdicts:
+    """Settle, sweep and (`execute`) carry out a plan in scenes written below a folder."""
     found: Verdicts = {}
     for name, bodies in {"kitchen": kitchen(0.0), "rocking": rocking()}.items():
         write_scene(folder / name, bodies)
@@ -49,6 +48,14 @@ def verdicts(folder: Path) -> Verdicts:
         poses = b"".join(np.stack(body.poses).tobytes() for body in report.bodies)
         numbers = hashlib.sha256(repr(report.as_json()).encode() + poses)
         found[name] = (report.verdict, numbers.hexdigest())
+    if execute:
+        found["execution"] = _executed(folder)
+    return found
+
+
+def _executed(folder: Path) -> tuple[str, str]:
+    from scenewright.stages.plan.stage import run
+
     output = folder / "plan"
     output.mkdir()
     context = Context(output=output, seed=0, device="cpu", progress=SilentProgress())
@@ -57,18 +64,17 @@ def verdicts(folder: Path) -> Verdicts:
     with np.load(plan.path("trajectory.npz"), allow_pickle=False) as arrays:
         moved = b"".join(arrays[name].tobytes() for name in sorted(arrays))
     text = plan.path("plan.json").read_bytes()
-    found["execution"] = (plan.info.status, hashlib.sha256(text + moved).hexdigest())
-    return found
+    return plan.info.status, hashlib.sha256(text + moved).hexdigest()
 
 
-def _write(folder: Path) -> None:
+def _write(folder: Path, *, execute: bool) -> None:
     folder.mkdir(parents=True)
-    (folder / "verdicts.json").write_text(json.dumps(verdicts(folder)))
+    (folder / "verdicts.json").write_text(json.dumps(verdicts(folder, execute=execute)))
 
 
 if __name__ == "__main__":
-    if sys.argv[2:] == ["fork"]:
+    if "fork" in sys.argv[2:]:
         child = os.fork()
         if child:
             sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-    _write(Path(sys.argv[1]))
+    _write(Path(sys.argv[1]), execute="execute" in sys.argv[2:])
