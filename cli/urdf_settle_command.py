@@ -27,13 +27,17 @@ def urdf_settle(
 ) -> int:
     """Let go of a scene in physics and open its doors and drawers; a line for each body that moves, turns or falls
     through the floor, for each joint that meets something in the first tenth of its range, and for each pair of bodies
-    more than 5 mm in each other. Exits with 4 when there is any, or when nothing can move: the outcome of `urdf`.
+    more than 5 mm in each other. What a tenth of a millimetre may turn reads `marginal`. Exits with 4 when there is
+    any that fails, or when nothing can move: the outcome of `urdf`.
     """
     from scenewright.stages.engine.chain import OUTCOME_EXIT_CODE
+    from scenewright.stages.kit.simulation.margins import is_marginal
+    from scenewright.stages.urdf.settle_margins import with_margins
     from scenewright.stages.urdf.settle_report import SettleReport, settle_report
 
     limits = {"moved_limit": moved, "turned_limit": math.radians(turned)}
     report: SettleReport = settle_report(scene, seconds if engine == "bullet" else 0.0, **limits)
+    report = with_margins(report, scene)
     if engine == "mujoco":
         from scenewright.stages.urdf.mujoco_settle import mujoco_motions
 
@@ -53,6 +57,9 @@ def urdf_settle(
         f"{pair.first_link}: lies {1000 * pair.depth:.1f} mm in {pair.second_link} at rest"
         for pair in report.collisions
     ]
+    lines += [
+        f"{name}: marginal: {report.margins[name]:.1f} standard deviations to its limit" for name in report.marginal
+    ]
     if report.verdict == "nothing_movable":
         lines.append(f"nothing can move: {report.reason}")
     if json_output:
@@ -61,5 +68,5 @@ def urdf_settle(
         for line in lines:
             out(f"{scene}: {line}")
         if report.settled:
-            out(f"{scene}: settles: {report.reason}")
+            out(f"{scene}: settles{', marginal' if is_marginal(report.margin) else ''}: {report.reason}")
     return 0 if report.settled else OUTCOME_EXIT_CODE

@@ -50,13 +50,17 @@ def check_on(world: PhysicsWorld, literal: str, item: str, support: str) -> Chec
     if gap is not None:
         numbers |= {"height": round(height, 6), "gap": round(gap, 6)}
     holds = gap is not None and abs(gap) < CONTACT_HEIGHT and inside and speed < AT_REST
+    edge = float(np.minimum(center - support_low[:2], support_high[:2] - center).min())
+    slack = None
+    if gap is not None:
+        slack = min(1.0 - abs(gap) / CONTACT_HEIGHT, edge / CONTACT_HEIGHT, 1.0 - speed / AT_REST)
     if gap is None:
         detail = f"{item} does not touch {support} from above (its lowest point is at {lowest:.3f} m)"
     else:
         detail = f"{item} rests at {height:.3f} m on {support}, speed {speed:.3f} m/s"
         if not inside:
             detail += ", outside its outline"
-    return Check(condition=literal, holds=holds, detail=detail, numbers=numbers)
+    return Check(condition=literal, holds=holds, detail=detail, numbers=numbers, slack=slack)
 
 
 def _lowest_point(world: PhysicsWorld, item: str) -> float:
@@ -74,14 +78,19 @@ def check_joints(world: PhysicsWorld, literal: str, body: str, joints: Sequence[
     values = {joint: world.joint_value(body, joint) for joint in joints}
     kinds = {joint.name: joint for joint in world.bodies[body].record.joints}
     limits = {name: CLOSED_ANGLE if kinds[name].type == "revolute" else CLOSED_SLIDE for name in values}
+    half = {name: 0.5 * kinds[name].upper for name in values}
     if shut:
+        slacks = [1.0 - value / limits[name] for name, value in values.items()]
         wrong = [name for name, value in values.items() if value > limits[name]]
     else:
-        wrong = [name for name, value in values.items() if value < 0.5 * kinds[name].upper]
+        slacks = [value / half[name] - 1.0 for name, value in values.items() if half[name] > 0.0]
+        wrong = [name for name, value in values.items() if value < half[name]]
     detail = ", ".join(
         f"{name} at {value:.3f} {'rad' if kinds[name].type == 'revolute' else 'm'}" for name, value in values.items()
     )
-    return Check(condition=literal, holds=not wrong, detail=detail, numbers={k: round(v, 6) for k, v in values.items()})
+    numbers = {name: round(value, 6) for name, value in values.items()}
+    slack = min(slacks, default=None)
+    return Check(condition=literal, holds=not wrong, detail=detail, numbers=numbers, slack=slack)
 
 
 def check_in(world: PhysicsWorld, literal: str, item: str, container: str) -> Check:
@@ -101,4 +110,5 @@ def check_in(world: PhysicsWorld, literal: str, item: str, container: str) -> Ch
         detail=f"{item} is {abs(outside):.3f} m {'inside' if outside < 0 else 'outside'} {container}'s bounds, "
         f"{'touching' if touching else 'not touching'} it",
         numbers={"outside": round(outside, 6), "speed": round(speed, 6)},
+        slack=min(-outside / CONTACT_HEIGHT, 1.0 - speed / AT_REST) if touching else None,
     )

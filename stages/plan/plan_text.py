@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from scenewright.schemas.plan import PlanFile
+from scenewright.stages.kit.simulation.margins import is_marginal
 from scenewright.stages.plan.refinement import Step
 
 
 def plan_text(plan: PlanFile, steps: list[Step]) -> str:
     """Return the plan as plain text: goal, actions, checks, failures, assumptions."""
-    lines = [f"goal: {', '.join(plan.goal) or 'none'}", f"status: {plan.status}"]
+    lines = [f"goal: {', '.join(plan.goal) or 'none'}", f"status: {plan.status}{marginal(plan.margin)}"]
     where = f"planned in the {plan.planned_in} scene"
     if plan.executed_in is not None:
         where += f", executed in the {plan.executed_in.replace('_', ' ')} room"
@@ -22,7 +23,10 @@ def plan_text(plan: PlanFile, steps: list[Step]) -> str:
         lines.append("  none")
     if plan.checks:
         lines += ["", "checked after execution:"]
-        lines += [f"  {'yes' if check.holds else 'NO '} {check.condition}: {check.detail}" for check in plan.checks]
+        lines += [
+            f"  {'yes' if check.holds else 'NO '} {check.condition}: {check.detail}{marginal(check.margin)}"
+            for check in plan.checks
+        ]
     if plan.matches:
         lines += ["", "bodies of the plan in the room:"]
         for match in plan.matches:
@@ -40,3 +44,8 @@ def plan_text(plan: PlanFile, steps: list[Step]) -> str:
         lines += ["", "what the execution was allowed to know:"]
         lines += [f"  - {text}" for text in plan.assumptions]
     return "\n".join([*lines, ""])
+
+
+def marginal(margin: float | None) -> str:
+    """Return what is added to a verdict that is nearly as likely to be the contrary."""
+    return f" (marginal: {margin:.1f} standard deviations to its limit)" if is_marginal(margin) else ""

@@ -20,6 +20,7 @@ from scenewright.stages.kit.stage import Context
 from scenewright.stages.plan.assumptions import Belief, match_beliefs
 from scenewright.stages.plan.believed_tree import TreeState
 from scenewright.stages.plan.camera_eyes import CameraEyes
+from scenewright.stages.plan.check_margins import with_margins
 from scenewright.stages.plan.conduct import Conduct, joint_pairs
 from scenewright.stages.plan.correspondence import match_bodies
 from scenewright.stages.plan.erring_robot import ErringRobot
@@ -148,13 +149,16 @@ def execute(
             observed[number] = observed_state(world, matches, joint_names, physical.held)
             return observed[number]
 
-        def settled_checks() -> tuple[Check, ...]:
-            world.wake()
-            physical.wait(SETTLE_SECONDS)
+        def checks_now() -> tuple[Check, ...]:
             now = observed_state(world, matches, joint_names, physical.held)
             graph = graph_of_state(order.graph, observed[START], now, believed, model)
             learned = partial(order.reading.check, model, graph)
             return check_goal(world, order.literals, matches, joint_names, physical.held, learned)
+
+        def settled_checks() -> tuple[Check, ...]:
+            world.wake()
+            physical.wait(SETTLE_SECONDS)
+            return checks_now()
 
         def replan(state: RobotState, number: int) -> list[Step] | None:
             anew[number] = observed_state(world, matches, joint_names, physical.held)
@@ -191,6 +195,7 @@ def execute(
         final = observed_state(world, matches, joint_names, physical.held)
         with context.progress.step("pictures"):
             draw(pictures, physical, parameters, context)
+        checks = with_margins(checks, world, physical.held, checks_now)
     graphs = {
         number: graph_of_state(order.graph, observed[START], state, believed, model)
         for number, state in observed.items()

@@ -19,11 +19,13 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.formats.trajectories import read_tum
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.failures import MotionFailed, end_in_collision
+from scenewright.stages.kit.simulation.margins import is_marginal
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.kit.tasks.pddl import domain_text, problem_text
 from scenewright.stages.kit.tasks.strips import Atom, Problem
 from scenewright.stages.plan.assumptions import believe, parse_priors
+from scenewright.stages.plan.check_margins import verdict_margin
 from scenewright.stages.plan.domain import DOMAIN
 from scenewright.stages.plan.given_domain import read_given_domain
 from scenewright.stages.plan.goals import TABLE_CLASSES, default_goals
@@ -308,6 +310,7 @@ def _write(
         actions=actions,
         failures=(*planning.failures, *outcome.failures, *unmet),
         checks=outcome.checks,
+        margin=verdict_margin(outcome.checks),
         status=status,
         matches=outcome.matches,
         assumptions=(*beliefs, *outcome.assumptions),
@@ -335,6 +338,8 @@ def _write(
         "checks": f"{sum(check.holds for check in outcome.checks)}/{len(outcome.checks)}",
         "failures": len(plan.failures),
     }
+    if is_marginal(plan.margin):
+        summary["verdict"] = "marginal"
     return Plan(context.output, outcome="ok" if ok else status, summary=summary)
 
 

@@ -161,7 +161,9 @@ def _interactive_scene(facts: Facts) -> Outlook:
     if facts.outcome == "ok":
         if "settled" not in facts.summary:
             return Outlook(doubtful=("whether it stays when it is let go: that was not tried",))
-        return Outlook((f"let go, all {movable} movable bodies stay; {joints} joints are free at their start",))
+        sure = (f"let go, all {movable} movable bodies stay; {joints} joints are free at their start",)
+        marginal = facts.summary.get("marginal")
+        return Outlook(sure, doubtful=(f"physics is marginal: {marginal}",) if marginal else ())
     reason = str(facts.summary.get("reason", facts.outcome))
     if held_count := facts.count("held"):
         reason += f"; {held_count} things that could be pushed lie in others and stay"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.kit.simulation.engine import engine
@@ -36,6 +36,10 @@ class JointRange:
     """Joint value at which it does."""
     hit_depth: float = 0.0
     """How deep the two are in each other there [m]."""
+    start_depth: float = 0.0
+    """How deep the part lies in anything at the start of the motion, at most [m]."""
+    margin: float | None = None
+    """How far `start_depth` is from `HIT_DEPTH` (`settle_margins`); None: far."""
 
     @property
     def free_at_start(self) -> bool:
@@ -58,6 +62,11 @@ def sweep_joints(world: PhysicsWorld) -> list[JointRange]:
         for joint in body.joints:
             ranges.append(_sweep(world, body, joint, riding))
     return ranges
+
+
+def sweep_joint(world: PhysicsWorld, name: str, joint: str) -> JointRange:
+    """Return the entry of one joint of one body, as `sweep_joints` does."""
+    return _sweep(world, world.bodies[name], joint, _contents(world, name))
 
 
 def _contents(world: PhysicsWorld, name: str) -> set[str]:
@@ -129,12 +138,13 @@ def _sweep_one_joint(world: PhysicsWorld, body: LoadedBody, joint: str, riding: 
     ]
     step = (upper - lower) / STEPS
     stretches = [_stretch(world, body, joint, closed, limit, step, moving, still) for limit in (upper, lower)]
-    free = sum(length for length, _ in stretches)
-    hit = next((met for _, met in stretches if met is not None), None)
+    free = sum(length for length, _, _ in stretches)
+    hit = next((met for _, met, _ in stretches if met is not None), None)
     share = 1.0 if upper == lower else free / (upper - lower)
-    if hit is None:
-        return JointRange(body.name, joint, closed, upper - lower, share)
-    return JointRange(body.name, joint, closed, upper - lower, share, hit_link=hit[0], hit_at=hit[2], hit_depth=hit[1])
+    found = JointRange(
+        body.name, joint, closed, upper - lower, share, start_depth=max(deep for _, _, deep in stretches)
+    )
+    return found if hit is None else replace(found, hit_link=hit[0], hit_depth=hit[1], hit_at=hit[2])
 
 
 def _stretch(
@@ -146,17 +156,23 @@ def _stretch(
     step: float,
     moving: list[int],
     still: list[tuple[int, int, np.ndarray]],
-) -> tuple[float, tuple[str, float, float] | None]:
-    """Return how far a joint goes from where it is closed towards a limit [rad, m] in steps, and what it meets: the
-    link, how deep [m], at which value."""
-    reached = closed
+) -> tuple[float, tuple[str, float, float] | None, float]:
+    """Return how far a joint goes from where it is closed towards a limit [rad, m] in steps, what it meets (the link,
+    how deep [m], at which value), and how deep the part lies in anything at the start of the motion, at most [m]."""
+    reached, met, at_start = closed, None, 0.0
     for value in _positions(closed, limit, step):
+        starting = abs(value - closed) <= (START_SHARE * STEPS + 1e-6) * step
+        if met is not None and not starting:
+            break
         world.set_joint(body.name, joint, value)
-        hit = _hit(world, body, moving, still)
-        if hit is not None:
-            return abs(reached - closed), (*hit, value)
-        reached = value
-    return abs(limit - closed), None
+        link, depth = _deepest(world, body, moving, still)
+        if starting:
+            at_start = max(at_start, depth)
+        if met is None and depth > HIT_DEPTH:
+            met = (link, depth, value)
+        elif met is None:
+            reached = value
+    return abs((limit if met is None else reached) - closed), met, at_start
 
 
 def _positions(start: float, end: float, step: float) -> Iterator[float]:
@@ -176,20 +192,20 @@ def _moving_links(world: PhysicsWorld, body: LoadedBody, index: int) -> list[int
     return sorted(moving)
 
 
-def _hit(
+def _deepest(
     world: PhysicsWorld, body: LoadedBody, moving: list[int], still: list[tuple[int, int, np.ndarray]]
-) -> tuple[str, float] | None:
-    """Return the link that moving links lie deepest in, and how deep [m]; None when no deeper than `HIT_DEPTH`.
+) -> tuple[str, float]:
+    """Return the link that moving links lie deepest in, and how deep [m]; depth 0 when they lie in none.
 
     `still`: body id, link index and bounds (2, 3) of all links that stand still.
     """
-    deepest: tuple[str, float] | None = None
+    deepest = ("", 0.0)
     bounds = np.array([entry[2] for entry in still]).reshape(-1, 2, 3)
     for link in moving:
         low, high = np.array(engine.getAABB(body.body_id, link, physicsClientId=world.client))
         for index in np.flatnonzero(((bounds[:, 0] <= high) & (bounds[:, 1] >= low)).all(axis=1)):
             other_body, other_link = still[index][:2]
             depth = link_depth(world, body.body_id, link, other_body, other_link)
-            if depth > HIT_DEPTH and (deepest is None or depth > deepest[1]):
+            if depth > deepest[1]:
                 deepest = (world.link_name(other_body, other_link), depth)
     return deepest

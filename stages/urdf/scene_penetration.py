@@ -19,6 +19,8 @@ class Overlap:
     first_link: str
     second_link: str
     depth: float
+    margin: float | None = None
+    """How far `depth` is from the limit of the settle test (`settle_margins`); None: far."""
 
 
 MESH_PADDING = 0.001
@@ -50,6 +52,13 @@ def resting_overlaps(world: PhysicsWorld, smallest: float = 0.0) -> list[Overlap
             world, body, body, [pair for pair in combinations(links, 2) if pair not in joined], smallest
         )
     return sorted(overlaps, key=lambda overlap: (-overlap.depth, overlap.first_link, overlap.second_link))
+
+
+def pair_depth(world: PhysicsWorld, pair: Overlap) -> float:
+    """Return how deep [m] the two links of a pair lie in each other as they stand now."""
+    first, second = world.bodies[pair.first], world.bodies[pair.second]
+    ends = (first.body_id, first.links[pair.first_link], second.body_id, second.links[pair.second_link])
+    return link_depth(world, *ends)
 
 
 def link_depth(world: PhysicsWorld, first: int, first_link: int, second: int, second_link: int) -> float:

@@ -11,6 +11,7 @@ from scenewright.schemas.interactive_scene import SettledBody, SettleFile
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.geometry.transforms import quaternion_of
 from scenewright.stages.kit.simulation.engine import engine
+from scenewright.stages.kit.simulation.margins import is_marginal
 from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene
 from scenewright.stages.urdf.joint_sweep import JointRange, sweep_joints
 from scenewright.stages.urdf.scene_penetration import Overlap, resting_overlaps
@@ -46,6 +47,8 @@ class BodyMotion:
     turned_limit: float = TURNED_LIMIT
     leaves: float | None = None
     """When it first was beyond a limit, as far as it was looked at [s]."""
+    margin: float | None = None
+    """How far it is from what decides whether it stays (`settle_margins`); None: far."""
     poses: tuple[np.ndarray, ...] = field(default=(), compare=False, repr=False)
     """(4, 4) of its frame in the world, every WATCHED seconds from the start on."""
 
@@ -118,6 +121,34 @@ class SettleReport:
         return ", ".join(parts)
 
     @property
+    def margins(self) -> dict[str, float]:
+        """Body, joint, or pair -> margin of what is said of it, of those within reach of their thresholds."""
+        found = {body.name: body.margin for body in self.bodies} | {joint.joint: joint.margin for joint in self.joints}
+        found |= {f"{pair.first_link} in {pair.second_link}": pair.margin for pair in self.overlaps}
+        return {name: margin for name, margin in found.items() if margin is not None}
+
+    @property
+    def margin(self) -> float | None:
+        """Margin of the verdict: all that speaks for it would have to be otherwise, or one thing that is graver; None
+        where neither is within reach."""
+        grave = [(not body.stays, body.margin) for body in self.bodies]
+        grave += [(not joint.free_at_start, joint.margin) for joint in self.joints]
+        pairs = [(pair.depth > COLLISION_DEPTH, pair.margin) for pair in self.overlaps]
+        if self.verdict == "unsettled":
+            return _margin_of_all(grave)
+        turning = [margin for _, margin in grave if margin is not None]
+        if self.verdict == "penetrating":
+            turning += [margin for margin in [_margin_of_all(pairs)] if margin is not None]
+        else:
+            turning += [margin for _, margin in pairs if margin is not None]
+        return min(turning, default=None)
+
+    @property
+    def marginal(self) -> tuple[str, ...]:
+        """Bodies, joints and pairs of which the contrary is nearly as likely."""
+        return tuple(name for name, margin in self.margins.items() if is_marginal(margin))
+
+    @property
     def max_penetration_mm(self) -> float:
         """Depth of the deepest pair [mm], 0 when none share space."""
         return 1000.0 * max((overlap.depth for overlap in self.overlaps), default=0.0)
@@ -133,6 +164,8 @@ class SettleReport:
             "verdict": self.verdict,
             "reason": self.reason,
             "settled": self.settled,
+            "margin": self.margin,
+            "marginal": list(self.marginal),
             "seconds": self.seconds,
             "max_penetration_mm": self.max_penetration_mm,
             "collisions": len(self.collisions),
@@ -140,6 +173,13 @@ class SettleReport:
             "joints": [asdict(joint) | {"free_at_start": joint.free_at_start} for joint in self.joints],
             "overlaps": [asdict(overlap) for overlap in self.overlaps],
         }
+
+
+def _margin_of_all(entries: list[tuple[bool, float | None]]) -> float | None:
+    """Return the margin of a verdict that stands until all that fails (True) no longer does; None where one is far."""
+    margins = [margin for fails, margin in entries if fails]
+    known = [margin for margin in margins if margin is not None]
+    return max(known) if known and len(known) == len(margins) else None
 
 
 def _plain(body: BodyMotion) -> dict[str, Any]:
@@ -195,13 +235,13 @@ def _let_go(world: PhysicsWorld, seconds: float, moved_limit: float, turned_limi
         count = min(every, steps - done)
         world.step(count)
         for name in movable:
-            moved, turned = _gone(before[name], world.center_of_mass(name))
+            moved, turned = gone(before[name], world.center_of_mass(name))
             seen[name].append(world.pose(name))
             if moved > moved_limit or turned > turned_limit:
                 left.setdefault(name, (done + count) * world.time_step)
     motions = []
     for name in movable:
-        moved, turned = _gone(before[name], world.center_of_mass(name))
+        moved, turned = gone(before[name], world.center_of_mass(name))
         motions.append(
             BodyMotion(
                 name,
@@ -217,7 +257,7 @@ def _let_go(world: PhysicsWorld, seconds: float, moved_limit: float, turned_limi
     return motions
 
 
-def _gone(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
+def gone(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
     """Return how far [m] and by how much [rad] a pose (4, 4) is another one."""
     turned = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).magnitude()
     return float(np.linalg.norm(after[:3, 3] - before[:3, 3])), float(turned)
@@ -235,11 +275,13 @@ def settle_file(report: SettleReport) -> SettleFile:
         troubles=tuple(troubles),
         verdict=report.verdict,
         reason=report.reason,
+        margin=None if report.margin is None else round(report.margin, 2),
+        margins={name: round(margin, 2) for name, margin in report.margins.items()},
     )
 
 
 def _settled(body: BodyMotion) -> SettledBody:
-    far = max((_gone(body.poses[0], pose)[0] for pose in body.poses), default=0.0)
+    far = max((gone(body.poses[0], pose)[0] for pose in body.poses), default=0.0)
     shown = body.poses if far > SEEN_MOVE or not body.stays else ()
     rows = [np.round([*pose[:3, 3], *quaternion_of(pose)], 4).tolist() for pose in shown]
     return SettledBody(

@@ -12,12 +12,14 @@ from scenewright.schemas.errors import UsageError
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.simulation.margins import is_marginal
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.urdf.bodies import scene_bodies
 from scenewright.stages.urdf.exports import write_exports
 from scenewright.stages.urdf.giving_way import given_way
 from scenewright.stages.urdf.parameters import UrdfParameters
 from scenewright.stages.urdf.resting import rested_bodies
+from scenewright.stages.urdf.settle_margins import with_margins
 from scenewright.stages.urdf.settle_report import SettleReport, settle_file, settle_report
 from scenewright.stages.urdf.wedged import wedged_furniture
 
@@ -68,6 +70,8 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         summary |= _measures(report)
         if scene.bodies and not report.settled:
             outcome, summary["reason"] = report.verdict, report.reason
+        if is_marginal(report.margin):
+            summary["verdict"] = "marginal"
     return InteractiveScene(context.output, outcome=outcome, summary=summary)
 
 
@@ -106,6 +110,7 @@ def _settle(context: Context, parameters: UrdfParameters) -> SettleReport:
         moved_limit=parameters.settle_distance,
         turned_limit=math.radians(parameters.settle_angle),
     )
+    report = with_margins(report, context.output)
     for body in report.unsettled:
         fate = "falls through the floor" if body.fell_through else "does not stay where it was reconstructed"
         context.logger.warning(
@@ -121,7 +126,8 @@ def _settle(context: Context, parameters: UrdfParameters) -> SettleReport:
 
 
 def _measures(report: SettleReport) -> dict[str, float | str]:
-    return {
+    marginal = {"marginal": ", ".join(report.marginal)} if report.marginal else {}
+    return marginal | {
         "settled": float(report.settled),
         "unstable": len(report.unsettled),
         "fell_through": sum(body.fell_through for body in report.bodies),

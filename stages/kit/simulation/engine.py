@@ -1,4 +1,9 @@
-"""Import pybullet quietly: the library prints its build time and warnings to standard output, where data goes."""
+"""pybullet, quiet, and with every client's parameters its own.
+
+The library prints its build time and warnings to standard output, where data goes. And it keeps the distance at which
+contacts break once for the process (`gContactBreakingThreshold`): a world that sets it changes every other world, those
+made later too. `engine` is pybullet with that one parameter kept by client, and set before contacts are looked for.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +14,11 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+CONTACT_BREAKING = 0.02
+"""Distance [m] at which contacts break in a world that sets none: the library's own."""
 
 
 @contextmanager
@@ -33,6 +43,53 @@ def native_output_to_stderr() -> Iterator[None]:
 
 
 with native_output_to_stderr():
-    import pybullet as engine
+    import pybullet
 
-__all__ = ["engine", "native_output_to_stderr"]
+_contact_breaking: dict[int, float] = {}
+"""Client -> distance at which its contacts break [m], of those that set one."""
+
+
+def _connect(*arguments: Any, **named: Any) -> int:
+    client = int(pybullet.connect(*arguments, **named))
+    _contact_breaking.pop(client, None)  # numbers of clients are used again
+    return client
+
+
+def _set_parameters(*, physicsClientId: int, **named: Any) -> None:
+    if "contactBreakingThreshold" in named:
+        _contact_breaking[physicsClientId] = named["contactBreakingThreshold"]
+    pybullet.setPhysicsEngineParameter(**named, physicsClientId=physicsClientId)
+
+
+def _step(*, physicsClientId: int) -> Any:
+    _own_contact_breaking(physicsClientId)
+    return pybullet.stepSimulation(physicsClientId)
+
+
+def _detect_collisions(*, physicsClientId: int) -> Any:
+    _own_contact_breaking(physicsClientId)
+    return pybullet.performCollisionDetection(physicsClientId)
+
+
+def _closest_points(*arguments: Any, physicsClientId: int, **named: Any) -> Any:
+    _own_contact_breaking(physicsClientId)
+    return pybullet.getClosestPoints(*arguments, physicsClientId=physicsClientId, **named)
+
+
+def _own_contact_breaking(client: int) -> None:
+    distance = _contact_breaking.get(client, CONTACT_BREAKING)
+    pybullet.setPhysicsEngineParameter(contactBreakingThreshold=distance, physicsClientId=client)
+
+
+engine = SimpleNamespace(
+    **vars(pybullet)
+    | {
+        "connect": _connect,
+        "setPhysicsEngineParameter": _set_parameters,
+        "stepSimulation": _step,
+        "performCollisionDetection": _detect_collisions,
+        "getClosestPoints": _closest_points,
+    }
+)
+
+__all__ = ["CONTACT_BREAKING", "engine", "native_output_to_stderr"]

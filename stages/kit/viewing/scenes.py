@@ -14,6 +14,7 @@ from scenewright.stages.kit.drawing.palette import instance_color
 from scenewright.stages.kit.formats.link_poses import link_poses
 from scenewright.stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
 from scenewright.stages.kit.geometry.transforms import inverse, transform_from_quaternion
+from scenewright.stages.kit.simulation.margins import is_marginal
 from scenewright.stages.kit.viewing.canvas import SHELL, Canvas, JointedLink, Trust
 from scenewright.stages.kit.viewing.graphs import draw_graph
 from scenewright.stages.kit.viewing.meshes import merged, shape_mesh
@@ -103,6 +104,9 @@ def draw_settling(scene: InteractiveScene, canvas: Canvas, prefix: str = "scene"
             canvas.moment(body.leaves, text, bad=True)
     canvas.always()
     canvas.moment(0.0, "let go")
+    for name, margin in settling.margins.items():
+        if is_marginal(margin):
+            canvas.moment(0.0, f"{name} is marginal: {margin:.1f} standard deviations to its limit")
     for trouble in settling.troubles:
         canvas.moment(0.0, trouble, bad=True)
     if settling.times:

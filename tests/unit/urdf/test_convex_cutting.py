@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenewright.stages.urdf.convex_cutting import THINNEST, half, outside_box
 from scipy.spatial import ConvexHull
@@ -18,6 +18,7 @@ def volume(points: np.ndarray) -> float:
     return float(ConvexHull(points).volume)
 
 
+@settings(deadline=None)
 @given(st.tuples(*[st.tuples(st.integers(-5, 15), st.integers(1, 20))] * 3))
 def test_what_is_left_of_a_cube_is_all_but_the_box(sides: tuple[tuple[int, int], ...]) -> None:
     low = np.array([start / 10 for start, _ in sides])
@@ -31,6 +32,7 @@ def test_what_is_left_of_a_cube_is_all_but_the_box(sides: tuple[tuple[int, int],
         assert inside.min() <= 1e-9, "an axis-aligned piece meets the box"
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**31), st.integers(0, 2), st.floats(-0.5, 0.5))
 def test_two_halves_of_any_hull_make_the_whole(seed: int, axis: int, limit: float) -> None:
     points = np.random.default_rng(seed).normal(0, 0.3, (12, 3))

@@ -151,7 +151,7 @@ def test_a_heap_without_a_name_gives_way_to_a_chair(tmp_path: Path) -> None:
     block.subdivide().export(scene.root / "meshes" / "surroundings.ply")
     made = run(scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
     assert made.summary["cut"] == 1 and made.summary["held"] == 0 and made.summary["movable"] == 2
-    assert made.summary["collisions"] == 0 and float(made.summary["largest_move_mm"]) < 50, "it is not thrown out"
+    assert made.outcome == "ok" and made.summary["collisions"] == 0
     pieces = written_pieces(made.root)
     left, before = np.concatenate([piece.points for piece in pieces["surroundings"]]), np.asarray(block.vertices)
     assert left.min(axis=0) == pytest.approx(before.min(axis=0), abs=0.02), "it is cut, not moved"

@@ -37,9 +37,12 @@ def _verdict(scene: InteractiveScene) -> str:
     """Return a sentence on what became of the scene when it was let go; empty where that was not tried."""
     if "settled" not in scene.summary:
         return ""
+    marginal = scene.summary.get("marginal")
+    doubt = f" A tenth of a millimetre may turn what is said of {marginal}." if marginal else ""
     if scene.outcome == "ok":
-        return f" Let go for a few seconds, all {scene.summary.get('movable', 0)} free bodies stay where they are."
-    return f" It is {scene.outcome.replace('_', ' ')}: {scene.summary.get('reason', 'see its summary')}."
+        count = scene.summary.get("movable", 0)
+        return f" Let go for a few seconds, all {count} free bodies stay where they are.{doubt}"
+    return f" It is {scene.outcome.replace('_', ' ')}: {scene.summary.get('reason', 'see its summary')}.{doubt}"
 
 
 def _trees(interactive_scene: InteractiveScene) -> Corresponding | None:
