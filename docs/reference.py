@@ -50,7 +50,7 @@ def commands_page() -> str:
         lines += ["| reads | |", "|---|---|"]
         lines += [f"| `--{role.replace('_', '-')}` | {_input(what)} |" for role, what in stage.reads.items()]
         kind = stage.writes.kind
-        lines += ["", f"Writes a [{kind}](kinds.md#{kind}). Version {stage.version}.", "", *_options(stage), ""]
+        lines += ["", f"Writes a [{kind}](kinds.md#{kind}).", "", *_options(stage), ""]
     lines += [
         "## Other commands",
         "",

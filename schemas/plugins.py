@@ -24,7 +24,8 @@ Taken = TypeVar("Taken")
 logger = logging.getLogger("scenewright")
 
 
-def _imported(module: str) -> ModuleType:
+def load_module(module: str) -> ModuleType:
+    """Import a module by its name. Who calls this names it, so that its code can be followed."""
     return importlib.import_module(module)
 
 
@@ -39,7 +40,7 @@ class PlugIn:
 
     def load(self) -> ModuleType:
         """Import what it names. Raises whatever that raises."""
-        return _imported(self.module)
+        return load_module(self.module)
 
     def say_broken(self, reason: str) -> None:
         """Tell that it is left out."""

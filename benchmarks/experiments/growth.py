@@ -199,7 +199,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterable[tuple[Trial, list
             work: tuple[Any, ...] = (fuse_walk, frames, voxel_size, count // one_of, standing)
         else:
             work = (segment_parts, frames) if trial.arm == SEGMENT else (listing_memory, frames, count)
-        yield trial, alone(*work, **AS_THE_COMMAND_LINE)
+        yield trial, alone(*work, **AS_THE_COMMAND_LINE)  # type: ignore[arg-type]
 
 
 def row_at(frames: int | None) -> Callable[[list[dict[str, float]]], dict[str, float] | None]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 import pkgutil
 from types import ModuleType
 
 from scenewright.schemas.errors import UsageError
-from scenewright.schemas.plugins import installed
+from scenewright.schemas.plugins import installed, load_module
 
 
 def _modules(package: ModuleType) -> dict[str, str]:
@@ -28,4 +27,4 @@ def module_named(package: ModuleType, name: str) -> ModuleType:
     modules = _modules(package)
     if name not in modules:
         raise UsageError(f"there is no {name!r}", hint=f"choose of {', '.join(sorted(modules))}")
-    return importlib.import_module(modules[name])
+    return load_module(modules[name])

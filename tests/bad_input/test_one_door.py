@@ -54,6 +54,8 @@ CACHE = "what this program keeps for itself; what cannot be read is asked for an
 WORLD = "no file: a method of this name, of a simulator or a format"
 SERVICE = "a message of a service, cut at the largest body"
 
+TAUGHT = "what the maker of a training's data has written"
+
 WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "cli/streams.py": {"os.open": DEVICE},
     "cli/viewing/desk/desk.py": {"read_text": OURS},
@@ -61,6 +63,19 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/kit/viewing/page/library.py": {"open": OURS, "zipfile.ZipFile": OURS},
     "stages/kit/viewing/page/page_canvas.py": {"read_text": OURS},
     "schemas/base.py": {"model_validate_json": PARSED},
+    "schemas/plugins.py": {"open": OURS},
+    "stages/disparity/training/raft_stereo/kept_pairs.py": {"cv2.imread": TAUGHT},
+    "stages/engine/code/digests.py": {"json.loads": CACHE, "read_text": CACHE},
+    "stages/engine/code/program.py": {"read_text": OURS},
+    "stages/kit/exports.py": {"read_text": OURS},
+    "stages/kit/formats/mosd_frames.py": {"cv2.imread": PICTURE},
+    "stages/kit/training/run.py": {"json.loads": MADE, "read_text": MADE},
+    "stages/segment/training/network/samples.py": {"json.loads": TAUGHT, "read_text": TAUGHT},
+    "stages/splat/training/word_probabilities/asked_places.py": {"json.loads": TAUGHT, "read_text": TAUGHT},
+    "stages/splat/training/words/lexicon.py": {"read_text": OURS, "tomllib.loads": OURS},
+    "stages/suture/training/needle_evidence/train.py": {"json.loads": TAUGHT, "read_text": TAUGHT},
+    "stages/suture/training/network/train.py": {"read_bytes": MADE},
+    "stages/suture/training/network/views.py": {"cv2.imread": TAUGHT},
     "schemas/vocabulary.py": {"open": OURS, "tomllib.load": OURS},
     "stages/cutting/recording/server.py": {"model_validate_json": PARSED, "read_bytes": OURS},
     "stages/predicates/teacher/terminal.py": {"model_validate_json": PARSED},
@@ -81,7 +96,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/engine/known_models.py": {"open": OURS, "tomllib.load": OURS},
     "stages/engine/memory_limit.py": {"read_text": KERNEL},
     "stages/engine/model_cache.py": {"open": WRITES},
-    "stages/engine/store.py": {"os.open": WRITES},
+    "stages/engine/store.py": {"open": WRITES, "os.open": WRITES},
     "stages/fuse/annotated_scan.py": {"json.loads": PARSED},
     "stages/ingest/folders/calibration_files.py": {"json.loads": PARSED},
     "stages/ingest/layouts/colmap/model.py": {"np.memmap": BOUNDED},

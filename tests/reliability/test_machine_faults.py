@@ -19,12 +19,18 @@ import pytest
 from scenewright.schemas.errors import BadInput, MachineFailure, ScenewrightError, UsageError
 from scenewright.schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
 from scenewright.stages.engine import interruption, runner, store
+from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.engine.reading import open_artifact
 from scenewright.stages.engine.runner import RunResult, run_stage
 from scenewright.stages.engine.verification import verify
 
 from tests.contract.probe_step import PROBE, ProbeParameters
 from tests.reliability.running import REPOSITORY, file_size_limit, memory_limit, only_error, run_probe, small_disk
+
+
+@pytest.fixture(autouse=True)
+def probe(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(all_stages(), "probe", PROBE)
 
 
 def make(out: Path, inputs: dict[str, Path] | None = None, *, force: bool = False, **values) -> RunResult:
@@ -600,12 +606,10 @@ sys.meta_path.insert(0, Numpy())
 """numpy makes an import error of an interruption while it loads."""
 
 
-@pytest.mark.parametrize(
-    "interrupted", [IMPORT, "main._refuse_foreign_packages = lambda: os.kill(os.getpid(), signal.SIGINT)\n"]
-)
+@pytest.mark.parametrize("interrupted", [IMPORT, "main._run_and_exit = lambda: os.kill(os.getpid(), signal.SIGINT)\n"])
 def test_an_interruption_while_code_loads_ends_in_one_line(interrupted: str) -> None:
     heard = "signal.signal(signal.SIGINT, signal.default_int_handler)"  # a shell's background jobs begin deaf to it
-    script = f"import os, signal, sys\n{heard}\nfrom cli import main\n{interrupted}main.main()\n"
+    script = f"import os, signal, sys\n{heard}\nfrom scenewright.cli import main\n{interrupted}main.main()\n"
     done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
     assert done.returncode == 130
     assert done.stderr == "error: interrupted; every finished artifact is as it was\n"

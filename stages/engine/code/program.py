@@ -418,6 +418,9 @@ class _Writer:
         if isinstance(node, ast.JoinedStr):
             first = node.values[0] if node.values else None
             if isinstance(first, ast.Constant) and isinstance(first.value, str) and "." in first.value:
+                for group, modules in self._program.places.plugins.items():
+                    for module in modules if group.startswith(first.value) else ():
+                        self._put(Whole(module))
                 package = first.value.rpartition(".")[0]
                 if self._program.is_ours(package) and "." in package:
                     self._put(Whole(package))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
 import time
@@ -171,7 +172,7 @@ def test_changed_modules_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 def test_a_fork_that_holds_older_code_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "held.py", "")
     monkeypatch.syspath_prepend(tmp_path)
-    __import__("held")
+    importlib.import_module("held")
     monkeypatch.setattr(inherited, "_modules", frozenset({"held"}))
     os.utime(tmp_path / "held.py", (1, 1))
     inherited.refuse_edited(["held", "other"])

@@ -324,7 +324,7 @@ def test_times_and_commands_come_from_the_manifests(tmp_path):
     for text in (
         "12.5 s",
         "512 MB",
-        "ingest v2",
+        "ingest, code unknown",
         "scenewright ingest --log 'a b'",
         "d" * 64,
         "c0ffeec0ffee with local",
