@@ -6,6 +6,7 @@ The list stands in the run's folder and in every manifest below it, and in what 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 
 from scenewright.schemas.accepted_code import ACCEPTED_CODE_NAME, AcceptedCode, AcceptedCodeFile
@@ -32,31 +33,33 @@ def accept_code(run: Path) -> tuple[AcceptedCode, ...]:
     """Accept today's code for every artifact of a run that other code made; return what was accepted now.
 
     Artifacts whose step is gone are left as they are. Raises BadInput where the folder holds no artifact, or one that
-    is damaged; nothing is written then.
+    is damaged, and MachineFailure where a step is writing one; nothing is written then.
     """
-    artifacts = {path.parent: read_manifest(path.parent) for path in sorted(Path(run).glob(f"*/{MANIFEST_NAME}"))}
-    if not artifacts:
+    roots = [path.parent for path in sorted(Path(run).glob(f"*/{MANIFEST_NAME}"))]
+    if not roots:
         raise BadInput(f"{run}: no artifact in it", hint="give the folder of a run")
-    for root, manifest in artifacts.items():
-        check_sizes(root, manifest)
-    new = [
-        AcceptedCode(step=manifest.stage, made_with=manifest.code, accepted=code)
-        for manifest in artifacts.values()
-        if (code := _code_today(manifest.stage)) not in ("", manifest.code) and not is_accepted(manifest, code)
-    ]
-    if not new:
+    with ExitStack() as locks:  # a step that replaced an artifact meanwhile would get the manifest of the old one
+        for root in roots:
+            locks.enter_context(store.locked(root))
+        artifacts = {root: read_manifest(root) for root in roots}
+        for root, manifest in artifacts.items():
+            check_sizes(root, manifest)
+        new = dict.fromkeys(entry for manifest in artifacts.values() for entry in _to_accept(manifest))
+        if new:
+            path = Path(run) / ACCEPTED_CODE_NAME
+            before = AcceptedCodeFile.read(path).accepted if path.is_file() else ()
+            entries = tuple(dict.fromkeys((*before, *new)))
+            store.replace_document(AcceptedCodeFile(accepted=entries), path)
+            for root, manifest in artifacts.items():
+                carried = tuple(dict.fromkeys((*manifest.accepted_code, *entries)))
+                store.replace_document(manifest.model_copy(update={"accepted_code": carried}), root / MANIFEST_NAME)
+    return tuple(new)
+
+
+def _to_accept(manifest: Manifest) -> tuple[AcceptedCode, ...]:
+    """What has to be accepted so that an artifact counts as made by today's code; empty where its step is gone."""
+    stage = all_stages().get(manifest.stage)
+    code = step_code(stage).digest if stage is not None else manifest.code
+    if code == manifest.code or is_accepted(manifest, code):
         return ()
-    path = Path(run) / ACCEPTED_CODE_NAME
-    before = AcceptedCodeFile.read(path).accepted if path.is_file() else ()
-    entries = tuple(dict.fromkeys((*before, *new)))
-    store.replace_document(AcceptedCodeFile(accepted=entries), path)
-    for root, manifest in artifacts.items():
-        with store.locked(root):
-            carried = tuple(dict.fromkeys((*manifest.accepted_code, *entries)))
-            store.replace_document(manifest.model_copy(update={"accepted_code": carried}), root / MANIFEST_NAME)
-    return tuple(dict.fromkeys(new))
-
-
-def _code_today(step: str) -> str:
-    stage = all_stages().get(step)
-    return step_code(stage).digest if stage is not None else ""
+    return (AcceptedCode(step=manifest.stage, made_with=manifest.code, accepted=code),)

@@ -19,7 +19,7 @@ from typing import Any
 from scenewright.schemas.errors import MachineFailure
 from scenewright.schemas.plugins import plugins
 from scenewright.stages.engine.code import inherited
-from scenewright.stages.engine.code.places import OURS, places_here
+from scenewright.stages.engine.code.places import OURS, added_folders, places_here
 from scenewright.stages.engine.code.program import Code, Definition, Program, Whole
 from scenewright.stages.engine.discovery import package_of
 from scenewright.stages.engine.user_cache import cache_folder
@@ -33,6 +33,8 @@ SETTLED_SECONDS = 0.1
 MOST_TREES = 8
 """Checkouts and installations whose answers are kept; the one that was asked for longest ago goes first."""
 
+Added = tuple[tuple[str, tuple[str, ...]], ...]
+"""Packages and their folders, of those that this process gave more than their own."""
 MOST_EARLIER = 4
 """Codes of a step that were seen before, by which a change is named."""
 
@@ -55,7 +57,7 @@ def changed_modules(stage: Stage, before: str) -> list[str]:
     is none of them. Empty where that code was not seen here lately."""
     code = step_code(stage)
     roots = _roots_of(stage)
-    modules = _kept((*roots, *_followed(roots))).get("earlier", {}).get(before, {})
+    modules = _kept(_question(roots, _followed(roots), added_folders())).get("earlier", {}).get(before, {})
     if not modules:
         return []
     new, gone = (
@@ -71,23 +73,32 @@ def _roots_of(stage: Stage) -> tuple[str, str]:
     return run, f"{stage.parameters.__module__}:{stage.parameters.__name__}"
 
 
-@cache
 def code_of(*roots: str, also: tuple[str, ...] = ()) -> Code:
     """Return the code that definitions reach, each given as `module:name`, or a whole module as `module:`.
 
     What is followed is scenewright, the packages at the top of these, and those that `also` names. Raises KeyError for
     one that is not there.
     """
-    also = _followed(roots, also)
-    kept = _read_kept((*roots, *also))
+    return _code_of(roots, _followed(roots, also), added_folders())
+
+
+@cache
+def _code_of(roots: tuple[str, ...], also: tuple[str, ...], added: Added) -> Code:
+    question = _question(roots, also, added)
+    kept = _read_kept(question)
     if kept is not None:
         return kept
-    program = _program(also)
+    program = _program(also, added)
     before = time.time()
     pairs = [root.split(":") for root in roots]
     code = program.code_of([Definition(module, name) if name else Whole(module) for module, name in pairs])
-    _keep((*roots, *also), program, code, before)
+    _keep(question, program, code, before)
     return code
+
+
+def _question(roots: Sequence[str], also: Sequence[str], added: Added) -> list[str]:
+    """What is asked of the code as it lies on the disk: definitions, packages and folders."""
+    return [*roots, *also, *(f"{name}={folder}" for name, folders in added for folder in folders)]
 
 
 def _followed(roots: Sequence[str], also: Sequence[str] = ()) -> tuple[str, ...]:
@@ -96,7 +107,8 @@ def _followed(roots: Sequence[str], also: Sequence[str] = ()) -> tuple[str, ...]
 
 
 @cache
-def _program(also: tuple[str, ...]) -> Program:
+def _program(also: tuple[str, ...], added: Added) -> Program:
+    """One for all steps of a process: they share most modules. `added` is what it would otherwise not notice."""
     return Program(places_here(_plugins(), also))
 
 
@@ -109,28 +121,28 @@ def _plugins() -> Mapping[str, Sequence[str]]:
     return modules
 
 
-def _file_of(roots: Sequence[str]) -> Path | None:
-    """Where the answer for these roots in this tree is kept."""
+def _file_of(question: Sequence[str]) -> Path | None:
+    """Where the answer to a question about this tree is kept."""
     tree = sha256_of_text(json.dumps([FORMAT, str(Path(__file__).resolve()), _plugins()]))[:16]
     try:
-        return cache_folder("code") / tree / f"{sha256_of_text(json.dumps(roots))[:16]}.json"
+        return cache_folder("code") / tree / f"{sha256_of_text(json.dumps(question))[:16]}.json"
     except MachineFailure:
         return None
 
 
-def _kept(roots: Sequence[str]) -> dict[str, Any]:
-    """What is kept of these roots, whether it is still true or not; empty where nothing is."""
-    path = _file_of(roots)
+def _kept(question: Sequence[str]) -> dict[str, Any]:
+    """What is kept of a question, whether it is still true or not; empty where nothing is."""
+    path = _file_of(question)
     with suppress(OSError, ValueError):
         kept = json.loads(path.read_text(encoding="utf-8")) if path else {}
-        if isinstance(kept, dict) and kept.get("roots") == list(roots):
+        if isinstance(kept, dict) and kept.get("question") == question:
             return kept
     return {}
 
 
-def _read_kept(roots: Sequence[str]) -> Code | None:
+def _read_kept(question: Sequence[str]) -> Code | None:
     """Return the kept answer where every file and folder is as it was."""
-    kept = _kept(roots)
+    kept = _kept(question)
     try:
         if any(_stamp(file) != stamp for file, stamp in kept["files"].items()):
             return None
@@ -141,19 +153,19 @@ def _read_kept(roots: Sequence[str]) -> Code | None:
         return None
 
 
-def _keep(roots: Sequence[str], program: Program, code: Code, before: float) -> None:
+def _keep(question: Sequence[str], program: Program, code: Code, before: float) -> None:
     """Keep an answer, whole or not at all, unless a file is too young to be told from a later one."""
-    path = _file_of(roots)
+    path = _file_of(question)
     if path is None:
         return
     with suppress(OSError):
         files = {str(file): _stamp(str(file)) for file in sorted(program.places.files)}
         if any(stamp[2] / 1e9 > before - SETTLED_SECONDS for stamp in files.values()):
             return
-        old = _kept(roots)
+        old = _kept(question)
         earlier = old.get("earlier", {}) | ({old["digest"]: old["modules"]} if "digest" in old else {})
         content = {
-            "roots": list(roots),
+            "question": question,
             "earlier": dict(list(earlier.items())[-MOST_EARLIER:]),
             "digest": code.digest,
             "modules": code.modules,

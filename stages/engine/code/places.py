@@ -29,10 +29,6 @@ class Places:
     files: set[Path] = field(default_factory=set)
     folders: set[Path] = field(default_factory=set)
 
-    def is_ours(self, name: str) -> bool:
-        """Whether a dotted name is a module or package that is followed."""
-        return self.file(name) is not None
-
     def file(self, name: str) -> Path | None:
         """Return the file of a dotted name; None where it is no module that is followed."""
         top, _, _ = name.partition(".")
@@ -89,3 +85,13 @@ def _folders_of(top: str) -> list[Path]:
         return [Path(folder) for folder in sys.modules[top].__path__]
     spec: importlib.machinery.ModuleSpec | None = importlib.util.find_spec(top)
     return [Path(folder) for folder in spec.submodule_search_locations or ()] if spec else []
+
+
+def added_folders() -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the packages of scenewright that this process has given more folders than their own, and those folders:
+    modules that no installation names."""
+    added = []
+    for name, module in sorted(sys.modules.items()):
+        if name.startswith(f"{OURS}.") and len(folders := tuple(getattr(module, "__path__", ()))) > 1:
+            added.append((name, folders))
+    return tuple(added)

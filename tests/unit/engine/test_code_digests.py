@@ -46,7 +46,7 @@ def write(path: Path, text: str) -> None:
 
 
 def forget() -> None:
-    digests.code_of.cache_clear()
+    digests._code_of.cache_clear()
     digests._program.cache_clear()
 
 
@@ -91,6 +91,21 @@ def test_what_an_installed_package_declares_counts_where_its_group_is_asked_for(
     assert len({before, asked, digest()}) == 3
     write(package.parent / "toyplugin" / "hues.py", "def broken(:\n")
     digest()
+
+
+def test_a_folder_that_a_user_gives_to_a_package_of_ours_counts(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the notebook on backends does: in a process of its own, after another has kept an answer without it."""
+    mine = package.parent / "mine"
+    write(mine / "hues.py", "VALUE = 1\n")
+    write(package / "core.py", 'def core():\n    return every("scenewright.stages.urdf.exporters")\n')
+    import scenewright.stages.urdf.exporters as ours
+
+    without = digest()
+    monkeypatch.setattr(ours, "__path__", [*ours.__path__, str(mine)])
+    assert digests.code_of("toybench.measuring:measure").digest != without, "within one process too"
+    first = digest()
+    write(mine / "hues.py", "VALUE = 2\n")
+    assert len({without, first, digest()}) == 3
 
 
 def test_what_was_read_is_kept_and_not_read_again(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,12 +173,12 @@ def test_changed_modules_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     stage = all_stages()["truth edited"]
     forget()
     code = digests.step_code(stage)
-    kept = digests._kept(digests._roots_of(stage))
+    kept = digests._kept(digests._question(digests._roots_of(stage), (), digests.added_folders()))
     if not kept:
         pytest.skip("the checkout is a moment old")
     name = sorted(code.modules)[-1]
     earlier = {"before": {**code.modules, name: "other"}, "moved": {f"{n}_moved": d for n, d in code.modules.items()}}
-    monkeypatch.setattr(digests, "_kept", lambda roots: {**kept, "earlier": earlier})
+    monkeypatch.setattr(digests, "_kept", lambda question: {**kept, "earlier": earlier})
     assert digests.changed_modules(stage, "before") == [name]
     assert digests.changed_modules(stage, "moved") == []
     assert digests.changed_modules(stage, "never seen") == []
