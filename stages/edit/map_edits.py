@@ -16,15 +16,15 @@ from scenewright.stages.kit.geometry.transforms import rotation_between, transfo
 from scipy.spatial import cKDTree
 
 FEWEST_VERTICES = 20
-"""Of a thing that an edit makes, and of what it leaves of another: as `fuse` drops smaller ones."""
+"""Fewest vertices of a thing that an edit makes or leaves, as in `fuse`."""
 MOST_STEPS = 200
 """Along an edge of a box that is drawn into the map."""
 
 MOSTLY_ONE = 0.8
-"""Of the surface of each thing that was merged already, this share is called what they are together."""
+"""Share of the surface of every merged thing that has to lie in a whole for the edit to be done already."""
 FLOOR = "floor"
 THICKNESS = 0.02
-"""Of a floor that is drawn [m]."""
+"""Thickness of a floor that is drawn [m]."""
 FLOOR_STEP = 0.05
 """Between its vertices [m]."""
 NARROWEST = 0.05

@@ -29,6 +29,7 @@ JOINT_REACH = 0.25
 JOINT_CLEAR = 0.6
 """... and nearer than this share of the distance of the next one."""
 JOINT_ANGLE = math.radians(25.0)
+"""Two joints are the same one when their axes differ by no more than this [rad]. By eye."""
 
 
 def choose_model(state: SceneState, edit: ChooseModel, fitting: Fitting) -> Done:

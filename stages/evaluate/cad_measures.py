@@ -22,7 +22,7 @@ from scenewright.stages.kit.measurement.pose_error import position_error, rotati
 from scenewright.stages.kit.measurement.tables import Cell, Table
 
 QUARTER_TURN = np.pi / 2
-"""By so much furniture may look alike when it is turned [rad]."""
+"""Turn by which much furniture looks the same [rad]."""
 OPEN_FROM = 0.05
 """A joint counts as open from this value on [rad or m]."""
 

@@ -23,7 +23,7 @@ NOT_SHOWN = "not_shown"
 
 
 SMALLEST_ABOVE_ZERO = 1e-9
-"""Of an option that divides, spaces or weighs something."""
+"""Smallest value of an option that divides, spaces or weighs something."""
 
 
 class Parameters(BaseModel):

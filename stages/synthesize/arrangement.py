@@ -25,9 +25,9 @@ RESTARTS = 24
 """Rooms begun before the recipe is given up."""
 HEADROOM = 1.9
 """Height of the space that must stay free for people and robots [m]."""
-WALL, CENTRE_MARGIN, FLOOR_MARGIN, TOUCH = 0.0, 0.8, 0.04, 4e-4
-"""Margins [m], by eye: to a wall (unused), of what stands free to the walls, between things on the floor, and between
-a thing and what it stands on."""
+CENTRE_MARGIN, FLOOR_MARGIN, TOUCH = 0.8, 0.04, 4e-4
+"""Margins [m], by eye: of what stands free to the walls, between things on the floor, and between a thing and what it
+stands on."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 Verdict = Literal["ok", "unsettled", "penetrating", "nothing_movable"]
 """Outcome of a scene that was let go."""
 SECONDS = 3.0
+"""Simulated time that a scene is given to come to rest [s]."""
 MOVED_LIMIT = 0.01
 """A movable body that moves further has not stayed [m]."""
 TURNED_LIMIT = np.radians(2.0)

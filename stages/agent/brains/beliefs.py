@@ -11,7 +11,7 @@ from scenewright.stages.agent.goals import FURNITURE, Among, Description, Gather
 from scenewright.stages.agent.language.values import SceneObject
 
 MOST_FAILURES = 3
-"""Of one step of one thing before it is left alone."""
+"""Failures of one step with one thing after which the thing is left alone."""
 
 
 @dataclass(frozen=True)

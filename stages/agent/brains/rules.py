@@ -21,11 +21,11 @@ from scenewright.stages.agent.language.interpreter import Ran
 from scenewright.stages.agent.language.values import SceneObject
 
 SEVERAL = 2
-"""Of the things that a middle is of: of one alone, the middle is where it stands."""
+"""Fewest things that have a middle to gather at; one alone is its own middle."""
 MOST_TROUBLES = 30
-"""Of a session before it is given up."""
+"""Troubles after which a session is given up."""
 MOST_PICTURES = 2
-"""Of a thing that looks used, to see whether it is."""
+"""Pictures taken of a thing that looks used, to see whether it is."""
 
 
 class RulesBrain:

@@ -11,6 +11,7 @@ import signal
 import sys
 
 SET_PARENT_DEATH_SIGNAL = 1
+"""Number of `PR_SET_PDEATHSIG` in Linux's prctl."""
 
 
 def main() -> None:

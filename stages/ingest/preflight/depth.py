@@ -21,8 +21,6 @@ SATURATED = 0.2
 """Share of valid pixels at the largest value that suggests a cut-off."""
 COARSE_VALUES = 256
 """Depth with fewer values in every frame was 8-bit once."""
-COARSE_STEP = 0.02
-"""Step [m] from which on such depth is called coarse."""
 HISTOGRAM_BINS = 48
 """Bars of the depth histogram; by eye."""
 

@@ -35,7 +35,7 @@ much as ten compiled ones."""
 ESCAPES = 120
 """Directions that are tried to leave a place too narrow for the compiled check."""
 REJECTIONS = 4
-"""So many paths that the meshes reject, and the mesh checker takes over the search."""
+"""Paths that the meshes reject before the mesh checker takes over the search."""
 
 
 def find_path(

@@ -17,7 +17,7 @@ from scenewright.stages.kit.rendering.surfaces import TriangleSoup
 LIGHT_POINTS = 4
 """Every lamp is sampled at so many points squared."""
 DIRECTIONS = 48
-"""So many look for light over every sample: a Vogel disk lifted to the hemisphere (Malley's method)."""
+"""Rays that look for light over every sample: a Vogel disk lifted to the hemisphere (Malley's method)."""
 MOST_SUBDIVISIONS = 128
 """Most subdivisions of a triangle's edge in the map; a bound on its memory."""
 RAY_DIRECTION = 3

@@ -87,7 +87,7 @@ class Alike:
 SECTORS = 8
 """Regions of views around a thing."""
 NEAR = 1.5
-"""From nearer than this is another region [m]."""
+"""Distance within which all views of a thing are one region [m]."""
 
 
 def view_region(camera: np.ndarray, points: np.ndarray) -> tuple[int, int]:

@@ -29,9 +29,11 @@ from scenewright.stages.kit.simulation.urdf_split import (
 )
 
 TIME_STEP = 1.0 / 240.0
+"""Time between two states [s]: Bullet's default."""
 GRAVITY = 9.81
+"""Acceleration of what falls [m/s²]."""
 FRICTION = 0.6
-"""Of links whose file has none; Bullet multiplies the values of the two links of a contact."""
+"""Friction coefficient of links whose file has none; Bullet multiplies the values of the two links of a contact."""
 JOINT_FRICTION = 0.4
 """Torque [N m] or force [N] that holds an unpowered door or drawer where it was left."""
 

@@ -22,6 +22,7 @@ from scenewright.stages.kit.training.run_state import read_state, write_state
 _LOGGER = logging.getLogger("scenewright")
 FACTS, LOG = "state.json", "log.jsonl"
 LOGGED_EVERY = 50
+"""Steps between two lines of the log."""
 
 
 def rate_at(step: int, steps: int, peak: float, warm_up: float) -> float:

@@ -31,7 +31,7 @@ from scenewright.stages.tableware.world.footprints import Footprint, footprint, 
 from scenewright.stages.tableware.world.items import Item, Table
 
 MOST_DISHES = 6
-"""In one grasp: three in each of two piles (section 6.4)."""
+"""Most dishes in one grasp: three in each of two piles (section 6.4)."""
 
 
 @dataclass(frozen=True)

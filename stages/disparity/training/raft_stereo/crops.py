@@ -13,6 +13,7 @@ HEIGHT, WIDTH = 128, 256
 LEAST, LARGEST = 1.0, 96.0
 """Disparities that are learned [px]; others in a crop count as unknown."""
 TEXTURES = 60
+"""Textures that scenes are drawn with. By eye."""
 Sample = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Left and right (HEIGHT, WIDTH, 3) uint8, disparity (HEIGHT, WIDTH) float32 [px], NaN where it does not count."""
 

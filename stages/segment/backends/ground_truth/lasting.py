@@ -13,22 +13,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from pydantic import TypeAdapter
 from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
+from scenewright.schemas.places import data_file
 from scenewright.stages.kit.rendering.segmenter_errors import Alike, Luck, view_region
 from scenewright.stages.segment.backends.ground_truth.corruption import displace_boundaries, merge, touching_things
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
-RATES_FILE = Path(__file__).resolve().parents[4] / "data" / "errors" / "segmenters.toml"
+RATES_FILE = data_file("errors/segmenters.toml")
 CELL = 0.5
 """Edge of the cubes of which each is one place for a false mask [m]."""
 FALSE_RADIUS = (0.1, 0.3)
 """**Assumed**: size of false masks [m]."""
 LEAST_CELL_PIXELS = 400
-"""Of a place that is in view, at 640 pixels of width."""
+"""Pixels of a place from which on it is in view, at 640 pixels of width."""
 BOUNDARY = 2.4
 """**Assumed**: standard deviation of boundaries [pixels at 640 width], drawn anew in every frame."""
 NEVER_SEEN = 5.0

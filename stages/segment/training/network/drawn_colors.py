@@ -8,7 +8,7 @@ from scenewright.stages.segment.training.network.draws import Draws
 from torch.nn import functional
 
 REACH = 5
-"""Of the kernels that blur [pixels]."""
+"""Radius of the kernels that blur [px]."""
 LUMINANCE = (
     (16, 11, 10, 16, 24, 40, 51, 61),
     (12, 12, 14, 19, 26, 58, 60, 55),
@@ -29,7 +29,7 @@ CHROMINANCE = (
 )
 """ITU-T T.81, table K.2."""
 FROM_RGB = ((0.299, 0.587, 0.114), (-0.168736, -0.331264, 0.5), (0.5, -0.418688, -0.081312))
-"""To luminance and two chrominances (JFIF)."""
+"""Matrix from RGB to luminance and two chrominances (JFIF)."""
 
 
 def other_colors(color: torch.Tensor, draws: Draws, generator: torch.Generator) -> torch.Tensor:

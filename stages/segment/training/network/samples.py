@@ -18,6 +18,7 @@ from scenewright.stages.segment.training.network.shards import DEPTH_UNIT
 from scenewright.stages.segment.training.network.targets import IGNORED, SOME_THING, Targets, make_targets
 
 LABELS = 256
+"""Labels that a picture of one byte a pixel can hold."""
 
 
 @dataclass(frozen=True)

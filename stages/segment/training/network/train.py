@@ -42,8 +42,9 @@ WARM_UP, WHOLE_FRAMES = 0.04, 0.12
 """Shares of the steps: the rate rises during the first; the last of them see whole frames instead of crops."""
 CENTRE_WEIGHT, OFFSET_WEIGHT = 200.0, 0.05
 SMOOTHING = 0.05
+"""Probability that the target spreads over all classes (label smoothing)."""
 REAL_SHARE = 0.08
-"""Of the samples of a batch, where there are real frames."""
+"""Share of real frames in a batch, where there are any."""
 LOOKED_FOR_EVERY = 200
 """After so many steps frames that were written meanwhile are taken."""
 QUICK_STEPS, QUICK_BATCH = 12, 4

@@ -83,11 +83,15 @@ MOST = {CUT: 8, TOUCHING: 14, APART: 10}
 QUANTILES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9)
 """Bounds are sought there."""
 REAL_WEIGHT = 8.0
+"""Weight of a pair of a real frame, in pairs of generated ones. By eye."""
 PAIRS = 60
 """A frame with more pairs weighs less than in proportion: by the root of this over their number."""
 PENALTY = 2.0
+"""Weight of the squared coefficients in the loss. By eye."""
 BY_TRUTH = 0.3
+"""Share of the joints that follow the truth from the second round on. By eye."""
 ROUNDS = 3
+"""Rounds that follow the rules learnt before, as DAgger does."""
 BY_HAND = (
     (
         Rule(CUT, "histogram", OVER, 0.0, 4.0),

@@ -27,6 +27,7 @@ PROJECTOR = 0.075
 DISPARITY_STEP = 0.125 / (525.0 * PROJECTOR)
 """An eighth of a pixel of disparity, as inverse depth [1/m]."""
 SETTLING_STEPS = 160
+"""Steps that a thing is given to settle before the next one is put down. By eye."""
 
 
 @dataclass

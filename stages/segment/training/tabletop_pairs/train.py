@@ -40,7 +40,9 @@ REAL_WEIGHT = 4.0
 BY_TRUTH = 0.3
 """Share of the joints in the second recording that follow the truth."""
 FOLDS = 5
+"""Folds of the cross-validation over frames."""
 SEED = 0
+"""Seed of the pairs that are drawn and of the trees."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from numba import njit
 from scenewright.stages.segment.backends.objects.boosting import Trees
 
 BINS = 64
+"""Bins into which a feature is sorted before splits are sought."""
 
 
 def bin_edges(features: np.ndarray) -> np.ndarray:

@@ -37,8 +37,11 @@ from scipy.optimize import minimize
 _LOGGER = logging.getLogger("scenewright")
 SOURCES = ("splat", "panoptic_map", NAMED_SPLAT)
 LEAST_SHARE = 0.01
+"""Smallest prior probability, where hardly an answer was right."""
 FIRST = 3
+"""Answers to a query that are learnt from: the first of these."""
 RIDGE = 1e-3
+"""Weight of the squared coefficients in the loss. By eye."""
 HEADER = """# Relevancies as probabilities (stages/kit/open_words/calibration.py), fitted on tuning rooms, for one
 # encoder, by scenewright train word-probabilities.
 """

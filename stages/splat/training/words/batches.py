@@ -16,16 +16,19 @@ from scenewright.stages.splat.training.words.samples import RENDERED, Samples
 from scipy.ndimage import find_objects
 
 LEAST_PIXELS = 40
-"""Of a thing in a picture, for a crop about it."""
+"""Pixels of a thing in a picture that a crop about it needs."""
 MAIN_SHARE = 0.3
 """Share, weighted towards the middle, of a crop from which on it shows its main thing."""
 PRESENT_SHARE = 0.03
+"""Share, weighted towards the middle, of a crop from which on another thing counts as present."""
 OTHERS = 4
 """Other things of a crop that are remembered: those of most pixels."""
 MOST_ATTRIBUTES = 4
+"""Attributes of a thing that are remembered: the first of these."""
 PHRASES = 32
 """Phrases of a thing that are drawn from."""
 TRIES = 8
+"""Points of a thing's box that are tried for the middle of a crop."""
 
 
 @dataclass(frozen=True)

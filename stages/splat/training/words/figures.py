@@ -12,9 +12,11 @@ from scenewright.stages.splat.training.words.lexicon import FALSE, TRUE, Lexicon
 from scenewright.stages.splat.training.words.samples import Samples
 
 CROPS = 1500
+"""Crops that a figure is the mean of, at most."""
 DISTRACTORS = 15
 """Wrong phrases beside the right one: chance is 1 in 16."""
 AT_ONCE = 100
+"""Crops that are encoded at once. By eye."""
 
 
 def figures_of(encoder: Encoder, samples: Samples, words: Lexicon, seed: int = 7) -> dict[str, dict[str, float]]:

@@ -16,8 +16,9 @@ from scenewright.stages.splat.training.words.lexicon import Lexicon, Thing
 
 TRAINING_FILE, VALIDATION_FILE = "training.npz", "validation.npz"
 RENDERED = 48
+"""Edge of the picture of a model [px]."""
 QUALITY = 75
-"""Of the pictures in a file (WebP)."""
+"""WebP quality of the pictures in a file."""
 
 
 @dataclass(frozen=True)

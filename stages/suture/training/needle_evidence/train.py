@@ -43,7 +43,7 @@ FOLDS, RIDGES = 10, (0.3, 0.1, 0.03, 0.01)
 THREADS = slice(6, None)
 """Terms of thread. The others were fitted on 300 views of spoiled masks and stand."""
 NOISE = 1.0
-"""Of the disparity [px]."""
+"""Standard deviation of the noise of a disparity [px]."""
 
 
 def rendered(quick: bool) -> Iterator[tuple[str, StereoView]]:

@@ -16,6 +16,7 @@ from scenewright.stages.suture.training.network.views import EYES, read_eye
 from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
 
 CROP = 192
+"""Edge of a crop [px]."""
 REACH = 196
 """A crop turned and made smaller by 0.7 reaches so far [px]."""
 BODIES_OF = ((NEEDLE,), (THREAD,), (LEFT_DRIVER, RIGHT_DRIVER))
@@ -25,7 +26,7 @@ BEFORE_JAWS = 25
 HIDES = 0.9
 """What is painted over a thing more opaquely than this hides it."""
 PICTURES_KEPT = 480
-"""So many decoded pictures are kept in memory, 5 MB each."""
+"""Decoded pictures that are kept in memory, 5 MB each."""
 
 
 class Views:

@@ -22,6 +22,7 @@ from scenewright.stages.suture.world.scene import make_scene
 
 ARMS = ("ours", "thesis")
 SEED_OF_CHOICE = 83
+"""Seed by which views are chosen from a trial."""
 PLACES = ("corner_right", "corner_left", "elsewhere", "tissue")
 
 
