@@ -5,10 +5,10 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def distances(free: np.ndarray, cost: np.ndarray, row: int, column: int) -> np.ndarray:
     """Return (H, W) the travel distance [cells] from a cell over the free ones (bool); inf where there is no way.
 

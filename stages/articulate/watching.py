@@ -13,6 +13,7 @@ import cv2
 import numba
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 
 NEAREST = 0.3
 """Nearer depth is not used [m]."""
@@ -102,7 +103,7 @@ class Watched:
         return is_moved
 
 
-@numba.njit(cache=True, parallel=True, nogil=True)
+@compiled(parallel=True, nogil=True)
 def _vote(  # noqa: PLR0913
     votes: np.ndarray,
     belief: np.ndarray,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scenewright.stages.cad.matching import CUBE_ROTATIONS, Match
+from scenewright.stages.kit.compiled import compiled
 
 STEP = 1e-6
 """Step of the forward difference (the released code's)."""
@@ -38,7 +38,7 @@ class Alignment:
     """J (2.12) at the solution."""
 
 
-@njit(cache=True)
+@compiled
 def rectangle(center: np.ndarray, size: np.ndarray, yaw: float) -> np.ndarray:
     """Return the corners (4, 2) of a ground rectangle, counter-clockwise, from centre, full lengths and yaw [rad]."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
@@ -51,7 +51,7 @@ def rectangle(center: np.ndarray, size: np.ndarray, yaw: float) -> np.ndarray:
     return corners
 
 
-@njit(cache=True)
+@compiled
 def convex_overlap_area(subject: np.ndarray, clip: np.ndarray) -> float:
     """Return the area [m^2] that two convex counter-clockwise polygons (K, 2), (M, 2) share (Sutherland-Hodgman).
 
@@ -88,14 +88,14 @@ def convex_overlap_area(subject: np.ndarray, clip: np.ndarray) -> float:
     return max(0.0, 0.5 * area)
 
 
-@njit(cache=True)
+@compiled
 def turn_about_z(yaw: float) -> np.ndarray:
     """Return the (3, 3) rotation by `yaw` [rad] about z."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-@njit(cache=True)
+@compiled
 def box_errors(
     center_x: np.ndarray,
     size_x: np.ndarray,
@@ -112,7 +112,7 @@ def box_errors(
     return np.array([outside, scale * size_y[2] - size_x[2]])
 
 
-@njit(cache=True)
+@compiled
 def plane_errors(
     normals_x: np.ndarray, offsets_x: np.ndarray, normals_y: np.ndarray, offsets_y: np.ndarray, shift: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -152,7 +152,7 @@ class _Fixed(NamedTuple):
     """(2,) containment and height."""
 
 
-@njit(cache=True)
+@compiled
 def _residuals(parameters: np.ndarray, fixed: _Fixed) -> np.ndarray:
     """e of equation 2.12, times the roots of the weights. Compiled, as every candidate asks for it 200 times."""
     size_y, normals_y = fixed.size_y, fixed.normals_y
@@ -170,7 +170,7 @@ def _residuals(parameters: np.ndarray, fixed: _Fixed) -> np.ndarray:
     return np.concatenate((fixed.box_weight * box, fixed.offset_weight * offset, fixed.angle_weight * angle))
 
 
-@njit(cache=True)
+@compiled
 def _residual_rows(rows: np.ndarray, fixed: _Fixed) -> np.ndarray:
     first = _residuals(rows[0], fixed)
     residuals = np.empty((len(rows), len(first)))

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.fuse.counts import TripleCounts
 from scenewright.stages.fuse.integration import intrinsics_of
 from scenewright.stages.fuse.voxel_blocks import SIDE, VoxelBlocks, find, mix, pack
+from scenewright.stages.kit.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Overlap:
     counts: np.ndarray
 
 
-@njit(cache=True)
+@compiled
 def index_segments(ids: np.ndarray, sorted_ids: np.ndarray) -> tuple[np.ndarray, int]:
     """Replace the ids (H, W) int32 of a frame by 1 + their place in sorted_ids (K,) int32; 0 stays 0.
 
@@ -54,7 +54,7 @@ def index_segments(ids: np.ndarray, sorted_ids: np.ndarray) -> tuple[np.ndarray,
     return result, unlisted
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _sample_voxels(
     depth: np.ndarray,
     index_image: np.ndarray,

@@ -8,8 +8,8 @@ sampled thinly in one direction.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scenewright.stages.fuse.voxel_blocks import AWAY, VoxelBlocks, find, pack
+from scenewright.stages.kit.compiled import compiled
 
 TILE = 4
 """Pixels a side that are looked at together."""
@@ -19,7 +19,7 @@ MOST_HITS = 255
 """Largest count of a voxel: it has 8 bits."""
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _count_hits(
     depth: np.ndarray,
     intrinsics: np.ndarray,

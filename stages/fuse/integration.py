@@ -8,10 +8,11 @@ is a guess; thin boards seen from both sides survive that way.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, parallel_chunksize, prange
+from numba import parallel_chunksize, prange
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.fuse.hits import count_hits
 from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VoxelBlocks
+from scenewright.stages.kit.compiled import compiled
 
 LARGEST_VOTE = 32000
 """Largest lead of a voxel's label: it has 16 bits with a sign."""
@@ -24,7 +25,7 @@ def intrinsics_of(camera: Camera) -> np.ndarray:
     return np.array([camera.fx, camera.fy, camera.cx, camera.cy], dtype=np.float64)
 
 
-@njit(parallel=True, cache=True, nogil=True, error_model="numpy")
+@compiled(parallel=True, nogil=True, error_model="numpy")
 def _integrate(
     touched: np.ndarray,
     coordinates: np.ndarray,

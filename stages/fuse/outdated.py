@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numba
 import numpy as np
 from scenewright.schemas.articulations import Articulations
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.formats.numpy_files import read_arrays
 
 HIDDEN = 0.06
@@ -35,7 +35,7 @@ class Outdated:
         return current
 
 
-@numba.njit(cache=True)
+@compiled
 def _blank(depth: np.ndarray, points: np.ndarray, intrinsics: np.ndarray, edge: float) -> None:
     """Set depth (H, W) to 0 over the outline of the ball around each voxel at points (N, 3), camera frame."""
     fx, fy, cx, cy = intrinsics

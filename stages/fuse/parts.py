@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 from scipy.spatial import cKDTree
 
 
-@njit(cache=True)
+@compiled
 def connected_parts(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return for every vertex (V,) the smallest vertex that edges between equal labels (V,) connect it with."""
     parents = np.arange(labels.shape[0])

@@ -9,12 +9,13 @@ prior, of which further steps change little.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from scenewright.stages.fuse.surface import find_neighbours, voxel_at
 from scenewright.stages.fuse.voxel_blocks import SIDE, VOXELS, VoxelBlocks
+from scenewright.stages.kit.compiled import compiled
 
 
-@njit(parallel=True, cache=True)
+@compiled(parallel=True)
 def _smooth(
     order: np.ndarray, neighbours: np.ndarray, tsdf: np.ndarray, weight: np.ndarray, strength: float, result: np.ndarray
 ) -> None:

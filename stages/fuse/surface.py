@@ -11,8 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VOXELS, VoxelBlocks, find, pack
+from scenewright.stages.kit.compiled import compiled
 
 SMALL_STEPS, ALL = 0b000111, 0b111111
 """Bits of a voxel's crossings."""
@@ -35,7 +36,7 @@ class Surface:
     segment: np.ndarray
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def voxel_at(neighbours: np.ndarray, rank: int, x: int, y: int, z: int) -> int:
     """Return slot * 512 + index of a voxel at -8 <= x, y, z < 16 relative to a block, or -1 where there is no block."""
     slot = neighbours[rank, (x // SIDE + 1) + 3 * (y // SIDE + 1) + 9 * (z // SIDE + 1)]
@@ -44,7 +45,7 @@ def voxel_at(neighbours: np.ndarray, rank: int, x: int, y: int, z: int) -> int:
     return slot * VOXELS + (x % SIDE) + SIDE * (y % SIDE) + SIDE * SIDE * (z % SIDE)
 
 
-@njit(parallel=True, cache=True)
+@compiled(parallel=True)
 def _crossings(
     order: np.ndarray,
     neighbours: np.ndarray,
@@ -78,7 +79,7 @@ def _crossings(
                         crossings[voxel] |= 8 << axis
 
 
-@njit(cache=True)
+@compiled
 def _measured_near(neighbours: np.ndarray, rank: int, x: int, y: int, z: int, hits: np.ndarray) -> bool:
     total = 0
     for k in range(z - 1, z + 2):
@@ -92,7 +93,7 @@ def _measured_near(neighbours: np.ndarray, rank: int, x: int, y: int, z: int, hi
     return False
 
 
-@njit(parallel=True, cache=True)
+@compiled(parallel=True)
 def _vertices(
     write: bool,
     order: np.ndarray,
@@ -181,7 +182,7 @@ def _vertices(
             offsets[rank] = count
 
 
-@njit(parallel=True, cache=True)
+@compiled(parallel=True)
 def _faces(
     write: bool,
     order: np.ndarray,
@@ -253,7 +254,7 @@ def _faces(
             offsets[rank] = count
 
 
-@njit(cache=True)
+@compiled
 def _neighbours(order: np.ndarray, coordinates: np.ndarray, keys: np.ndarray, slots: np.ndarray) -> np.ndarray:
     """Return the slots (B, 27) int32 of the blocks around every block, -1 where there is none."""
     result = np.empty((order.shape[0], 27), dtype=np.int32)

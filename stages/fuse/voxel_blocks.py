@@ -8,7 +8,7 @@ so that it never depends on timing); whoever writes them sorts them (`canonical_
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 SIDE = 8
 """Voxels along the edge of a block."""
@@ -34,20 +34,20 @@ FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
 """What a block holds: array -> type and shape per block."""
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def pack(x: int, y: int, z: int) -> int:
     """Return the 64-bit key of integer coordinates, each within +-COORDINATE_LIMIT."""
     return ((x + COORDINATE_LIMIT) << 42) | ((y + COORDINATE_LIMIT) << 21) | (z + COORDINATE_LIMIT)
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def mix(key: int, mask: int) -> int:
     """Return the first place to look for `key` in a table of mask + 1 (a power of two) entries."""
     mixed = (key ^ (key >> 31)) * 0x1D8E4E27C47D124F
     return (mixed ^ (mixed >> 32)) & mask
 
 
-@njit(cache=True)
+@compiled
 def find(keys: np.ndarray, slots: np.ndarray, key: int) -> int:
     """Return the slot of `key` in the open-addressing table (keys (T,), -1 empty; slots (T,)), or -1."""
     mask = keys.shape[0] - 1
@@ -59,7 +59,7 @@ def find(keys: np.ndarray, slots: np.ndarray, key: int) -> int:
     return -1
 
 
-@njit(cache=True)
+@compiled
 def _insert(keys: np.ndarray, slots: np.ndarray, key: int, slot: int) -> None:
     mask = keys.shape[0] - 1
     hash_slot = mix(key, mask)
@@ -69,13 +69,13 @@ def _insert(keys: np.ndarray, slots: np.ndarray, key: int, slot: int) -> None:
     slots[hash_slot] = slot
 
 
-@njit(cache=True)
+@compiled
 def _fill_table(keys: np.ndarray, slots: np.ndarray, coordinates: np.ndarray, count: int) -> None:
     for slot in range(count):
         _insert(keys, slots, pack(coordinates[slot, 0], coordinates[slot, 1], coordinates[slot, 2]), slot)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _touch(
     depth: np.ndarray,
     intrinsics: np.ndarray,

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.formats.foxglove import depth_to_millimetres, millimetres_to_depth
 
 RELATIVE_STEP = 0.05
@@ -38,7 +38,7 @@ def registered_depth(
     return depth_to_millimetres(depth_in_color)
 
 
-@njit(cache=True)
+@compiled
 def _draw(
     depth: np.ndarray, intrinsics: np.ndarray, target: np.ndarray, motion: np.ndarray, inverse_depth: np.ndarray
 ) -> None:
@@ -90,7 +90,7 @@ def _draw(
                 )
 
 
-@njit(cache=True)
+@compiled
 def _reproject(
     column: float, row: float, z: float, intrinsics: np.ndarray, target: np.ndarray, motion: np.ndarray
 ) -> tuple[float, float, float]:
@@ -105,7 +105,7 @@ def _reproject(
     return target[0] * moved_x / moved_z + target[2], target[1] * moved_y / moved_z + target[3], 1.0 / moved_z
 
 
-@njit(cache=True)
+@compiled
 def _cells_on_one_surface(depth: np.ndarray, w: np.ndarray) -> np.ndarray:
     """Return (H + 1, W + 1): whether the four pixels that meet in the corner above and left of a pixel lie on one
     surface. The outer rim is False."""
@@ -136,7 +136,7 @@ def _cells_on_one_surface(depth: np.ndarray, w: np.ndarray) -> np.ndarray:
     return spans
 
 
-@njit(cache=True)
+@compiled
 def _is_one_surface(before: float, first: float, second: float, after: float) -> bool:
     """Whether of four inverse depths in a row (0: invalid) the middle two lie on one surface: near to each other, or
     on a line with a third."""
@@ -150,7 +150,7 @@ def _is_one_surface(before: float, first: float, second: float, after: float) ->
     return after > 0 and abs(after - 2.0 * second + first) <= STRAIGHTNESS * largest
 
 
-@njit(cache=True)
+@compiled
 def _draw_triangle(
     u0: float,
     v0: float,
@@ -180,7 +180,7 @@ def _draw_triangle(
                     buffer[row, column] = value
 
 
-@njit(cache=True)
+@compiled
 def _draw_square(
     z: float, row: int, column: int, intrinsics: np.ndarray, target: np.ndarray, motion: np.ndarray, buffer: np.ndarray
 ) -> None:
@@ -197,7 +197,7 @@ def _draw_square(
     _draw_triangle(u[3], v[3], w[3], u[1], v[1], w[1], u[2], v[2], w[2], buffer)
 
 
-@njit(cache=True)
+@compiled
 def _pixels(lowest: float, highest: float, size: int) -> tuple[int, int]:
     """Return the first and last whole pixel within [lowest, highest] and the image; the last is smaller when none."""
     if highest < 0 or lowest > size - 1:

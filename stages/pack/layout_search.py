@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 BOX, X, Y, TURN, HALF_SIDE = 0, 1, 2, 3, 4
 """Columns of placements: number of the box, its centre [m], quarter turns (0 or 1); half side [m] of the square around
@@ -94,7 +94,7 @@ class _Rectangle(NamedTuple):
     high_y: float
 
 
-@njit(cache=True)
+@compiled
 def _apart(first, second, gap):  # type: ignore[no-untyped-def]
     """Whether rectangles are at least `gap` apart along an axis."""
     return (
@@ -105,20 +105,20 @@ def _apart(first, second, gap):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled
 def _row(rectangles, row):  # type: ignore[no-untyped-def]
     """Return one of (F, 4) rectangles."""
     return _Rectangle(rectangles[row, LOW_X], rectangles[row, LOW_Y], rectangles[row, HIGH_X], rectangles[row, HIGH_Y])
 
 
-@njit(cache=True)
+@compiled
 def _box_at(extents, box, x, y, turn):  # type: ignore[no-untyped-def]
     """Return what a box covers with its centre at (x, y)."""
     half_x, half_y = extents[box, turn] / 2, extents[box, 1 - turn] / 2
     return _Rectangle(x - half_x, y - half_y, x + half_x, y + half_y)
 
 
-@njit(cache=True)
+@compiled
 def _hand_at(hand, part, x, y, turn):  # type: ignore[no-untyped-def]
     """Return what a part of the hand covers that holds a box at (x, y)."""
     return _Rectangle(
@@ -129,7 +129,7 @@ def _hand_at(hand, part, x, y, turn):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled
 def _may_stand(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-def]
     """Whether a box may stand at (x, y) beside those that are `placed` (B, 3)."""
     footprint = _box_at(problem.extents, box, x, y, turn)
@@ -177,7 +177,7 @@ def _may_stand(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untype
     return True
 
 
-@njit(cache=True)
+@compiled
 def _lines(problem, placed, box, turn, axis, gap, out):  # type: ignore[no-untyped-def]
     """Write the centre coordinates along an axis (0: x, 1: y) at which the box touches something into `out`; return how
     many."""
@@ -215,7 +215,7 @@ def _lines(problem, placed, box, turn, axis, gap, out):  # type: ignore[no-untyp
     return count
 
 
-@njit(cache=True)
+@compiled
 def _candidates(problem, placed, box, gap, corner, rows):  # type: ignore[no-untyped-def]
     """Write the allowed touching positions into `rows` (N, 4), best first; return how many."""
     extents, fixed, hand, reach = problem.extents, problem.fixed, problem.hand, problem.reach
@@ -269,7 +269,7 @@ def _candidates(problem, placed, box, gap, corner, rows):  # type: ignore[no-unt
     return distinct
 
 
-@njit(cache=True)
+@compiled
 def _search(problem, order, gap, corner, nodes):  # type: ignore[no-untyped-def]
     """Depth first over `order`; return places (B, 3) and 1: found, 0: out of nodes, -1: there is none."""
     preset = problem.preset

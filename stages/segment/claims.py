@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.overlaps import overlap_table
 from scenewright.stages.segment.panoptic import PanopticFrame
 
 
-@njit(cache=True)
+@compiled
 def _components(claims: np.ndarray, depth: np.ndarray, ratio: float, minimum_pixels: int, first: int) -> np.ndarray:
     height, width = claims.shape
     result = np.zeros((height, width), dtype=np.int32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scipy.spatial import cKDTree
 
 MOST_PAIRS = 200_000
@@ -30,7 +30,7 @@ def clouds_touch(first: np.ndarray, second: np.ndarray, distance: float) -> bool
     return bool(np.isfinite(nearest).any())
 
 
-@njit(cache=True)
+@compiled
 def _any_within(first: np.ndarray, second: np.ndarray, limit: float) -> bool:
     """Whether any two points of (N, 3) and (M, 3) are closer than the root of `limit`."""
     for i in range(len(first)):

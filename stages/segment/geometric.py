@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.segment.normals import planes_of, surface_normals
 
@@ -71,7 +72,7 @@ def smooth_depth(depth: np.ndarray, *, window: int = 7, deviation: float = 0.009
 Row = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _lower_by_neighbour(
     here: Row, normals: Row, there: Row, others: Row, mask_threshold: float, mutual: bool, lowest: np.ndarray
 ) -> None:
@@ -95,7 +96,7 @@ def _lower_by_neighbour(
         lowest[k] = cosine if counts else lowest[k]
 
 
-@njit(cache=True)
+@compiled
 def _row_of_convexity(
     points: Row, normals: Row, v: int, window: int, mask_threshold: float, mutual: bool, lowest: np.ndarray
 ) -> None:
@@ -118,7 +119,7 @@ def _row_of_convexity(
             )
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _minimum_convexity(points: Row, normals: Row, window: int, mask_threshold: float, mutual: bool) -> np.ndarray:
     """Least convexity (H, W) of points and normals whose coordinates are images (H, W) of their own."""
     result: np.ndarray = np.ones(points[2].shape, dtype=np.float32)
@@ -175,7 +176,7 @@ def edge_map(depth: np.ndarray, points: np.ndarray, normals: np.ndarray, setting
     return (convex == 0) | (jump_mask != 0) | (depth <= 0) | ~normals.any(axis=2)
 
 
-@njit(cache=True)
+@compiled
 def _fill_edges(labels: np.ndarray, points: np.ndarray, normals: np.ndarray, ratio: float) -> None:
     """Breadth-first growth of the labels over unlabelled pixels with depth, never across a depth jump.
 
@@ -215,7 +216,7 @@ def _fill_edges(labels: np.ndarray, points: np.ndarray, normals: np.ndarray, rat
                 tail += 1
 
 
-@njit(cache=True)
+@compiled
 def _sole_neighbours(labels: np.ndarray, small: np.ndarray) -> np.ndarray:
     """For every small label the one large label it touches: 0 when it touches none, -1 when several."""
     height, width = labels.shape
@@ -237,7 +238,7 @@ def _sole_neighbours(labels: np.ndarray, small: np.ndarray) -> np.ndarray:
     return sole
 
 
-@njit(cache=True)
+@compiled
 def _relabel(labels: np.ndarray, largest: int) -> np.ndarray:
     height, width = labels.shape
     number = np.zeros(largest + 1, dtype=np.int32)

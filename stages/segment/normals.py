@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.geometry.cameras import back_project
 
 # A row is worked on in loops without branches over arrays of their own, which add several pixels at a time; every sum
 # takes its terms in the order of the window, so that how many are added at a time changes no bit.
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _steps_to(
     there: tuple[np.ndarray, np.ndarray, np.ndarray],
     here: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -39,7 +40,7 @@ def _steps_to(
         z[k] = weight * dz
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _add(x: np.ndarray, y: np.ndarray, z: np.ndarray, sx: np.ndarray, sy: np.ndarray, sz: np.ndarray) -> None:
     for k in range(len(x)):
         sx[k] += x[k]
@@ -47,7 +48,7 @@ def _add(x: np.ndarray, y: np.ndarray, z: np.ndarray, sx: np.ndarray, sy: np.nda
         sz[k] += z[k]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _add_products(x: np.ndarray, y: np.ndarray, z: np.ndarray, xx: np.ndarray, xy: np.ndarray, xz: np.ndarray) -> None:
     for k in range(len(x)):
         xx[k] += x[k] * x[k]
@@ -55,7 +56,7 @@ def _add_products(x: np.ndarray, y: np.ndarray, z: np.ndarray, xx: np.ndarray, x
         xz[k] += x[k] * z[k]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _add_other_products(y: np.ndarray, z: np.ndarray, yy: np.ndarray, yz: np.ndarray, zz: np.ndarray) -> None:
     for k in range(len(y)):
         yy[k] += y[k] * y[k]
@@ -63,7 +64,7 @@ def _add_other_products(y: np.ndarray, z: np.ndarray, yy: np.ndarray, yz: np.nda
         zz[k] += z[k] * z[k]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _covariances(count: np.ndarray, sums: np.ndarray, scale: np.ndarray, determinant: np.ndarray) -> None:
     """Turn the six products in `sums` (9, N) into covariances, and leave their mean in `sums[0]`; `scale` (N,) is 0
     where nothing varies, `determinant` (N,) half of that of the scaled matrix (Smith 1961)."""
@@ -84,7 +85,7 @@ def _covariances(count: np.ndarray, sums: np.ndarray, scale: np.ndarray, determi
         sums[3, k], sums[4, k], sums[5, k], sums[6, k], sums[7, k], sums[8, k] = xx, xy, xz, yy, yz, zz
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _smallest_eigenvalues(scale: np.ndarray, determinant: np.ndarray, sums: np.ndarray) -> None:
     """Put the smallest eigenvalue of every covariance into `sums[1]`, in closed form (Smith 1961); `scale` becomes 0
     where the largest is not positive."""
@@ -97,7 +98,7 @@ def _smallest_eigenvalues(scale: np.ndarray, determinant: np.ndarray, sums: np.n
             scale[k] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _directions(
     px: np.ndarray, py: np.ndarray, pz: np.ndarray, scale: np.ndarray, sums: np.ndarray, normals: np.ndarray
 ) -> None:
@@ -128,7 +129,7 @@ def _directions(
         normals[k, 2] = np.float32((-z if away else z) if has_normal else 0.0)
 
 
-@njit(cache=True)
+@compiled
 def _row_of_normals(
     xs: np.ndarray,
     ys: np.ndarray,
@@ -165,7 +166,7 @@ def _row_of_normals(
     _directions(xs[v], ys[v], zs[v], scale, sums, normals)
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _window_normals(
     xs: np.ndarray, ys: np.ndarray, zs: np.ndarray, window: int, step: int, distance_factor: float
 ) -> np.ndarray:

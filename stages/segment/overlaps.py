@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 
 def overlap_table(geometric: np.ndarray, panoptic: np.ndarray) -> np.ndarray:
@@ -15,7 +15,7 @@ def overlap_table(geometric: np.ndarray, panoptic: np.ndarray) -> np.ndarray:
     return table
 
 
-@njit(cache=True)
+@compiled
 def _count(first: np.ndarray, second: np.ndarray, table: np.ndarray) -> None:
     for k in range(len(first)):
         table[first[k], second[k]] += 1
@@ -43,7 +43,7 @@ def pixels_of_labels(labels: np.ndarray) -> LabelPixels:
     return LabelPixels(order, starts)
 
 
-@njit(cache=True)
+@compiled
 def _place(labels: np.ndarray, next_place: np.ndarray, order: np.ndarray) -> None:
     for k in range(len(labels)):
         order[next_place[labels[k]]] = k

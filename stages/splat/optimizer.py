@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.rendering.splatting.gaussians import GaussianGradients, Gaussians
 
 FIRST, SECOND, EPSILON = 0.9, 0.999, 1e-15
@@ -53,7 +54,7 @@ class RowAdam:
                 _step(array.reshape(len(array), -1), gradient, self.moments[name], self.steps, moved, columns)
 
 
-@numba.njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _step(values, gradients, moments, steps, moved, rates):  # type: ignore[no-untyped-def]
     """Move values (N, D) by the rates (D,) where `moved` (N,) is true; moments (N, 2, D) are kept up."""
     for row in numba.prange(len(values)):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 
 GRID = 0.01
 """Edge of the cells, one point each [m]."""
@@ -41,7 +41,7 @@ class _View(NamedTuple):
     farthest: float
 
 
-@njit(cache=True)
+@compiled
 def _insert(table: _Table, count: int, depth: np.ndarray, instance: np.ndarray, view: _View) -> int:
     """Add the points of a frame to a table that holds `count`; returns the new count."""
     keys, rows, points, labels = table
@@ -115,7 +115,7 @@ class SeenSurface:
         return table.points[rows], table.labels[rows]
 
 
-@njit(cache=True)
+@compiled
 def _rehash(keys: np.ndarray, rows: np.ndarray, old_keys: np.ndarray, old_rows: np.ndarray) -> None:
     mask = np.uint64(len(keys) - 1)
     for k in range(len(old_keys)):

@@ -118,12 +118,13 @@ def test_without_a_home_folder(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_compiled_code_that_can_be_kept_nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import numba
-    from numba.core.caching import CacheImpl
+    from numba.core import config
+    from scenewright.stages.kit.compiled import compiled
 
-    monkeypatch.setattr(CacheImpl, "_locator_classes", [])  # as when every folder for it is read-only
+    no_place = "IPythonCacheLocator"  # as when every folder for it is read-only: this one takes nothing of a file
+    monkeypatch.setattr(config, "CACHE_LOCATOR_CLASSES", no_place)
     with pytest.raises(MachineFailure, match="NUMBA_CACHE_DIR"), runner._machine_errors(tmp_path):
-        numba.njit(cache=True)(lambda number: number + 1)
+        compiled(lambda number: number + 1)
 
 
 NOBODY = (

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numba
 import numpy as np
 from scenewright.stages.cutting.world.body import Body
 from scenewright.stages.cutting.world.canonical import box_edges, canonical
 from scenewright.stages.cutting.world.voxels import Grid, occupancy
+from scenewright.stages.kit.compiled import compiled
 
 LATTICE = 18
 """Points along every edge of the box around a piece."""
@@ -108,7 +108,7 @@ def _flat(tree: Tree) -> tuple[np.ndarray, np.ndarray]:
     return np.array(rows, dtype=np.int64), np.array(weights)
 
 
-@numba.njit(cache=True)
+@compiled
 def _moments(
     points: np.ndarray, nodes: np.ndarray, weights: np.ndarray, volumes: np.ndarray, leaves: int
 ) -> tuple[np.ndarray, np.ndarray]:

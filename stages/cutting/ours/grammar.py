@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numba
 import numpy as np
 from scenewright.stages.cutting.demonstrations.cutter import Demonstration
 from scenewright.stages.cutting.demonstrations.recipes import CATEGORIES
 from scenewright.stages.cutting.ours.items import features, item_of
 from scenewright.stages.cutting.world.canonical import axis_across
+from scenewright.stages.kit.compiled import compiled
 from scipy.cluster.vq import kmeans2
 
 MOST_TYPES = 12
@@ -103,7 +103,7 @@ class Grammar:
         return np.asarray((weights @ chances).argmax(axis=1))
 
 
-@numba.njit(cache=True)
+@compiled
 def _type_of_box(a: float, b: float, c: float, constants: np.ndarray, means: np.ndarray, deviations: np.ndarray) -> int:
     logs = np.log(np.sort(np.array([a, b, c])))
     return int(np.argmax(constants - 0.5 * (((logs - means) / deviations) ** 2).sum(axis=1)))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 
 MARGIN = 1e-4
 """Share of a voxel by which middles of columns are set off from where vertices of regular meshes lie."""
@@ -36,7 +36,7 @@ def occupancy(vertices: np.ndarray, faces: np.ndarray, grid: Grid) -> np.ndarray
     return np.asarray(np.logical_xor.accumulate(inside, axis=2))
 
 
-@numba.njit(cache=True)
+@compiled
 def _is_left_of(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> bool:
     """Whether (x, y) is left of a -> b; the same answer for both triangles of an edge."""
     if ax < bx or (ax == bx and ay < by):
@@ -44,7 +44,7 @@ def _is_left_of(ax: float, ay: float, bx: float, by: float, x: float, y: float) 
     return bool((ax - bx) * (y - by) - (ay - by) * (x - bx) < 0.0)
 
 
-@numba.njit(cache=True)
+@compiled
 def _fill(vertices: np.ndarray, faces: np.ndarray, low: np.ndarray, voxel: float, inside: np.ndarray) -> None:
     """Toggle, in every column that a face crosses, the first voxel whose middle is above the crossing."""
     nx, ny, nz = inside.shape

@@ -12,9 +12,9 @@ from __future__ import annotations
 import struct
 
 import numpy as np
-from numba import njit
 from scenewright.stages.ingest.images import decode_image
 from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.formats.foxglove import PNG_START
 from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_decoded
 
@@ -94,7 +94,7 @@ def decode_rvl(body: bytes) -> np.ndarray:
     return pixels.reshape(height, width)
 
 
-@njit(cache=True)
+@compiled
 def _number(words: np.ndarray, nibble: int) -> tuple[int, int]:
     """Return the number at a piece, and the next piece; the number is negative when there is none."""
     value, shift = 0, 0
@@ -112,7 +112,7 @@ def _number(words: np.ndarray, nibble: int) -> tuple[int, int]:
             return _WRONG_VALUE, nibble
 
 
-@njit(cache=True)
+@compiled
 def _unpack_rvl(words: np.ndarray, pixels: np.ndarray) -> int:
     """Fill `pixels` (N,) uint16, zeros so far, from RVL words (M,) int64. Return 0, or the fault."""
     position, nibble, last = 0, 0, 0

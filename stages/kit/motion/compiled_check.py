@@ -8,7 +8,7 @@ than UNSURE may be free for the mesh checker.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.motion.compiled_arrays import (
     ARM,
     BASE_X,
@@ -28,7 +28,7 @@ UNSURE = 0.004
 """Refusals nearer than this [m] to being free are not certain."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def link_frames(chain: np.ndarray, mount_height: float, body: np.ndarray, frames: np.ndarray) -> None:
     """Write world_from_frame (J + 1, 3, 4) for base x, y, yaw and joint values (3 + J,).
 
@@ -58,13 +58,13 @@ def link_frames(chain: np.ndarray, mount_height: float, body: np.ndarray, frames
             )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@compiled(error_model="numpy", inline="always")
 def _place(pose: np.ndarray, ball: np.ndarray, out: np.ndarray) -> None:
     for row in range(3):
         out[row] = pose[row, 0] * ball[0] + pose[row, 1] * ball[1] + pose[row, 2] * ball[2] + pose[row, 3]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@compiled(error_model="numpy", inline="always")
 def _square_to_box(point: np.ndarray, box: np.ndarray, half: np.ndarray) -> float:
     """Return the squared distance of a point (3,) from a box given by box_from_world (3, 4) and half sides."""
     total = 0.0
@@ -76,12 +76,12 @@ def _square_to_box(point: np.ndarray, box: np.ndarray, half: np.ndarray) -> floa
     return total
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@compiled(error_model="numpy", inline="always")
 def _hull(robot: RobotArrays, frames: np.ndarray, piece: int) -> Hull:
     return Hull(robot.vertices, robot.vertex_begin[piece], robot.vertex_begin[piece + 1], frames[robot.frame[piece]])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _piece_meets(
     robot: RobotArrays, scene: SceneArrays, frames: np.ndarray, piece: int, obstacle: int, centers: np.ndarray
 ) -> int:
@@ -103,7 +103,7 @@ def _piece_meets(
     return UNCERTAIN if upper >= scene.distance - UNSURE else HIT
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _pieces_meet(robot: RobotArrays, frames: np.ndarray, pair: int, centers: np.ndarray) -> int:
     """Return FREE, UNCERTAIN or HIT for two pieces of the robot."""
     first, second = robot.pairs[pair, 0], robot.pairs[pair, 1]
@@ -126,7 +126,7 @@ def _pieces_meet(robot: RobotArrays, frames: np.ndarray, pair: int, centers: np.
     return UNCERTAIN if upper >= apart - UNSURE else HIT
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def find_collision(robot: RobotArrays, scene: SceneArrays, body: np.ndarray, first_frame: int) -> tuple[int, int, int]:
     """Return FREE, UNCERTAIN or HIT of a configuration (3 + J,), the part, and the other: the first that is not free.
 

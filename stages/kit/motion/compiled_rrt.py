@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
 from scenewright.stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_collision
 
@@ -38,7 +38,7 @@ class Moving(NamedTuple):
     """(1 + parts + groups,) what refused is added, see `count_refusal`."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def count_refusal(counts: np.ndarray, state: int, other: int, parts: int) -> None:
     """Count what refused: counts are (1 + parts + groups,)."""
     if state == UNCERTAIN:
@@ -46,7 +46,7 @@ def count_refusal(counts: np.ndarray, state: int, other: int, parts: int) -> Non
     counts[1 + parts + other if other >= 0 else -other] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _step_count(begin: np.ndarray, end: np.ndarray, resolution: np.ndarray) -> int:
     steps = 1
     for k in range(begin.shape[0]):
@@ -54,7 +54,7 @@ def _step_count(begin: np.ndarray, end: np.ndarray, resolution: np.ndarray) -> i
     return steps
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def last_free(motion: Moving, begin: np.ndarray, end: np.ndarray, most: int) -> tuple[int, int]:
     """Return how many steps from `begin` (D,) towards `end` are free, and how many the whole way has.
 
@@ -73,7 +73,7 @@ def last_free(motion: Moving, begin: np.ndarray, end: np.ndarray, most: int) -> 
     return min(steps, most), steps
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def way_is_free(motion: Moving, begin: np.ndarray, end: np.ndarray) -> bool:
     """Return whether all steps of `last_free` are free, looked at from coarse to fine: a way that is blocked is
     mostly blocked in its middle, and then few looks tell."""
@@ -100,7 +100,7 @@ def way_is_free(motion: Moving, begin: np.ndarray, end: np.ndarray) -> bool:
     return bool(state == FREE)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _nearest(points: np.ndarray, count: int, target: np.ndarray, resolution: np.ndarray) -> int:
     best, least = 0, np.inf
     for index in range(count):
@@ -113,7 +113,7 @@ def _nearest(points: np.ndarray, count: int, target: np.ndarray, resolution: np.
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _grown(points: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     more_points = np.empty((2 * points.shape[0], points.shape[1]))
     more_parents = np.empty(2 * parents.shape[0], dtype=np.int64)
@@ -122,7 +122,7 @@ def _grown(points: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndar
     return more_points, more_parents
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def search(
     motion: Moving,
     start: np.ndarray,
@@ -195,7 +195,7 @@ def search(
     return np.empty((0, dimension)), samples
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _join_trees(
     points_a: np.ndarray, parents_a: np.ndarray, node_a: int, points_b: np.ndarray, parents_b: np.ndarray, node_b: int
 ) -> np.ndarray:
@@ -221,7 +221,7 @@ def _join_trees(
     return path
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _length(rows: np.ndarray, resolution: np.ndarray) -> float:
     """Return the Euclidean length of a path (N, D) in resolutions."""
     total = 0.0
@@ -234,7 +234,7 @@ def _length(rows: np.ndarray, resolution: np.ndarray) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _path_is_free(motion: Moving, rows: np.ndarray) -> bool:
     """Whether the pieces between rows (N, D), of which the first and last are free, are: its bends are looked at
     first."""
@@ -249,7 +249,7 @@ def _path_is_free(motion: Moving, rows: np.ndarray) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def shorten(
     motion: Moving, path: np.ndarray, attempts: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 ITERATIONS = 48
 """Most iterations of a distance; by eye."""
@@ -25,7 +25,7 @@ class Hull(NamedTuple):
     pose: np.ndarray
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@compiled(error_model="numpy", inline="always")
 def _extreme(hull: Hull, direction: np.ndarray, sign: float) -> int:
     """Return the index of the vertex that lies farthest along sign * direction (world)."""
     vertices, begin, end, pose = hull
@@ -42,7 +42,7 @@ def _extreme(hull: Hull, direction: np.ndarray, sign: float) -> int:
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _nearest_on_segment(simplex: np.ndarray, a: int, b: int, weights: np.ndarray) -> None:
     dot, square = 0.0, 0.0
     for k in range(3):
@@ -55,7 +55,7 @@ def _nearest_on_segment(simplex: np.ndarray, a: int, b: int, weights: np.ndarray
     weights[b] += share
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _nearest_on_triangle(simplex: np.ndarray, a: int, b: int, c: int, weights: np.ndarray) -> None:
     d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(3):
@@ -97,7 +97,7 @@ def _nearest_on_triangle(simplex: np.ndarray, a: int, b: int, c: int, weights: n
     weights[a] = 1.0 - weights[b] - weights[c]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _outside(simplex: np.ndarray, a: int, b: int, c: int, d: int) -> bool:
     """Whether the origin and corner d lie on different sides of the plane a, b, c, or the corners are in one plane."""
     ux, uy, uz = (simplex[b, 0] - simplex[a, 0], simplex[b, 1] - simplex[a, 1], simplex[b, 2] - simplex[a, 2])
@@ -112,7 +112,7 @@ def _outside(simplex: np.ndarray, a: int, b: int, c: int, d: int) -> bool:
     return origin * corner <= 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _nearest_on_tetrahedron(simplex: np.ndarray, weights: np.ndarray) -> bool:
     """Write the weights of the nearest point; return True when the origin lies inside."""
     trial = np.zeros(4)
@@ -135,7 +135,7 @@ def _nearest_on_tetrahedron(simplex: np.ndarray, weights: np.ndarray) -> bool:
     return inside
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def convex_distance(first: Hull, second: Hull, enough: float, too_near: float) -> tuple[float, float]:
     """Return a lower and an upper bound [m] of the distance of two convex hulls; 0, 0 when they overlap.
 

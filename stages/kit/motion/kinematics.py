@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, joints_between
 from scenewright.stages.kit.simulation.urdf_split import read_urdf
 from scipy.spatial.transform import Rotation
@@ -76,7 +76,7 @@ def _from_z(axis: np.ndarray) -> np.ndarray:
     return turned
 
 
-@njit(cache=True)
+@compiled
 def _multiply(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
     for row in range(3):
         for column in range(4):
@@ -87,7 +87,7 @@ def _multiply(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
         out[row, 3] += first[row, 3]
 
 
-@njit(cache=True)
+@compiled
 def _frames(fixed: np.ndarray, tool: np.ndarray, arm: np.ndarray, frames: np.ndarray) -> None:
     """Write base_from_joint of every joint, and base_from_tool last, into `frames` (J + 1, 4, 4)."""
     count = fixed.shape[0]
@@ -106,7 +106,7 @@ def _frames(fixed: np.ndarray, tool: np.ndarray, arm: np.ndarray, frames: np.nda
     frames[count] = turned
 
 
-@njit(cache=True)
+@compiled
 def _pose_error(current: np.ndarray, target: np.ndarray, error: np.ndarray) -> None:
     """Write the twist (6,) [m, rad] from the current to the target pose, base frame."""
     for row in range(3):
@@ -131,7 +131,7 @@ def _pose_error(current: np.ndarray, target: np.ndarray, error: np.ndarray) -> N
         error[3], error[4], error[5] = np.pi, 0.0, 0.0  # half a turn: any axis leads out of it
 
 
-@njit(cache=True)
+@compiled
 def _descend(
     fixed: np.ndarray,
     tool: np.ndarray,
@@ -214,7 +214,7 @@ def _descend(
     return best, best_position, best_rotation
 
 
-@njit(cache=True)
+@compiled
 def _search(
     fixed: np.ndarray,
     tool: np.ndarray,

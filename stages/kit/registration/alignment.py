@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.registration.pyramid import Level, Pyramid
 from scenewright.stages.kit.registration.rigid_motion import exponential, orthonormal
 
@@ -80,7 +80,7 @@ class _Comparison(NamedTuple):
     use_color: bool
 
 
-@numba.njit(cache=True, fastmath=False)
+@compiled(fastmath=False)
 def _accumulate(
     target: Level, source: Level, motion: np.ndarray, gain: float, bias: float, comparison: _Comparison
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
-import numba
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 
 DEPTH_JUMP = 0.04
 """Depths of one surface differ by less than this share within 2x2 pixels, and bend by less along three."""
@@ -43,7 +43,7 @@ class Pyramid:
     """Median depth [m], 0 without any."""
 
 
-@numba.njit(cache=True)
+@compiled
 def _halve(depth: np.ndarray, jump: float) -> np.ndarray:
     """Return (H // 2, W // 2) means over 2x2 pixels of the surface that is nearest there."""
     height, width = depth.shape[0] // 2, depth.shape[1] // 2
@@ -67,7 +67,7 @@ def _halve(depth: np.ndarray, jump: float) -> np.ndarray:
     return result
 
 
-@numba.njit(cache=True)
+@compiled
 def _points_and_normals(
     depth: np.ndarray, intrinsics: np.ndarray, jump: float, reach: int
 ) -> tuple[np.ndarray, np.ndarray]:

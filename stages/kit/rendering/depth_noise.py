@@ -12,8 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 
 
 class DepthCamera(NamedTuple):
@@ -40,7 +41,7 @@ class DepthCamera(NamedTuple):
     """Losses come in blocks of this many pixels."""
 
 
-@njit(cache=True)
+@compiled
 def axial_sigma(z: float, incidence: float) -> float:
     """Return the axial standard deviation [m] at depth z [m] and incidence angle [rad] (Nguyen et al. 2012, eq. 3-4):
     0.0012 + 0.0019 (z - 0.4)^2, and 0.0001 / sqrt(z) * theta^2 / (pi/2 - theta)^2 on top. The angle is cut at 82
@@ -50,7 +51,7 @@ def axial_sigma(z: float, incidence: float) -> float:
     return 0.0012 + 0.0019 * (z - 0.4) ** 2 + slanted
 
 
-@njit(cache=True)
+@compiled
 def lateral_sigma(incidence: float) -> float:
     """Return the lateral standard deviation [px] at an incidence angle [rad] (Nguyen et al. 2012, eq. 2):
     0.8 + 0.035 theta / (pi/2 - theta)."""
@@ -58,14 +59,14 @@ def lateral_sigma(incidence: float) -> float:
     return 0.8 + 0.035 * angle / (np.pi / 2 - angle)
 
 
-@njit(cache=True)
+@compiled
 def quantise(z: float, focal_length: float, baseline: float, levels: float) -> float:
     """Round z [m] to the nearest disparity level."""
     disparity = np.floor(focal_length * baseline / z * levels + 0.5) / levels
     return focal_length * baseline / disparity if disparity > 0.0 else 0.0
 
 
-@njit(cache=True)
+@compiled
 def loss_probability(z: float, incidence: float, reflectance: float, gloss: float, sensor: DepthCamera) -> float:
     """Return the probability in 0..1 that a pixel gets no depth. The causes are independent.
 
@@ -80,7 +81,7 @@ def loss_probability(z: float, incidence: float, reflectance: float, gloss: floa
     return 1.0 - (1.0 - grazing) * (1.0 - dark) * (1.0 - shiny)
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _projector_shadow(depth: np.ndarray, focal_length: float, baseline: float) -> np.ndarray:
     """Mark pixels (H, W) that the projector, left of the camera, cannot see.
 
@@ -124,7 +125,7 @@ class _Draws(NamedTuple):
     shift: np.ndarray
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _disturb(seen: _Seen, draws: _Draws, focal_length: float, sensor: DepthCamera) -> np.ndarray:
     depth, incidence_cosine, reflectance, gloss, shadow = seen
     normal, jump, chance, loss, shift = draws

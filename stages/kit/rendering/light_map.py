@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import open3d as o3d
-from numba import njit, prange
+from numba import prange
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.rendering.surfaces import TriangleSoup
 
 LIGHT_POINTS = 4
@@ -83,7 +84,7 @@ class LightMap(NamedTuple):
     """(S, 3) float32, linear RGB."""
 
 
-@njit(cache=True)
+@compiled
 def _subdivisions(corners: np.ndarray, texel: float, most: int) -> np.ndarray:
     count = corners.shape[0]
     result = np.empty(count, dtype=np.int32)
@@ -99,7 +100,7 @@ def _subdivisions(corners: np.ndarray, texel: float, most: int) -> np.ndarray:
     return result
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _samples(
     corners: np.ndarray,
     corner_normals: np.ndarray,
@@ -143,7 +144,7 @@ def _samples(
     return positions, normals
 
 
-@njit(cache=True)
+@compiled
 def lookup(light: np.ndarray, offset: int, n: int, u: float, v: float, channel: int) -> float:
     """Interpolate one channel of the light map at barycentric (u, v) of a triangle with n subdivisions."""
     a, b = u * n, v * n
@@ -166,7 +167,7 @@ def lookup(light: np.ndarray, offset: int, n: int, u: float, v: float, channel: 
     )
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _rays_to(positions: np.ndarray, rows: np.ndarray, target: np.ndarray) -> np.ndarray:
     rays = np.empty((len(rows), 6), dtype=np.float32)
     for k in prange(len(rows)):
@@ -176,7 +177,7 @@ def _rays_to(positions: np.ndarray, rows: np.ndarray, target: np.ndarray) -> np.
     return rays
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _form_factor(
     positions: np.ndarray, normals: np.ndarray, point: np.ndarray, shine: np.ndarray, area: float
 ) -> np.ndarray:
@@ -194,7 +195,7 @@ def _form_factor(
     return result
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _gather_rays(positions: np.ndarray, normals: np.ndarray, start: int, end: int, x: float, y: float) -> np.ndarray:
     """One ray a sample in the cosine-distributed local direction (x, y, sqrt(1 - x^2 - y^2))."""
     z = np.sqrt(max(0.0, 1.0 - x * x - y * y))
@@ -236,7 +237,7 @@ class _Gathered(NamedTuple):
     uvs: np.ndarray
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _add_bounce(
     total: np.ndarray, inside: np.ndarray, start: int, gathered: _Gathered, radiant: _Radiant, weight: float
 ) -> None:
@@ -263,7 +264,7 @@ def _add_bounce(
             total[start + k, channel] += weight * value
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _fill_buried(light: np.ndarray, buried: np.ndarray, offset: np.ndarray, subdivisions: np.ndarray) -> None:
     """Give samples inside another solid the mean of their neighbours, ring by ring: what stands on a surface must not
     darken it beyond its own outline by interpolation. Triangles that are buried whole stay dark."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 PatternName = Literal["plain", "planks", "tiles", "carpet", "plaster", "wood", "fabric", "speckle"]
 PATTERNS: tuple[PatternName, ...] = ("plain", "planks", "tiles", "carpet", "plaster", "wood", "fabric", "speckle")
@@ -56,7 +56,7 @@ def is_wood(srgb: np.ndarray) -> np.ndarray:
     return (green > 0.6 * red) & (green < 0.88 * red) & (blue < 0.86 * green)
 
 
-@njit(cache=True)
+@compiled
 def _hash(x: int, y: int, z: int, seed: int) -> float:
     """Return a number in 0..1 for a lattice point (32-bit mixing in 64-bit registers: numba widens products)."""
     mask = np.uint64(0xFFFFFFFF)
@@ -73,7 +73,7 @@ def _hash(x: int, y: int, z: int, seed: int) -> float:
     return float(h & np.uint64(0xFFFFFF)) / 16777216.0
 
 
-@njit(cache=True)
+@compiled
 def value_noise(x: float, y: float, z: float, seed: int) -> float:
     """Return smooth noise in -1..1 at a point, of unit lattice spacing."""
     xf, yf, zf = np.floor(x), np.floor(y), np.floor(z)
@@ -93,20 +93,20 @@ def value_noise(x: float, y: float, z: float, seed: int) -> float:
     return 2.0 * total - 1.0
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _visible_detail(detail: float, footprint: float) -> float:
     """Return how much of a detail of this size [m] survives in a pixel that covers `footprint` [m], 0..1."""
     return min(1.0, max(0.0, detail / max(footprint, 1e-6) - 0.5))
 
 
-@njit(cache=True)
+@compiled
 def pattern_line(distance: float, width: float, footprint: float) -> float:
     """Return how dark a joint of this width is in a pixel, box-filtered over its footprint, 0..1."""
     spread = max(width, footprint)
     return max(0.0, 1.0 - distance / spread) * min(1.0, width / spread)
 
 
-@njit(cache=True)
+@compiled
 def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: float) -> tuple[float, float]:
     """Return (brightness factor, warmth) of a material row at world point x, y, z [m].
 

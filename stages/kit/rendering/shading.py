@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.rendering.light_map import RAY_DIRECTION, LightMap, lookup
 from scenewright.stages.kit.rendering.patterns import GLOSS, PATTERN, SHARPNESS, SKIRTING, pattern_factor, pattern_line
 
@@ -38,7 +39,7 @@ class Surfaces(NamedTuple):
     material_table: np.ndarray
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def camera_rays(
     pixels: np.ndarray, fx: float, fy: float, cx: float, cy: float, world_from_camera: np.ndarray
 ) -> np.ndarray:
@@ -56,7 +57,7 @@ def camera_rays(
     return rays
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def surface_at(
     rays: np.ndarray, primitive: np.ndarray, uvs: np.ndarray, corner_normals: np.ndarray, face_normals: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -84,7 +85,7 @@ def surface_at(
     return normals, cosine
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def surface_color(hits: Hits, surfaces: Surfaces, pixel_angle: float) -> np.ndarray:
     """Return the diffuse albedo (N, 3), linear, with patterns. `pixel_angle` is the width of a pixel at depth 1."""
     rays, primitive, uvs, t_hit, _, cosine = hits
@@ -119,7 +120,7 @@ def surface_color(hits: Hits, surfaces: Surfaces, pixel_angle: float) -> np.ndar
     return albedo
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def light_from_map(hits: Hits, light_map: LightMap) -> np.ndarray:
     """Return the light (N, 3) on matt white at the hits, from the light map."""
     primitive, uvs = hits.primitive, hits.uvs
@@ -134,7 +135,7 @@ def light_from_map(hits: Hits, light_map: LightMap) -> np.ndarray:
     return result
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def add_light(
     total: np.ndarray,
     highlight: np.ndarray,
@@ -178,7 +179,7 @@ def add_light(
             highlight[k, channel] += shine * min(1.0, 4.0 * cosine) * color[channel]
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def tone_map(linear: np.ndarray, exposure: float, table: np.ndarray) -> np.ndarray:
     """Return (N, 3) uint8 sRGB of linear light (N, 3): exposure, a soft shoulder over 0.6 that reaches white at
     infinity, then the sRGB curve from `table` (4096,) uint8."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from numba import njit
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.geometry.cells import row_keys
 from scenewright.stages.kit.rendering.patterns import Material, is_wood
 
@@ -66,7 +66,7 @@ def _corner_colors(mesh: trimesh.Trimesh) -> np.ndarray:
     return np.full((len(mesh.faces), 3, 3), 0.7, dtype=np.float32)
 
 
-@njit(cache=True)
+@compiled
 def _smooth_normals(
     vertex_of_corner: np.ndarray,
     start: np.ndarray,

@@ -13,7 +13,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem
 
 FAR = 1 << 30
@@ -100,7 +101,7 @@ def successor(task: Relaxed, state: np.ndarray, action: int) -> np.ndarray:
     return after
 
 
-@njit("int32[::1](uint8[::1], int32[::1], int32[::1])", cache=True)
+@compiled("int32[::1](uint8[::1], int32[::1], int32[::1])")
 def applicable(state, pre, pre_at):  # type: ignore[no-untyped-def]
     """Return the actions whose preconditions hold in a state (A,)."""
     actions = np.empty(len(pre_at) - 1, dtype=np.int32)
@@ -117,9 +118,7 @@ def applicable(state, pre, pre_at):  # type: ignore[no-untyped-def]
     return actions[:count]
 
 
-@njit(
-    types.void(types.uint8[::1], _EFFECTS, types.int64, types.boolean, types.int64[::1], types.int32[::1]), cache=True
-)
+@compiled(types.void(types.uint8[::1], _EFFECTS, types.int64, types.boolean, types.int64[::1], types.int32[::1]))
 def costs(state, effects, without, use_max, cost, by):  # type: ignore[no-untyped-def]
     """Write the cost of every atom when nothing is ever deleted, and the action that gives it so (-1: none).
 
@@ -199,7 +198,7 @@ def costs(state, effects, without, use_max, cost, by):  # type: ignore[no-untype
         level += 1
 
 
-@njit("int64(uint8[::1], int32[::1], int32[::1], int32[::1], int64[::1], int32[::1], uint8[::1])", cache=True)
+@compiled("int64(uint8[::1], int32[::1], int32[::1], int32[::1], int64[::1], int32[::1], uint8[::1])")
 def relaxed_plan(state, pre, pre_at, goal, cost, by, preferred):  # type: ignore[no-untyped-def]
     """Return the number of actions of a relaxed plan (FAR: there is none) and mark those that can be done now.
 

@@ -7,7 +7,7 @@ how far colours and normals are apart. Coarser pieces are made of finer ones.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
 from scipy.spatial import cKDTree
 
@@ -64,7 +64,7 @@ def pieces(gaussians: Gaussians) -> np.ndarray:
     return result
 
 
-@njit(cache=True)
+@compiled
 def _root(parents: np.ndarray, k: int) -> int:
     while parents[k] != k:
         parents[k] = parents[parents[k]]
@@ -72,7 +72,7 @@ def _root(parents: np.ndarray, k: int) -> int:
     return k
 
 
-@njit(cache=True)
+@compiled
 def _join_pieces(
     first: np.ndarray, second: np.ndarray, weights: np.ndarray, count: int, granularity: float, smallest: int
 ) -> np.ndarray:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.suture.needle.silhouette import (
     ANGLES,
     GROWTH,
@@ -87,7 +87,7 @@ class Evidence:
         return float(WEIGHTS @ self.terms)
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _explain(arc: Arc, sheet: Sheet, eye: int, state: np.ndarray, lost: np.ndarray, excess: np.ndarray) -> float:
     """Return the pixels of free mask within COVERED of the outline; write each piece's `state` (K,), 0 seen, 1 missing,
     2 nothing can be said, its part in the misfit for mask that is not there, `lost` (K,), and by how much the mask is

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
-import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.suture.needle.windows import EyeMask
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
@@ -110,7 +110,7 @@ def _dilate(mask: np.ndarray, side: int) -> np.ndarray:
     return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)) > 0)
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def trace(arc: Arc, corner: np.ndarray, eye: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the arc's points (K, 3) [m] and their columns, rows and radii (K, 3) [px] in the window."""
     pose, shift, camera, on_circle, radii = arc.pose, arc.shift, arc.camera, arc.on_circle, arc.radii
@@ -126,7 +126,7 @@ def trace(arc: Arc, corner: np.ndarray, eye: int) -> tuple[np.ndarray, np.ndarra
     return points, pixels
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def box_of(pixels: np.ndarray, k: int, reach: float, stride: int, height: int, width: int) -> tuple[int, int, int, int]:
     """Return first and last column and row of the window's part within `reach` [px] of piece k, the first ones
     multiples of `stride`."""
@@ -142,7 +142,7 @@ def box_of(pixels: np.ndarray, k: int, reach: float, stride: int, height: int, w
     )
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _foot(pixels: np.ndarray, k: int, column: int, row: int) -> tuple[float, float, float]:
     """Return the share (0 to 1) of piece k at which it is nearest to a pixel, and the way (x, y) [px] from there."""
     dx, dy = pixels[k + 1, 0] - pixels[k, 0], pixels[k + 1, 1] - pixels[k, 1]
@@ -151,7 +151,7 @@ def _foot(pixels: np.ndarray, k: int, column: int, row: int) -> tuple[float, flo
     return share, column - pixels[k, 0] - share * dx, row - pixels[k, 1] - share * dy
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def draw(pixels: np.ndarray, growth: float, reach: float, stride: int, drawn: np.ndarray, piece: np.ndarray) -> None:
     """Write each pixel's signed distance [px] to the outline, and the piece it is of, within `reach` of the pieces, for
     every `stride`th row and column."""
@@ -168,7 +168,7 @@ def draw(pixels: np.ndarray, growth: float, reach: float, stride: int, drawn: np
                     piece[row, column] = k
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _compare(
     arc: Arc, sheet: Sheet, eye: int, tau: float, scale: float, matrix: np.ndarray, gradient: np.ndarray
 ) -> float:
@@ -230,7 +230,7 @@ def _compare(
     return cost
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _misfit(
     arc: Arc, sheets: tuple[Sheet, Sheet], tau: float, scale: float, matrix: np.ndarray, gradient: np.ndarray
 ) -> float:
@@ -249,7 +249,7 @@ def _misfit(
     return cost
 
 
-@numba.njit(cache=True)
+@compiled
 def _take_step(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: float) -> Arc:
     """Return the needle after a damped Gauss-Newton step of pose and shift."""
     step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)) + UNDETERMINED, gradient)
@@ -267,7 +267,7 @@ def _take_step(arc: Arc, matrix: np.ndarray, gradient: np.ndarray, damping: floa
     return Arc(pose, arc.shift + step[6:], arc.camera, arc.on_circle, arc.radii, arc.growth)
 
 
-@numba.njit(cache=True)
+@compiled
 def _fit_to_masks(
     arc: Arc, sheets: tuple[Sheet, Sheet], levels: tuple[tuple[float, int], ...], polish: int
 ) -> tuple[Arc, float, np.ndarray]:

@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import cv2
-import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.suture.needle.windows import EyeMask
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
@@ -71,7 +71,7 @@ def _differ(pose: np.ndarray, other: np.ndarray) -> bool:
     return plane < np.cos(DIFFERENT[0]) or far > DIFFERENT[1] or middle < np.cos(DIFFERENT[2])
 
 
-@numba.njit(cache=True)
+@compiled
 def _runs(mask: np.ndarray, longest: int) -> np.ndarray:
     """Return (R, 3), row, column and kind of the runs of mask: 0 for the middle of one of at most `longest` pixels, 1
     and 2 for the left and the right end of a longer one."""
@@ -174,7 +174,7 @@ class _BothMasks(NamedTuple):
     pixels: tuple[np.ndarray, np.ndarray]
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _score(centre: np.ndarray, normal: np.ndarray, masks: _BothMasks, pose: np.ndarray) -> float:
     """Return 0..2: share of the best half circle that lies on mask, plus share of the mask that it explains; write that
     half circle's pose (3, 4)."""
@@ -240,7 +240,7 @@ def _score(centre: np.ndarray, normal: np.ndarray, masks: _BothMasks, pose: np.n
     return best / (2.0 * half) + 0.5 * explained
 
 
-@numba.njit(cache=True)
+@compiled
 def _scores(centres: np.ndarray, normals: np.ndarray, masks: _BothMasks, poses: np.ndarray, scores: np.ndarray) -> None:
     for index in range(len(centres)):
         scores[index] = _score(centres[index], normals[index], masks, poses[index])

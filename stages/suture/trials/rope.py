@@ -8,7 +8,7 @@ steps along the paths that its ends are led on. Thread passes a hole in the tiss
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.geometry.transforms import wrapped
 
 PARTICLES = 48
@@ -22,7 +22,7 @@ DAMPING, ITERATIONS, PAD_FRICTION, BENDING = 0.85, 10, 0.5, 0.08
 a bend that a step straightens; by eye."""
 
 
-@njit(cache=True)
+@compiled
 def drape(
     points: np.ndarray,
     rest: np.ndarray,
@@ -85,7 +85,7 @@ def drape(
             points[count - 1, k] = last[step, k]
 
 
-@njit(cache=True)
+@compiled
 def contact(points: np.ndarray, before: np.ndarray, i: int, half_width: float, height: float) -> None:
     """Keep particle i out of pad and ridge; what touches keeps part of its place along the surface (friction)."""
     touched = False
@@ -104,7 +104,7 @@ def contact(points: np.ndarray, before: np.ndarray, i: int, half_width: float, h
             points[i, k] += PAD_FRICTION * (before[i, k] - points[i, k]) / ITERATIONS
 
 
-@njit(cache=True)
+@compiled
 def push_out(points: np.ndarray, capsules: np.ndarray, step: int, m: int) -> None:
     """Move the particles inside capsule m of a step to its surface."""
     x, y, z = capsules[step, m, 0], capsules[step, m, 1], capsules[step, m, 2]
@@ -124,7 +124,7 @@ def push_out(points: np.ndarray, capsules: np.ndarray, step: int, m: int) -> Non
             points[i, 2] += oz * s
 
 
-@njit(cache=True)
+@compiled
 def apart_from_itself(points: np.ndarray, length: float) -> None:
     """Push segments of the rope that run into each other apart, ends by their shares (once a step)."""
     count = len(points)
@@ -149,14 +149,14 @@ def apart_from_itself(points: np.ndarray, length: float) -> None:
                     points[j + 1, k] -= push * t
 
 
-@njit(cache=True)
+@compiled
 def gap(points: np.ndarray, i: int, j: int, s: float, t: float, k: int) -> float:
     """Return component k from the point at share t of segment j to the one at share s of segment i."""
     on_i = points[i, k] + s * (points[i + 1, k] - points[i, k])
     return on_i - points[j, k] - t * (points[j + 1, k] - points[j, k])
 
 
-@njit(cache=True)
+@compiled
 def nearest_shares(points: np.ndarray, i: int, j: int) -> tuple[float, float]:
     """Return where along segments i and j (shares 0 to 1) they are nearest (Ericson 2005, section 5.1.9)."""
     uu, vv, uv, uw, vw = 1e-18, 1e-18, 0.0, 0.0, 0.0

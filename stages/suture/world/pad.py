@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 
 RIDGE_HEIGHT = 0.0055
 """Height of the wound over the pad [m]; by eye."""
@@ -29,7 +29,7 @@ FLAT_FROM = 0.0135
 """Distance from the wound [m] beyond which the pad is flat but for its waves."""
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def height(x: float, y: float, ridge: Ridge) -> float:
     """Return the pad's height [m] at (x, y)."""
     if ridge.elliptic:
@@ -43,14 +43,14 @@ def height(x: float, y: float, ridge: Ridge) -> float:
     return crest - slit + waves
 
 
-@numba.njit(cache=True)
+@compiled
 def _hash(column: int, row: int, salt: int) -> float:
     value = (column * 374761393 + row * 668265263 + salt * 1274126177) & 0xFFFFFFFF
     value = ((value ^ (value >> 13)) * 1103515245) & 0xFFFFFFFF
     return float((value ^ (value >> 16)) & 0xFFFF) / 65535.0
 
 
-@numba.njit(cache=True)
+@compiled
 def texture(x: float, y: float, salt: int) -> float:
     """Return a smooth mottle between -1 and 1 with grains of 6, 1.5 and 0.5 mm at (x, y) [m]."""
     total = 0.0

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.suture.world.pad import FLAT_FROM, Ridge, height, texture
 from scenewright.stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
@@ -53,7 +53,7 @@ class Lighting(NamedTuple):
     shadow_scale: float
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _hit_depth(
     ray_x: float, ray_y: float, start: np.ndarray, axis: np.ndarray, start_radius: float, end_radius: float
 ) -> tuple[float, float]:
@@ -81,7 +81,7 @@ def _hit_depth(
     return depth - np.sqrt(inside / ray_squared) / sine, along
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def draw(cones: Cones, view: View, depth: np.ndarray, cone: np.ndarray) -> tuple[int, int, int, int]:
     """Fill the sub-pixel buffers `depth` (0: nothing) and `cone` (index of the tube's cone, -1: nothing).
 
@@ -121,7 +121,7 @@ def draw(cones: Cones, view: View, depth: np.ndarray, cone: np.ndarray) -> tuple
     return box[0] // SUBPIXELS, -(-box[1] // SUBPIXELS), box[2] // SUBPIXELS, -(-box[3] // SUBPIXELS)
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def pad_depth(ray_x: float, ray_y: float, view: View) -> tuple[float, float, float]:
     """Return the depth z at which the ray meets the wound pad, and the world's x and y there."""
     _, _, _, rotation, eye, ridge = view
@@ -157,7 +157,7 @@ def pad_depth(ray_x: float, ray_y: float, view: View) -> tuple[float, float, flo
     return far_depth, eye[0] + far_depth * direction_x, eye[1] + far_depth * direction_y
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def hide_below_pad(depth: np.ndarray, cone: np.ndarray, box: tuple[int, int, int, int], view: View) -> None:
     """Take out of the buffers whatever lies behind the wound pad's surface: what is in the tissue is not seen."""
     focal, centre_x, centre_y, rotation, eye, ridge = view
@@ -183,7 +183,7 @@ def hide_below_pad(depth: np.ndarray, cone: np.ndarray, box: tuple[int, int, int
                 depth[row, column] = 0.0
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _surroundings(x: float, y: float, z: float, turn: float) -> float:
     """Return what steel mirrors from the room in the world's direction (x, y, z): dark bench, bright lamps, stripes."""
     azimuth = np.arctan2(y, x) + turn
@@ -193,13 +193,13 @@ def _surroundings(x: float, y: float, z: float, turn: float) -> float:
     return level * (1.0 + 0.35 * np.sin(5.0 * azimuth) * np.sin(7.0 * z))
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _unit(x: float, y: float, z: float) -> tuple[float, float, float]:
     length = np.sqrt(x * x + y * y + z * z) + 1e-12
     return x / length, y / length, z / length
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _shade_tube(
     body: int,
     point: np.ndarray,
@@ -241,7 +241,7 @@ def _shade_tube(
         colour[0], colour[1], colour[2] = grey * tint, grey, grey / tint
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def shade(
     depth: np.ndarray,
     cone: np.ndarray,
@@ -321,7 +321,7 @@ def shade(
             image[row, column, 2] = total_2 * share
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def label(
     depth: np.ndarray,
     cone: np.ndarray,

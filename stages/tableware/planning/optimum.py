@@ -15,8 +15,8 @@ from math import hypot
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.tableware.planning.rules import Rules, pile_order, split_over_two
 from scenewright.stages.tableware.planning.time_model import Chances, TimeModel
 from scenewright.stages.tableware.planning.trip_options import Part, TripOptions, trip_options
@@ -153,7 +153,7 @@ def _piles(table: Table) -> _Piles:
     return _Piles(below, above)
 
 
-@njit(cache=True)
+@compiled
 def _meets(items, masks, others):  # type: ignore[no-untyped-def]
     """Whether the mask of any of a set of items (bits) has a bit in common with `others`."""
     for item in range(masks.shape[0]):  # noqa: SIM110 numba compiles no generators
@@ -182,7 +182,7 @@ class _Options(NamedTuple):
     blockers: np.ndarray
 
 
-@njit(cache=True)
+@compiled
 def _solve(piles, options, worth, per_trip):  # type: ignore[no-untyped-def]
     """f over all sets of items that may be left: (2^N,) row of the best option, and from there on seconds, trips,
     losses."""

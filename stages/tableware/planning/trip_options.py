@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.tableware.planning.rules import (
     Rules,
     can_hold,
@@ -342,7 +342,7 @@ WAY = np.dtype(
 """One option, see TripOptions."""
 
 
-@njit(cache=True)
+@compiled
 def _base(rows: np.ndarray, count: int, kind: int, parts: _Parts) -> int:
     """Return which of a choice's parts all others are stacked on, one of type `kind` on the table (-1: none)."""
     if count == 1:
@@ -353,7 +353,7 @@ def _base(rows: np.ndarray, count: int, kind: int, parts: _Parts) -> int:
     return -1
 
 
-@njit(cache=True)
+@compiled
 def _standing_on(rows: np.ndarray, count: int, one: int, other: int, parts: _Parts) -> tuple[int, int]:
     """Return which of a choice's parts stand on the table by either of two items (-1: none)."""
     first = second = -1
@@ -366,7 +366,7 @@ def _standing_on(rows: np.ndarray, count: int, one: int, other: int, parts: _Par
     return first, second
 
 
-@njit(cache=True)
+@compiled
 def _is_idle(ways: np.ndarray, begin: int, last: int, worth: float) -> bool:
     """Whether way `last`, a grasp of two, is no better in anything than one of the ways from `begin` on."""
     way = ways[last]
@@ -383,7 +383,7 @@ def _is_idle(ways: np.ndarray, begin: int, last: int, worth: float) -> bool:
     return False
 
 
-@njit(cache=True)
+@compiled
 def _ways_of(
     choices: _Choices, kinds: _Signatures, parts: _Parts, pairs: _Pairs, costs: _Costs
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ while the rows beside it hold few, so that broad patches (a shadow, a dish) do n
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 ALONG, ACROSS = 4.0, 2.5
 """Cells [px]."""
@@ -17,7 +17,7 @@ DIRECTIONS = 45
 """Directions of bars in half a turn; by eye."""
 
 
-@njit(cache=True)
+@compiled
 def _cells(
     rows: np.ndarray, columns: np.ndarray, cos: float, sin: float, lowest: tuple[float, float], counts: np.ndarray
 ) -> None:
@@ -28,7 +28,7 @@ def _cells(
         counts[int((r - lowest[1]) / ACROSS), int((s - lowest[0]) / ALONG)] += 1.0
 
 
-@njit(cache=True)
+@compiled
 def bar_candidates(rows: np.ndarray, columns: np.ndarray, length: float, most: int) -> np.ndarray:
     """Return (N, 4) bars (votes, u [px], v [px], direction [rad]), most votes first, N <= `most`, of the item's pixels
     `rows`, `columns` (P,) [px]; `length` [px] of a bar. No two lie within 8 px and 10 degrees of each other."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.tableware.world.items import TABLE_SIDES
 from scenewright.stages.tableware.world.overhead import OverheadCamera
 
@@ -177,7 +177,7 @@ def _table_plane(
     return plane
 
 
-@njit(cache=True)
+@compiled
 def _heights(part: np.ndarray, a: float, b: float, c: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return heights (h, w) [m] over the plane of depth a u + b v + c, 0 where not valid, (h, w) bool valid, and (h, w)
     bool taller than TALLEST.
@@ -197,7 +197,7 @@ def _heights(part: np.ndarray, a: float, b: float, c: float) -> tuple[np.ndarray
     return raw, valid, tall
 
 
-@njit(cache=True)
+@compiled
 def _fill_gaps(raw: np.ndarray, valid: np.ndarray, sums: np.ndarray, weight: np.ndarray) -> np.ndarray:
     filled = raw.copy()
     for v in range(raw.shape[0]):

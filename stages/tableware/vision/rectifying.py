@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.geometry.planes import ransac_plane
 from scenewright.stages.tableware.world.overhead import OverheadCamera, overhead_camera
 
@@ -242,7 +242,7 @@ class _LooksDown(NamedTuple):
     columns: int
 
 
-@njit(cache=True)
+@compiled
 def _splat_downwards(
     world: np.ndarray, depth: np.ndarray, color: np.ndarray, camera: _LooksDown
 ) -> tuple[np.ndarray, np.ndarray]:

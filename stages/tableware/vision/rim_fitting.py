@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 DIRECTIONS = 96
 """Directions in which the fall of a rim is looked for; by eye."""
@@ -21,7 +21,7 @@ RAYS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 """The same as unit vectors (DIRECTIONS, 2)."""
 
 
-@njit(cache=True)
+@compiled
 def _profiles(smooth: np.ndarray, u: float, v: float, radius: float, rays: np.ndarray, profile: np.ndarray) -> None:
     """Write heights along each ray, from WINDOW pixels inside of the circle to WINDOW outside, into (D, 2 W + 1)."""
     rows, columns = smooth.shape
@@ -37,7 +37,7 @@ def _profiles(smooth: np.ndarray, u: float, v: float, radius: float, rays: np.nd
             profile[k, step] = (1.0 - b) * upper + b * lower
 
 
-@njit(cache=True)
+@compiled
 def _outer_edges(profile: np.ndarray, lip: float, falls: np.ndarray, edge: np.ndarray) -> int:
     """Write per direction whether a fall from the lip is there, and its offset from the circle [px]: the outermost
     one. Returns how many."""
@@ -57,7 +57,7 @@ def _outer_edges(profile: np.ndarray, lip: float, falls: np.ndarray, edge: np.nd
     return count
 
 
-@njit(cache=True)
+@compiled
 def _circle_shift(edge: np.ndarray, kept: np.ndarray, rays: np.ndarray) -> np.ndarray:
     """Return (du, dv, dr) [px] of the least-squares circle through the kept edges: normal equations, Cramer's rule."""
     n = np.zeros((3, 3))
@@ -102,7 +102,7 @@ class SoughtLip(NamedTuple):
     camera_height: float
 
 
-@njit(cache=True)
+@compiled
 def fit_circle(
     smooth: np.ndarray, u: float, v: float, sought: SoughtLip, rays: np.ndarray
 ) -> tuple[float, float, float, float, float]:

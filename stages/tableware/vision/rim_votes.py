@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def cast_votes(
     blurred: np.ndarray,
     smooth: np.ndarray,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.tableware.world.dish_shapes import GAP_SHARE, HEAD_SHARE, TINES
 from scenewright.stages.tableware.world.items import Measures
 
@@ -27,7 +27,7 @@ def _comb(fork: Measures) -> tuple[np.ndarray, np.ndarray]:
     return points(middles), points(gaps)
 
 
-@njit(cache=True)
+@compiled
 def _mean(image: np.ndarray, points: np.ndarray, u: float, v: float, cos: float, sin: float) -> float:
     """Return the mean of an image (h, w) at points [m], bilinear; negative values of the image are not known."""
     total, weight = 0.0, 0.0
@@ -46,7 +46,7 @@ def _mean(image: np.ndarray, points: np.ndarray, u: float, v: float, cos: float,
     return total / weight if weight > 0.25 * len(points) else np.nan
 
 
-@njit(cache=True)
+@compiled
 def _difference(
     image: np.ndarray, tines: np.ndarray, gaps: np.ndarray, u: float, v: float, angle: float, scale: float, sign: float
 ) -> float:

@@ -12,7 +12,7 @@ from functools import cache
 
 import cv2
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.tableware.vision.bar_search import bar_candidates
 from scenewright.stages.tableware.world.dish_shapes import utensil_parts
 from scenewright.stages.tableware.world.items import DishSizes, Kind
@@ -71,7 +71,7 @@ def outline(kind: Kind, sizes: DishSizes) -> tuple[np.ndarray, np.ndarray]:
     return points[inside > 0][::3], points[border][::3]
 
 
-@njit(cache=True)
+@compiled
 def _scores(
     map_: np.ndarray,
     inside: np.ndarray,

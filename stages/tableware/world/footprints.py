@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import cos, hypot, sin
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.tableware.world.items import TABLE_SIDES, Item
 
 POINT = tuple[float, float]
@@ -59,7 +59,7 @@ def _as_rows(prints: Sequence[Footprint]) -> np.ndarray:
     return np.array([(*print_.start, *print_.end, print_.radius) for print_ in prints], dtype=np.float64).reshape(-1, 5)
 
 
-@njit(cache=True)
+@compiled
 def _overlaps(places, others):  # type: ignore[no-untyped-def]
     result = np.zeros((len(places), len(others)), np.bool_)
     for i in range(len(places)):
@@ -69,7 +69,7 @@ def _overlaps(places, others):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(cache=True)
+@compiled
 def _square_distance(first, second):  # type: ignore[no-untyped-def]
     """Square of the distance of two segments (x, y, x, y, ...)."""
     ax, ay, bx, by = first[0], first[1], first[2], first[3]
@@ -86,7 +86,7 @@ def _square_distance(first, second):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled
 def _square_to_segment(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy

@@ -10,6 +10,7 @@ import math
 
 import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.rendering.splatting import rasterizer
 
 TILE = 16
@@ -21,7 +22,7 @@ ONE, HALF = np.float32(1.0), np.float32(0.5)
 """Numbers of single precision, so that nothing is computed in double."""
 
 
-@numba.njit(cache=True)
+@compiled
 def list_tiles(order, reach, columns, rows):  # type: ignore[no-untyped-def]
     """Return starts (T + 1,) and members (M,): the Gaussians of each tile, row by row, in the given order, front first.
 
@@ -47,7 +48,7 @@ def list_tiles(order, reach, columns, rows):  # type: ignore[no-untyped-def]
     return starts, members
 
 
-@numba.njit(cache=True, parallel=True, fastmath=True)
+@compiled(parallel=True, fastmath=True)
 def blend(starts, members, flat, reach, values, background, width, height):  # type: ignore[no-untyped-def]
     """Return channels (H, W, C), transmittance left (H, W), and how far down its tile's list each pixel looked (H, W).
 
@@ -99,7 +100,7 @@ def blend(starts, members, flat, reach, values, background, width, height):  # t
     return image, transmittance, looked
 
 
-@numba.njit(cache=True, parallel=True, fastmath=True)
+@compiled(parallel=True, fastmath=True)
 def blend_back(starts, members, flat, reach, values, left, looked, image_gradients, behind):  # type: ignore[no-untyped-def]
     """Return gradients (M, 6 + C) by u v a b c, opacity and values, of every entry of `members`.
 
@@ -154,7 +155,7 @@ def blend_back(starts, members, flat, reach, values, left, looked, image_gradien
     return gradients
 
 
-@numba.njit(cache=True)
+@compiled
 def gathered(members, gradients, count):  # type: ignore[no-untyped-def]
     """Return the sums (N, D) float64 of gradients (M, D) over the entries of each Gaussian."""
     sums = np.zeros((count, gradients.shape[1]))

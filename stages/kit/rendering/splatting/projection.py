@@ -10,6 +10,7 @@ import math
 
 import numba
 import numpy as np
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.rendering.splatting import rasterizer
 
 DILATION, NEAR, SMALLEST_ALPHA = rasterizer.DILATION, rasterizer.NEAR, rasterizer.SMALLEST_ALPHA
@@ -17,7 +18,7 @@ CHUNK = 256
 """Gaussians that one thread takes at a time."""
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _turn(quaternion, turn):  # type: ignore[no-untyped-def]
     """Write the rotation matrix (3, 3) of a quaternion (4,) into `turn`; return its length."""
     w, x, y, z = quaternion[0] * 1.0, quaternion[1] * 1.0, quaternion[2] * 1.0, quaternion[3] * 1.0
@@ -29,7 +30,7 @@ def _turn(quaternion, turn):  # type: ignore[no-untyped-def]
     return length
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _jacobian(point, focal, limits, jacobian):  # type: ignore[no-untyped-def]
     """Write the Jacobian (2, 3) of the projection at a point (3,) of the camera's frame; return x/z and y/z taken."""
     z = point[2]
@@ -40,7 +41,7 @@ def _jacobian(point, focal, limits, jacobian):  # type: ignore[no-untyped-def]
     return across, along
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _product(a, b, out):  # type: ignore[no-untyped-def]
     """Write the product of small matrices into `out`."""
     for i in range(a.shape[0]):
@@ -51,7 +52,7 @@ def _product(a, b, out):  # type: ignore[no-untyped-def]
             out[i, j] = total
 
 
-@numba.njit(cache=True, parallel=True, fastmath=True)
+@compiled(parallel=True, fastmath=True)
 def project(means, quaternions, log_scales, logit_opacities, pose, focal, center, limits, size):  # type: ignore[no-untyped-def]
     """Return flat (N, 7) float32, depths (N,) float32 [m] and reach (N, 4) int32.
 
@@ -101,7 +102,7 @@ def project(means, quaternions, log_scales, logit_opacities, pose, focal, center
     return flat, depths, reach
 
 
-@numba.njit(cache=True, parallel=True, fastmath=True)
+@compiled(parallel=True, fastmath=True)
 def project_back(means, quaternions, log_scales, flat, pose, focal, limits, flat_gradients, depth_gradients, visible):  # type: ignore[no-untyped-def]
     """Return gradients by means (N, 3), quaternions (N, 4), log scales (N, 3), logits (N,), and the twist (6,).
 
@@ -196,7 +197,7 @@ def project_back(means, quaternions, log_scales, flat, pose, focal, limits, flat
     return by_mean, by_quaternion, by_scale, by_logit, twist
 
 
-@numba.njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _add_quaternion(quaternion, length, g, out):  # type: ignore[no-untyped-def]
     """Write the gradient by an unnormalised quaternion (4,), given that by its matrix (3, 3), into `out`."""
     w, x, y, z = quaternion[0] / length, quaternion[1] / length, quaternion[2] / length, quaternion[3] / length

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.network.features import STRIDE
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 
@@ -107,7 +107,7 @@ def find_centres(heat: np.ndarray, allowed: np.ndarray, settings: GroupingSettin
     return peaks[order]
 
 
-@njit(cache=True)
+@compiled
 def assign_to_centres(allowed: np.ndarray, offsets: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """Return (h, w) int32: 1 + number of the centre nearest to pixel + offset, where allowed; 0 elsewhere.
 
@@ -131,7 +131,7 @@ def assign_to_centres(allowed: np.ndarray, offsets: np.ndarray, centres: np.ndar
     return owner
 
 
-@njit(cache=True)
+@compiled
 def raise_to_depth(coarse: np.ndarray, coarse_depth: np.ndarray, depth: np.ndarray, step: float) -> np.ndarray:
     """Return masks (H, W) int32 for a depth image (H, W) [m, 0 invalid] from masks (h, w) at a lower resolution.
 

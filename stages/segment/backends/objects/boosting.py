@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 
 Trees = tuple[np.ndarray, np.ndarray, np.ndarray, float]
@@ -16,7 +16,7 @@ FORMAT = "scenewright boosted trees"
 _OTHER = "give a file that `scenewright train tabletop-pairs` wrote"
 
 
-@njit(cache=True)
+@compiled
 def score_rows(row: np.ndarray, trees: tuple[np.ndarray, np.ndarray, np.ndarray, float]) -> float:
     """Return the log-odds of one row of features (F,) float32."""
     features, thresholds, values, base = trees

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.regions import color_difference
 
 
@@ -35,7 +35,7 @@ class CutSettings:
     """Cuts per direction."""
 
 
-@njit(cache=True)
+@compiled
 def _unroll_patch(
     rows: np.ndarray,
     columns: np.ndarray,
@@ -72,7 +72,7 @@ def _unroll_patch(
     return color, pixels, s_low
 
 
-@njit(cache=True)
+@compiled
 def _line_support(color: np.ndarray, pixels: np.ndarray, step: float) -> np.ndarray:
     """Of every line of cells (S,) the share of its width with a colour step or a thin line there."""
     height, width = pixels.shape
@@ -143,7 +143,7 @@ def _peaks(score: np.ndarray, least: float, apart: int, most: int) -> list[int]:
     return positions
 
 
-@njit(cache=True)
+@compiled
 def pixels_by_label(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return rows and columns (K,) of all pixels with a label in `labels` (H, W), label by label and row by row, and
     where every label 0..count begins (count + 2,); label 0 has none."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.boosting import Trees, score_rows
 from scenewright.stages.segment.backends.objects.groups import Groups
 from scenewright.stages.segment.backends.objects.rules import rule_score
@@ -70,7 +70,7 @@ def group_patches(groups: Groups, scorer: PairScorer, threshold: float) -> np.nd
         work.join(first, second)
 
 
-@njit(cache=True)
+@compiled
 def _by_trees(features: np.ndarray, trees: tuple[np.ndarray, np.ndarray, np.ndarray, float]) -> np.ndarray:
     scores = np.empty(len(features))
     for k in range(len(features)):
@@ -78,7 +78,7 @@ def _by_trees(features: np.ndarray, trees: tuple[np.ndarray, np.ndarray, np.ndar
     return scores
 
 
-@njit(cache=True)
+@compiled
 def _by_rules(features: np.ndarray, table: np.ndarray) -> np.ndarray:
     scores = np.empty(len(features))
     for k in range(len(features)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.hulls import convex_hull, hull_content
 from scenewright.stages.segment.backends.objects.pairs import (
     CONTENT_STEP,
@@ -94,7 +94,7 @@ class Groups:
         self._own_behind[k] = _own_behind(np.ascontiguousarray(hull), k, self.sums, self._image, self._inverse)
 
 
-@njit(cache=True)
+@compiled
 def _candidate(a: int, b: int, sums: np.ndarray, borders: np.ndarray, boxes: np.ndarray) -> bool:
     if borders[a, b, 0] > 0:
         return True
@@ -106,7 +106,7 @@ def _candidate(a: int, b: int, sums: np.ndarray, borders: np.ndarray, boxes: np.
     return np.hypot(across, down) < LARGEST_GAP * np.sqrt(smaller)
 
 
-@njit(cache=True)
+@compiled
 def _own_behind(hull: np.ndarray, k: int, sums: np.ndarray, groups: np.ndarray, inverse: np.ndarray) -> float:
     plane, residual = inverse_plane(sums[k])
     covered, hidden, missing, behind = hull_content(
@@ -115,7 +115,7 @@ def _own_behind(hull: np.ndarray, k: int, sums: np.ndarray, groups: np.ndarray, 
     return behind / max(1.0, covered + hidden + missing + behind)
 
 
-@njit(cache=True)
+@compiled
 def _candidates(fresh: int, alive: np.ndarray, sums: np.ndarray, borders: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     """The pairs (P, 2) that may be one, with the group `fresh` in them (-1: all)."""
     count = len(alive)
@@ -131,7 +131,7 @@ def _candidates(fresh: int, alive: np.ndarray, sums: np.ndarray, borders: np.nda
     return pairs[:size].copy()
 
 
-@njit(cache=True)
+@compiled
 def _features(
     pairs: np.ndarray,
     sums: np.ndarray,

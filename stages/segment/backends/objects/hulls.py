@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def convex_hull(points: np.ndarray) -> np.ndarray:
     """Return the corners (K, 2) of the convex hull of points (N, 2) float64, counter-clockwise in a y-up frame, no
     three in a line (Andrew 1979, monotone chain). One or two distinct points are returned as they are."""
@@ -31,7 +31,7 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
     return hull[: max(size, 1)].copy()
 
 
-@njit(cache=True)
+@compiled
 def hull_span(hull: np.ndarray, row: float) -> tuple[float, float]:
     """Return the first and the last column in which a hull (K, 2) of (column, row) meets a row; first > last: never."""
     first, last = 1e9, -1e9
@@ -50,7 +50,7 @@ def hull_span(hull: np.ndarray, row: float) -> tuple[float, float]:
     return first, last
 
 
-@njit(cache=True)
+@compiled
 def hull_content(
     hull: np.ndarray,
     groups: np.ndarray,
@@ -93,7 +93,7 @@ def hull_content(
     return covered * scale, hidden * scale, missing * scale, behind * scale
 
 
-@njit(cache=True)
+@compiled
 def inside_hull(hull: np.ndarray, x: float, y: float) -> bool:
     """Return whether (x, y) lies in a hull (K, 2) as convex_hull returns it, border included."""
     count = len(hull)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.hulls import convex_hull, hull_content, inside_hull
 from scenewright.stages.segment.backends.objects.regions import HEIGHT_BIN
 
@@ -56,7 +56,7 @@ HIDING_MARGIN = 0.02
 """Nearer by this hides [1/m]: 2 cm at 1 m."""
 
 
-@njit(cache=True)
+@compiled
 def inverse_plane(s: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the plane (3,) of the inverse depth over (1, column, row) from sums (POINT_SUMS,), and its residual
     (root mean square) [1/m]."""
@@ -74,7 +74,7 @@ def inverse_plane(s: np.ndarray) -> tuple[np.ndarray, float]:
     return plane, np.sqrt(residual)
 
 
-@njit(cache=True)
+@compiled
 def _quantile(histogram: np.ndarray, share: float) -> float:
     total = histogram.sum() * share
     passed = 0.0
@@ -85,7 +85,7 @@ def _quantile(histogram: np.ndarray, share: float) -> float:
     return HEIGHT_BIN * len(histogram)
 
 
-@njit(cache=True)
+@compiled
 def pair_features(
     a: int,
     b: int,

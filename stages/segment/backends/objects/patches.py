@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.support import (
     SupportSettings,
     SupportSurface,
@@ -83,7 +84,7 @@ def foreground_of(
     return foreground, height
 
 
-@njit(cache=True)
+@compiled
 def _take_surface(
     foreground: np.ndarray,
     height: np.ndarray,
@@ -114,7 +115,7 @@ def _take_surface(
                 foreground[v, u] = False
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _edges(
     points: np.ndarray,
     normals: np.ndarray,
@@ -207,7 +208,7 @@ def find_patches(
     return PatchFrame(window, labels, points, normals, inverse, supports, height)
 
 
-@njit(cache=True)
+@compiled
 def reciprocal(depth: np.ndarray) -> np.ndarray:
     """Return 1 / depth (H, W) float32, 0 where the depth (H, W) float32 is 0."""
     result = np.zeros(depth.shape, dtype=np.float32)
@@ -218,7 +219,7 @@ def reciprocal(depth: np.ndarray) -> np.ndarray:
     return result
 
 
-@njit(cache=True)
+@compiled
 def _points(depth: np.ndarray, foreground: np.ndarray, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (h, w, 3) of a depth image, y / z of every row and x / z of every column; the second time without those
     off the foreground."""

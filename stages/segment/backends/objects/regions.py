@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.hulls import convex_hull
 
 LIGHTNESS_BINS, CHROMA_BINS = 5, 6
@@ -63,13 +63,13 @@ def lab_image(color: np.ndarray, window: tuple[slice, slice]) -> np.ndarray:
     return cv2.cvtColor(np.divide(inner, np.float32(255), dtype=np.float32), cv2.COLOR_RGB2LAB)
 
 
-@njit(cache=True)
+@compiled
 def color_difference(a: np.ndarray, b: np.ndarray) -> float:
     """Return the difference of two Lab colours (3,), lightness at half weight: it changes with the light on a face."""
     return np.sqrt(0.25 * (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
-@njit(cache=True)
+@compiled
 def _point_sums(
     labels: np.ndarray,
     points: np.ndarray,
@@ -125,7 +125,7 @@ def _point_sums(
     return sums, colors, heights
 
 
-@njit(cache=True)
+@compiled
 def _border_sums(
     labels: np.ndarray,
     patch_of: np.ndarray,
@@ -245,7 +245,7 @@ def _border_sums(
     return borders, perimeters
 
 
-@njit(cache=True)
+@compiled
 def _hulls(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Hulls of all labels from the first and last pixel of every row."""
     rows, columns = labels.shape

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.pairs import FEATURES
 
 _AT = {name: k for k, name in enumerate(FEATURES)}
@@ -88,7 +88,7 @@ def rule_table(rules: tuple[Rule, ...], start: dict[int, float]) -> np.ndarray:
     return np.array(rows, dtype=np.float64)
 
 
-@njit(cache=True)
+@compiled
 def kind_of(f: np.ndarray) -> int:
     """Return CUT, TOUCHING or APART for the features (pairs.FEATURES) of a pair."""
     if f[JOINED_BY_CUT] > 0.5:
@@ -96,7 +96,7 @@ def kind_of(f: np.ndarray) -> int:
     return TOUCHING if f[TOUCHES] > 0.0 else APART
 
 
-@njit(cache=True)
+@compiled
 def term_values(f: np.ndarray) -> np.ndarray:
     """Return the values (TERMS,) float64 that rules speak of, from the features (pairs.FEATURES) of a pair."""
     values = np.empty(PLAIN + 2)
@@ -107,7 +107,7 @@ def term_values(f: np.ndarray) -> np.ndarray:
     return values
 
 
-@njit(cache=True)
+@compiled
 def rule_score(f: np.ndarray, table: np.ndarray) -> float:
     """Return the score of two groups with features `f` (pairs.FEATURES) by the rows of rule_table."""
     kind, values, score = kind_of(f), term_values(f), 0.0

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from numba import njit
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.cuts import CutSettings, cut_patches
 from scenewright.stages.segment.backends.objects.grouping import PairScorer, by_rules, group_patches
 from scenewright.stages.segment.backends.objects.groups import Groups
@@ -115,7 +115,7 @@ def _holes_closed(labels: np.ndarray, valid: np.ndarray, largest: int) -> np.nda
     return np.where((labels == 0) & valid, owner[holes], labels)
 
 
-@njit(cache=True)
+@compiled
 def _surrounding_labels(labels: np.ndarray, holes: np.ndarray, count: int) -> np.ndarray:
     """The one label that every hole 0..count-1 of `holes` (H, W) touches: 0 when none, -1 when several."""
     sole = np.zeros(count, dtype=np.int32)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.compiled import compiled
 
 SAMPLE_STEP = 6
 """Every how many-th row and column takes part in the search and in the fit."""
@@ -78,7 +78,7 @@ def _best_plane(design: np.ndarray, inverse: np.ndarray, thickness: float, weigh
     return best
 
 
-@njit(cache=True)
+@compiled
 def _weight_within(
     design: np.ndarray, inverse: np.ndarray, weights: np.ndarray, planes: np.ndarray, thickness: float
 ) -> np.ndarray:

@@ -4,7 +4,7 @@ Guestrin 2016): features in bins, balanced trees of a fixed depth, every tree on
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.segment.backends.objects.boosting import Trees
 
 BINS = 64
@@ -23,7 +23,7 @@ def binned(features: np.ndarray, edges: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1).astype(np.uint8)
 
 
-@njit(cache=True)
+@compiled
 def _grow_tree(
     bins: np.ndarray,
     gradient: np.ndarray,
@@ -72,7 +72,7 @@ def _grow_tree(
     return feature, cut, -leaf_gradient / (leaf_curvature + ridge)
 
 
-@njit(cache=True)
+@compiled
 def _add_tree(
     total: np.ndarray, bins: np.ndarray, feature: np.ndarray, cut: np.ndarray, values: np.ndarray, rate: float
 ) -> None:
