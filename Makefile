@@ -20,28 +20,40 @@ help: ## List the targets
 # ---- installation -------------------------------------------------------------------------------------------------
 
 .PHONY: setup
-setup: $(STAMP) ## Create .venv from requirements.lock when it is missing or stale
+setup: $(STAMP) ## Create .venv from requirements.lock when it is missing or stale (BASE_PYTHON=python3.12)
 
 $(STAMP): requirements.lock pyproject.toml data/setup.sh
-	TORCH_INDEX="$(TORCH_INDEX)" bash data/setup.sh $(VENV)
+	TORCH_INDEX="$(TORCH_INDEX)" BASE_PYTHON="$(BASE_PYTHON)" bash data/setup.sh $(VENV)
 	touch $@
 
-.PHONY: extras
+INSTALL := $(PYTHON) -m pip --disable-pip-version-check install --quiet -r
+
+.PHONY: development extras
+development: $(VENV)/.development ## Install what tests, lint, site and notebooks need
+
+$(VENV)/.development: requirements-dev.lock $(STAMP)
+	$(INSTALL) requirements-dev.lock
+	touch $@
+
 extras: $(VENV)/.extras ## Install the extras too: Rerun, Ray, atheris, transformers, ONNX Runtime
 
-$(VENV)/.extras: requirements-extras.lock $(STAMP)
-	$(PYTHON) -m pip --disable-pip-version-check install --quiet -r requirements-extras.lock
+$(VENV)/.extras: requirements-extras.lock $(VENV)/.development
+	$(INSTALL) requirements-extras.lock
 	touch $@
 
+NAMES_OF = $$(sed 's/==.*//; s/^/--exclude /' $(1))
+
 .PHONY: lock
-lock: ## Write requirements.lock from what is installed, but for the extras
-	$(PYTHON) -m pip freeze --exclude-editable --exclude scenewright $$(sed 's/==.*//; s/^/--exclude /' requirements-extras.lock) | sed 's/+cpu$$//' > requirements.lock
+lock: development ## Write requirements.lock and requirements-dev.lock from what is installed
+	$(PYTHON) -m pip freeze --exclude-editable -r requirements-dev.lock | sed '/^##/,$$d' > requirements-dev.lock.new
+	mv requirements-dev.lock.new requirements-dev.lock
+	$(PYTHON) -m pip freeze --exclude-editable --exclude scenewright $(call NAMES_OF,requirements-dev.lock requirements-extras.lock) | sed 's/+cpu$$//' > requirements.lock
 
 # ---- checks -------------------------------------------------------------------------------------------------------
 
 .PHONY: test test-all fuzz lint format rules
 TEST_JOBS ?= 2
-test: setup ## Run the tests (under 12 minutes on 2 cores; TEST_JOBS=2)
+test: development ## Run the tests (under 12 minutes on 2 cores; TEST_JOBS=2)
 	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n $(TEST_JOBS) --dist loadfile
 
 test-all: extras ## Run the slow tests and those of the extras too
@@ -54,14 +66,14 @@ fuzz: extras ## Fuzz the commands (MINUTES=10 of processor time, SEED=0), then e
 	$(PYTHON) -m tests.fuzz.commands.run --minutes $(MINUTES) --seed $(SEED)
 	$(PYTHON) -m tests.fuzz.run --seconds $(SECONDS_EACH)
 
-lint: setup ## Format and lint check, types, who may import whom
+lint: development ## Format and lint check, types, who may import whom
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m tests.wheel_layout .mypy_cache/packages
 	$(PYTHON) -m mypy
 	$(PYTHON) -m pytest -p no:cacheprovider tests/contract/test_floors.py
 
-format: setup ## Format the code
+format: development ## Format the code
 	$(PYTHON) -m ruff format .
 	$(PYTHON) -m ruff check --fix .
 

@@ -9,32 +9,34 @@ import shutil
 import sys
 from dataclasses import dataclass
 
+from scenewright.schemas.places import checkout
 from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.engine.model_cache import cache_folder, cached_models
 from scenewright.stages.kit.library_versions import library_version
 
 CORE = {
-    "typer": "typer",
-    "open3d": "open3d",
-    "trimesh": "trimesh",
-    "pycolmap": "pycolmap",
-    "opencv-python-headless": "cv2",
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "torch": "torch",
-    "mcap": "mcap",
-    "pybullet": "pybullet",
-    "pydantic": "pydantic",
-    "numba": "numba",
-    "python-fcl": "fcl",
-    "embreex": "embreex",
-    "shapely": "shapely",
-    "networkx": "networkx",
-    "ompl": "ompl",
-    "matplotlib": "matplotlib",
-    "rosbags": "rosbags",
-    "psutil": "psutil",
+    "typer": ("typer", "every command"),
+    "pydantic": ("pydantic", "every command"),
+    "numpy": ("numpy", "every step"),
+    "scipy": ("scipy", "every step"),
+    "numba": ("numba", "compiled kernels of most steps"),
+    "opencv-python-headless": ("cv2", "pictures"),
+    "mcap": ("mcap", "MCAP logs"),
+    "rosbags": ("rosbags", "ROS bags"),
+    "torch": ("torch", "networks of segment, disparity and suture"),
+    "pycolmap": ("pycolmap", "poses --bundle-adjustment, a splat's points from pictures alone"),
+    "trimesh": ("trimesh", "meshes"),
+    "open3d": ("open3d", "ray casting at meshes"),
+    "python-fcl": ("fcl", "distances between solids"),
+    "embreex": ("embreex", "faster rays of plan"),
+    "shapely": ("shapely", "outlines of surfaces"),
+    "networkx": ("networkx", "contact graphs"),
+    "pybullet": ("pybullet", "physics of urdf, plan, tableware and agent"),
+    "ompl": ("ompl", "motion planning"),
+    "matplotlib": ("matplotlib", "plots"),
+    "psutil": ("psutil", "memory and processes of a batch"),
 }
+"""Distribution -> module, and what needs it."""
 EXTRAS = {
     "rerun-sdk": ("rerun", "viewing artifacts: pip install rerun-sdk"),
     "ray": ("ray", "batches on a cluster: pip install ray"),
@@ -75,11 +77,13 @@ def diagnose() -> list[Check]:
     """Check Python, system libraries, core and extra packages, memory and disk."""
     checks = []
     python = ".".join(map(str, sys.version_info[:3]))
-    supported = sys.version_info[:2] == (3, 11)
-    checks.append(Check("python", python, "" if supported else "use Python 3.11 and run: make setup"))
+    supported = (3, 11) <= sys.version_info[:2] <= (3, 13)
+    checks.append(Check("python", python, "" if supported else "use Python 3.11, 3.12 or 3.13"))
     usb = ctypes.util.find_library("usb-1.0")
     checks.append(Check("libusb-1.0-0", usb or "absent", "" if usb else "apt-get install libusb-1.0-0"))
-    checks += [_import_check(name, module, "run: make setup", True) for name, module in CORE.items()]
+    for name, (module, purpose) in CORE.items():
+        remedy = "make setup" if checkout() else f"pip install {name}"
+        checks.append(_import_check(name, module, f"{purpose}: {remedy}", True))
     torchvision = library_version("torchvision")
     if torchvision != "absent":
         checks.append(Check("torchvision", torchvision, "pip uninstall torchvision (it breaks transformers)", False))

@@ -28,7 +28,7 @@ from scenewright.stages.engine.provenance import processor_seconds, provenance_n
 from scenewright.stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
 from scenewright.stages.kit.digests import external_digest, external_files
 from scenewright.stages.kit.estimates import Estimate
-from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.progress import SilentProgress, showing
 from scenewright.stages.kit.stage import Context, External, Optionally, Parameters, Stage
 
 logger = logging.getLogger("scenewright")
@@ -333,7 +333,12 @@ def run_stage(
         with store.partial_folder(out) as partial:
             kept = store.kept_folder(out, key, fresh=force)
             context = Context(output=partial, seed=seed, device=device, progress=progress, force=force, kept=kept)
-            with interruption.insisting(), _inputs_stay(opened), memory_limit.limited(max_memory, out):
+            with (
+                interruption.insisting(),
+                _inputs_stay(opened),
+                memory_limit.limited(max_memory, out),
+                showing(progress),
+            ):
                 made = _work(stage, opened, parameters, context)
             _check_payload(stage, made, partial)
             timings = {**progress.seconds, PROCESSOR: processor_seconds()}

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import njit
-from numba.core import caching, config
+from numba.core import caching, config, event
 from numba.core.dispatcher import Dispatcher
+from scenewright.stages.kit.progress import shown
 
 _ours: set[Any] = set()
 """Python functions whose compiled code is kept by what they hold."""
@@ -95,6 +97,22 @@ class InUserCache(_ByWhatItHolds, caching.UserWideCacheLocator):  # type: ignore
     """numba's folder in the user's cache."""
 
 
+class _ShowsCompilation(event.Listener):  # type: ignore[misc]
+    """Tells the progress of what goes on; a function that another one waits for is part of that one."""
+
+    def __init__(self) -> None:
+        self._open: list[ExitStack] = []
+
+    def on_start(self, _: Any) -> None:
+        self._open.append(ExitStack())
+        if len(self._open) == 1:
+            self._open[0].enter_context(shown().compiling())
+
+    def on_end(self, _: Any) -> None:
+        self._open.pop().close()
+
+
+event.register("numba:compile", _ShowsCompilation())
 if not config.CACHE_LOCATOR_CLASSES:
     config.CACHE_LOCATOR_CLASSES = ",".join(
         [f"{place.__module__}.{place.__name__}" for place in (InGivenFolder, BesideTheFile, InUserCache)]

@@ -15,11 +15,18 @@ from typing import TypeVar
 Item = TypeVar("Item")
 
 
+COMPILE = "compile"
+"""Part of the work that is numba's, within the parts that wait for it."""
+
+
 class SilentProgress:
     """Times the parts and shows nothing."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+
+    def say(self, text: str) -> None:
+        """Show a line."""
 
     def track(self, items: Iterable[Item], *, total: int | None = None, description: str = "") -> Iterator[Item]:
         """Yield the items."""
@@ -33,6 +40,14 @@ class SilentProgress:
             yield
         finally:
             self.seconds[description] = self.seconds.get(description, 0.0) + time.perf_counter() - started
+
+    @contextmanager
+    def compiling(self) -> Iterator[None]:
+        """Time the compilation of a function; the first one is said."""
+        if COMPILE not in self.seconds:
+            self.say("compile functions for this machine, kept for later runs ...")
+        with SilentProgress.step(self, COMPILE):
+            yield
 
 
 class LineProgress(SilentProgress):
@@ -54,14 +69,18 @@ class LineProgress(SilentProgress):
                 last = now
                 of = f"/{total}" if total else ""
                 rate = count / (now - started)
-                print(f"{self.start}{description}: {count}{of} ({rate:.1f}/s)", file=sys.stderr, flush=True)
+                self.say(f"{description}: {count}{of} ({rate:.1f}/s)")
 
     @contextmanager
     def step(self, description: str) -> Iterator[None]:
         """Say what begins, and time it."""
-        print(f"{self.start}{description} ...", file=sys.stderr, flush=True)
+        self.say(f"{description} ...")
         with super().step(description):
             yield
+
+    def say(self, text: str) -> None:
+        """Print a line after the name."""
+        print(f"{self.start}{text}", file=sys.stderr, flush=True)
 
 
 class BarProgress(SilentProgress):
@@ -75,6 +94,29 @@ class BarProgress(SilentProgress):
         if total is None and hasattr(items, "__len__"):
             total = len(items)  # type: ignore[arg-type]
         yield from track(items, description=description, total=total, console=Console(stderr=True), transient=True)
+
+    def say(self, text: str) -> None:
+        """Print a line."""
+        print(text, file=sys.stderr, flush=True)
+
+
+_shown: list[SilentProgress] = []
+"""Progress of the work that goes on, the innermost last."""
+
+
+@contextmanager
+def showing(progress: SilentProgress) -> Iterator[None]:
+    """Show the progress of what has no context there, such as compilation."""
+    _shown.append(progress)
+    try:
+        yield
+    finally:
+        _shown.remove(progress)
+
+
+def shown() -> SilentProgress:
+    """Return the progress of the work that goes on."""
+    return _shown[-1] if _shown else SilentProgress()
 
 
 def progress_for(stream_is_terminal: bool, quiet: bool = False, name: str = "") -> SilentProgress:

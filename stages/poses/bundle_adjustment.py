@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.needed import needed
 from scenewright.stages.kit.registration.pose_graph import Edge, squared_errors
 from scenewright.stages.poses.estimation import Estimate
 from scenewright.stages.poses.features import Features, match_features
@@ -105,7 +106,7 @@ def _bundle(
     keys: list[KeyFrame], poses: np.ndarray, tracks: list[list[tuple[int, int]]], used: list[int], camera: Camera
 ) -> np.ndarray | None:
     """Return the adjusted world_from_key (U, 4, 4) of the key frames `used` in metres, or None without scale."""
-    import pycolmap
+    pycolmap = needed("pycolmap", "bundle adjustment")
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
     model = pycolmap.Reconstruction()

@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.needed import needed
 from scenewright.stages.splat.views import PosedView
 
 FEATURES = 2000
@@ -28,7 +29,10 @@ LEAST_ANGLE = 2.0
 
 
 def with_points(views: Sequence[PosedView], seed: int) -> list[PosedView]:
-    """Return the views with the z-depth [m] of the triangulated points that each shows, 0 everywhere else."""
+    """Return the views with the z-depth [m] of the triangulated points that each shows, 0 everywhere else.
+
+    Raises MissingDependency without pycolmap.
+    """
     points = _points(views, seed)
     with_depth = []
     for number, view in enumerate(views):
@@ -45,7 +49,7 @@ def with_points(views: Sequence[PosedView], seed: int) -> list[PosedView]:
 
 def _points(views: Sequence[PosedView], seed: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """Return number of a view -> pixels (K, 2) and places (K, 3) [m, world] of the points that it shows."""
-    import pycolmap
+    pycolmap = needed("pycolmap", "triangulation")
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
     pycolmap.set_random_seed(seed)
@@ -113,7 +117,7 @@ def _points(views: Sequence[PosedView], seed: int) -> dict[int, tuple[np.ndarray
 
 
 def _match(database: Path, count: int, seed: int) -> None:
-    import pycolmap
+    pycolmap = needed("pycolmap", "triangulation")
 
     matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
     verification = pycolmap.TwoViewGeometryOptions()

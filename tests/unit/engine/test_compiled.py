@@ -50,3 +50,19 @@ def test_an_edit_of_another_file_compiles_anew(tmp_path: Path, change: dict[str,
     assert outcome(tmp_path) == [6.0, 0]
     assert outcome(tmp_path) == [6.0, 1]
     assert outcome(tmp_path, **change) == [value, 0]
+
+
+def test_compilation_is_said_once_and_timed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from numba.core import config
+    from scenewright.stages.kit.compiled import compiled
+    from scenewright.stages.kit.progress import COMPILE, LineProgress, showing
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    progress = LineProgress()
+    with showing(progress):
+        for number in (1, 2.0):
+            compiled(lambda value: value + 1)(number)
+    assert capsys.readouterr().err.count("compile") == 1
+    assert progress.seconds[COMPILE] > 0.0
