@@ -51,13 +51,19 @@ lock: development ## Write requirements.lock and requirements-dev.lock from what
 
 # ---- checks -------------------------------------------------------------------------------------------------------
 
-.PHONY: test test-all fuzz lint format rules
+.PHONY: test test-all test-slice fuzz lint format rules
 TEST_JOBS ?= 2
-test: development ## Run the tests (under 12 minutes on 2 cores; TEST_JOBS=2)
-	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n $(TEST_JOBS) --dist loadfile
+PYTEST := OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n $(TEST_JOBS) --dist loadfile $(OPTIONS)
+test: development ## Run the tests in a drawn order (OPTIONS=--randomly-seed=7 repeats one; TEST_JOBS=2)
+	$(PYTEST)
 
 test-all: extras ## Run the slow tests and those of the extras too
-	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n $(TEST_JOBS) --dist loadfile -m ''
+	$(PYTEST) -m ''
+
+# The hash of a commit is as good as a drawn number: of SLICES slices, twelve landings run nearly all.
+SLICES := 4
+test-slice: extras ## Run the slice of the slow tests that the commit's hash draws
+	$(PYTEST) -m slow --slice $$((16#$$(git rev-parse HEAD | cut -c1-7) % $(SLICES)))/$(SLICES)
 
 SECONDS_EACH ?= 60
 MINUTES ?= 10

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scenewright.stages.suture.evaluation.judgement import judged
 from scenewright.stages.suture.masks import spoiled_masks
 from scenewright.stages.suture.needle.estimate import estimate
 from scenewright.stages.suture.world.corruption import noisy_disparity
 from scenewright.stages.suture.world.sampling import seen_scene
 
-from tests.quality.bands import Band, outside
+from tests.quality.limits import misses
+
+pytestmark = pytest.mark.slow
 
 VIEWS = 24
 FIRST_SEED = 7000
 DISPARITY_NOISE = 1.0  # px
 CALIBRATION_ERROR = 0.15  # px
 
-BANDS: dict[str, Band] = {
-    "answered": (19, 19),
-    "right": (18, 18),
-    "swapped": (0, 0),
-    "median_centre_error_mm": (0.234, 0.242),
-    "median_normal_error_deg": (0.29, 0.32),
-}
-"""Today 19, 18, 0, 0.238, 0.300. Without the test of presence 21 and 20: it refuses some near edge-on and in tissue."""
+AT_LEAST = {"answered": 19, "right": 18}
+AT_MOST = {"swapped": 0, "median_centre_error_mm": 0.242, "median_normal_error_deg": 0.32}
 
 
 def figures() -> dict[str, float]:
@@ -45,4 +42,4 @@ def figures() -> dict[str, float]:
 
 
 def test_needles_are_found() -> None:
-    assert not outside(figures(), BANDS)
+    assert not misses(figures(), AT_LEAST, AT_MOST)

@@ -5,27 +5,25 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scenewright.cli.main import run
 from scenewright.schemas.tableware_detections import TablewareDetectionsFile
 from scenewright.schemas.tableware_scene import TablewareSceneFile
 from scenewright.schemas.tableware_trial import TablewareEvaluationFile
 
-from tests.quality.bands import Band, outside
+from tests.quality.limits import misses
+
+pytestmark = pytest.mark.slow
 
 TABLES = 6
 SEEN_SEEDS = (7000, 7001, 7002)
 NEAR = 0.02
 """A detection counts for an item of its kind no further away than this in the plane [m]."""
 
-PLANNED: dict[str, Band] = {
-    "seconds_ours": (77.3, 78.4),
-    "seconds_stack": (83.7, 84.6),
-    "objects_per_trip_ours": (3.25, 3.37),
-    "failure_rate_ours": (0.0, 0.0),
-}
-"""Today 77.85 and 84.15 s, 3.311 objects a trip. Another action on one of six tables moves a mean by half a second."""
-SEEN: dict[str, Band] = {"items": (42, 42), "found": (42, 42), "in_vain": (0, 0), "mean_error_mm": (0.86, 0.97)}
-"""Today 42 of 42, none in vain, 0.916 mm."""
+PLANNED = {"seconds_ours": 78.4, "seconds_stack": 84.6, "failure_rate_ours": 0.0}
+"""At most. Another action on one of six tables moves a mean by half a second."""
+CARRIED = {"objects_per_trip_ours": 3.25}
+"""At least."""
 
 
 def planned(folder: Path) -> dict[str, float]:
@@ -66,8 +64,8 @@ def seen(folder: Path) -> dict[str, float]:
 
 
 def test_tables_are_cleared_in_few_seconds(tmp_path: Path) -> None:
-    assert not outside(planned(tmp_path), PLANNED)
+    assert not misses(planned(tmp_path), CARRIED, PLANNED)
 
 
 def test_items_are_seen(tmp_path: Path) -> None:
-    assert not outside(seen(tmp_path), SEEN)
+    assert not misses(seen(tmp_path), {"items": 42, "found": 42}, {"in_vain": 0, "mean_error_mm": 0.97})
