@@ -9,14 +9,19 @@ import socket
 import subprocess
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
 DRIVER = shutil.which("chromedriver")
-needs_browser = pytest.mark.skipif(DRIVER is None, reason="no browser here: install chromium and chromium-driver")
+
+
+def needs_browser(test: Callable[..., None]) -> Callable[..., None]:
+    """Mark a test that drives a browser: it is slow, and skipped where there is none."""
+    absent = pytest.mark.skipif(DRIVER is None, reason="no browser here: install chromium and chromium-driver")
+    return pytest.mark.slow(absent(test))
 
 
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")

@@ -23,6 +23,7 @@ KEPT = sorted(COMMANDS.glob("*.json"))
 PUT = Edit("graph", "graph.json", "put", (["nodes", 0, "confidence"], 0.25))
 
 
+@pytest.mark.slow
 def test_every_find_stands() -> None:
     """In one process with all of them, as a fork for each is what makes it fast."""
     done = subprocess.run(

@@ -19,6 +19,7 @@ LARGEST_GROWTH = 1024 * 1024
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.slow
 def test_corpus_and_mutations(name: str) -> None:
     target = load(name).target
     inputs = [path.read_bytes() for path in corpus_of(name)]

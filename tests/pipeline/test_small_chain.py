@@ -87,6 +87,7 @@ SAID = {
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_notebooks_run(path: Path, run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each on the small room, in a kernel, as a reader would; what they call is this checkout."""
     nbclient = pytest.importorskip("nbclient")
@@ -135,8 +136,7 @@ def test_make_gives_identical_digests_and_rebuilds_what_is_deleted(run_folder: P
     """make starts from a copy without the middle of the chain, builds that, and ends with the same digests."""
     folder = tmp_path / "outputs" / "demo"
     shutil.copytree(run_folder, folder)
-    for name in ("contact_graph", "cad_scene", "interactive_scene"):
-        shutil.rmtree(folder / name)
+    shutil.rmtree(folder / "contact_graph")
     command = ["make", "-f", "data/pipelines/demo.mk", f"PYTHON={sys.executable}", f"OUTPUTS={tmp_path}/outputs"]
     command += [f"{name.upper()}={value}" for name, value in SMALL.items()]
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
@@ -147,13 +147,8 @@ def test_make_gives_identical_digests_and_rebuilds_what_is_deleted(run_folder: P
         assert manifest(folder / name).key == manifest(run_folder / name).key, name
 
 
-# Unit tests repeat these three on small inputs; here they take a minute together.
-REPEATED_ELSEWHERE = ("cad_library", "ground_truth", "plan")
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in REPEATED_ELSEWHERE else n for n in STEPS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STEPS)
 def test_same_seed_same_bytes(run_folder: Path, tmp_path: Path, name: str) -> None:
     """Every step made once more, elsewhere and on one thread, gives the same content digest."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "7"}
@@ -166,6 +161,7 @@ def test_same_seed_same_bytes(run_folder: Path, tmp_path: Path, name: str) -> No
 
 
 @pytest.mark.parametrize("name", STEPS)
+@pytest.mark.slow
 def test_kill_leaves_the_previous_artifact(run_folder: Path, tmp_path: Path, name: str) -> None:
     """SIGKILL while a step works on an existing artifact: the old one stays, sound, and nothing half-made shows."""
     out = tmp_path / name
@@ -191,6 +187,7 @@ FAST = ("sequence", "geometric_segments", "geometric_map", "contact_graph")
 
 
 @pytest.mark.parametrize("number", range(12))
+@pytest.mark.slow
 def test_interrupted_steps_resume_to_the_same_digest(run_folder: Path, tmp_path: Path, number: int) -> None:
     """A dozen interruptions as in docs/RELIABILITY.md: SIGKILL, SIGINT, SIGTERM, early and as the artifact is whole."""
     rng = random.Random(number)

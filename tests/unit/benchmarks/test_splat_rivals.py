@@ -30,6 +30,9 @@ from tests.unit.splat.test_language import BALLS, CAMERA, gaussians, poses
 Shown = tuple[Gaussians, list[Sight]]
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def shown() -> Shown:
     made, sights = gaussians(), []

@@ -100,6 +100,7 @@ def test_slivers_are_refused_and_the_file_stays(tmp_path: Path) -> None:
     assert (tmp_path / "cuts.json").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_what_a_person_cut_is_demonstrated_and_learned_from(tmp_path: Path) -> None:
     path = tmp_path / "cuts.json"
     session = Session(path, "cucumber", 0)

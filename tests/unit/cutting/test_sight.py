@@ -139,6 +139,7 @@ def test_pictures_that_cannot_be_read_are_refused(
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_trial_through_cameras_is_a_goal_on_pictures(tmp_path: Path) -> None:
     shown, model, plan, trial, again = (str(tmp_path / name) for name in ("shown", "model", "plan", "trial", "again"))
     small = ["--image-width", "300", "--quiet"]

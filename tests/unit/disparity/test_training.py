@@ -128,6 +128,7 @@ class OnlyShapes(Sources):
         return [shapes_sample(self.bank, np.random.default_rng([plan.seed, step]))]
 
 
+@pytest.mark.slow
 def test_a_stopped_run_ends_with_the_bytes_of_one_that_was_not(tmp_path: Path, bank: list[np.ndarray]) -> None:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)

@@ -81,6 +81,7 @@ def test_every_class_has_shapes_that_differ(models):
     assert kinds == {"revolute", "prismatic"}
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes_other_seed_other_shapes(tmp_path):
     classes = ("chair", "fridge", "cup", "keyboard")
     first = build(tmp_path / "a", 5, classes=classes)

@@ -50,6 +50,7 @@ def test_how_many(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     "options", [{"backend": "geometric"}, {"backend": "network"}, {"backend": "ground-truth", "corruption": 0.4}]
 )
+@pytest.mark.slow
 def test_same_bytes(options: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sequence = write_sequence(tmp_path / "sequence", 9, labels=True, without={4: ("depth",)})
     here = segmented(sequence, tmp_path / "here", **options)

@@ -62,6 +62,7 @@ def killed_after(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("steps", [3, 24])
+@pytest.mark.slow
 def test_it_goes_on_to_the_same_bytes(
     steps: int, sequence: Sequence, undisturbed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -79,6 +80,7 @@ def test_it_goes_on_to_the_same_bytes(
     assert taken[0] == steps and not kept.exists()
 
 
+@pytest.mark.slow
 def test_a_torn_checkpoint_and_force_begin_anew(
     sequence: Sequence, undisturbed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -82,6 +82,7 @@ def shown() -> tuple[Gaussians, list[Sight]]:
     return made, sights
 
 
+@pytest.mark.slow
 def test_pieces_keep_what_is_of_one_colour_together(shown: tuple[Gaussians, list[Sight]]) -> None:
     found = pieces(shown[0])
     for row in found:
@@ -104,6 +105,7 @@ def test_the_pyramid_covers_the_picture_and_reads_between_its_squares(shown: tup
     np.testing.assert_allclose(level.at(rows, columns)[0], level.vectors[1, 2], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_field_learns_what_is_where(shown: tuple[Gaussians, list[Sight]]) -> None:
     made, sights = shown
     torch.manual_seed(0)

@@ -128,6 +128,7 @@ def test_pictures_bring_no_more_gaussians_than_there_may_be() -> None:
     assert len(trainer.gaussians) == 150
 
 
+@pytest.mark.slow
 def test_a_pose_that_is_off_is_mended() -> None:
     """Five views are right, one stands 3 cm and a degree off: it is brought back, and the first stays where it is."""
     seen = views(WALK[:6])

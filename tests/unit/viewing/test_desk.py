@@ -393,7 +393,6 @@ def test_what_others_write_while_a_form_is_open_is_shown_when_it_is_closed(tmp_p
         settled(window)
 
 
-@pytest.mark.slow  # Most of a minute where nothing draws for the processor.
 @needs_browser
 def test_clicks_become_lines_and_the_map_as_it_is_then(tmp_path: Path) -> None:
     seen, file = room_map(tmp_path / "map"), tmp_path / "edits.toml"

@@ -140,7 +140,6 @@ def test_the_map_behind_a_scene_is_put_right_from_its_page(room: dict[str, Path]
     assert link is not None and link.source == "floor_1"
 
 
-@pytest.mark.slow  # Half a minute where nothing draws for the processor.
 @needs_browser
 def test_a_scene_is_put_right_by_clicking(room: dict[str, Path], tmp_path: Path) -> None:
     file = tmp_path / "edits.toml"
