@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+from scenewright.cli.main import run
 from scenewright.stages.kit.configuration import parameters_for
 
 from tests.contract.probe_step import PROBE
@@ -49,12 +50,14 @@ def scenewright(*arguments: str | Path, **options) -> subprocess.CompletedProces
         (("models", "--check", "{tmp}/nowhere.onnx"), 3, "no such file"),
     ],
 )
-def test_errors_are_one_line_with_the_exit_code(tmp_path: Path, arguments: tuple, code: int, words: str) -> None:
-    done = scenewright(*(argument.replace("{tmp}", str(tmp_path)) for argument in arguments))
-    assert done.returncode == code, done.stderr
-    errors = [line for line in done.stderr.splitlines() if line.startswith("error:")]
-    assert len(errors) == 1 and words in errors[0], done.stderr
-    assert "Traceback" not in done.stderr and done.stdout == ""
+def test_errors_are_one_line_with_the_exit_code(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple, code: int, words: str
+) -> None:
+    assert run([argument.replace("{tmp}", str(tmp_path)) for argument in arguments]) == code
+    done = capsys.readouterr()
+    errors = [line for line in done.err.splitlines() if line.startswith("error:")]
+    assert len(errors) == 1 and words in errors[0], done.err
+    assert "Traceback" not in done.err and done.out == ""
     assert not [path for path in tmp_path.rglob("*") if not path.name.startswith(".")]
 
 

@@ -149,6 +149,7 @@ def test_the_report_reads_it_and_shows_its_section(tree: Path) -> None:
     assert '<section id="novelty">as &lt;new&gt; as can be</section>' in page and "A novelty." in page
 
 
+@pytest.mark.slow
 def test_import_contracts_and_golden_artifacts_cover_it(tree: Path) -> None:
     """The step is a floor of its own, and may not import another: with such an import the contract fails."""
     words = ("-m", "pytest", "-p", "no:cacheprovider", "-p", "no:xdist", "tests/contract/test_floors.py")

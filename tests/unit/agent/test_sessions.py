@@ -194,6 +194,7 @@ class Drops(FastWorld):
         return felt
 
 
+@pytest.mark.slow
 def test_what_left_the_hand_and_is_not_seen_again_is_not_done() -> None:
     wanted = setting("place_fruit", 305)
     world = Drops(wanted.apartment, ("apple", "banana", "lemon", "orange", "plate"), NOTHING_FAILS, wanted.seed, None)

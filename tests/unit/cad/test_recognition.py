@@ -70,6 +70,7 @@ def test_what_people_said_stands(room, library, tmp_path):
     assert named(scene)["bottle_3"] == ("bottle", None) and named(scene)["object_2"][0] == "table"
 
 
+@pytest.mark.slow
 def test_the_thesis_believes_masks(room, replace_objects):
     scene = replace_objects(room, {1: "floor", 2: "object", 3: "bottle", 4: "fridge"}, method="thesis")
     assert named(scene)["object_2"] == ("object", None)

@@ -43,6 +43,7 @@ def statuses(scene: CadScene) -> list[str]:
     return [record.status for record in scene.edits.edits]
 
 
+@pytest.mark.slow
 def test_another_model_stands_for_a_thing_or_none_does(room: dict[str, Path], tmp_path: Path) -> None:
     before = CadScene(room["cad"]).graph
     assert before.node("table_2").model_id == "table_long"
@@ -106,6 +107,7 @@ def test_a_thing_is_moved_with_what_it_carries(room: dict[str, Path], tmp_path: 
     assert link is not None and link.plane is not None and abs(link.gap or 0.0) < 0.01
 
 
+@pytest.mark.slow
 def test_a_built_in_is_moved_as_models_are(tmp_path: Path) -> None:
     room = scene_room(tmp_path / "room", built_ins=True)
     before = CadScene(room["cad"]).graph.node("cabinet_5")

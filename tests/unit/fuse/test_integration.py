@@ -120,6 +120,7 @@ def plain_integrate(
                     cell["segment"], cell["votes"] = label, 1
 
 
+@pytest.mark.slow
 def test_plain_numpy_gives_the_same_numbers() -> None:
     camera = Camera(width=40, height=30, fx=60.0, fy=60.0, cx=19.5, cy=14.5)
     target = np.array([0.0, 0.0, 0.5])

@@ -129,6 +129,7 @@ def test_the_log_reads_back(executed: Plan) -> None:
     assert topics == {"/tf", "/camera/color", "/camera/calibration"}
 
 
+@pytest.mark.slow
 def test_open_loop_replay_of_an_exact_scene_and_the_same_bytes_twice(tmp_path: Path) -> None:
     write_scene(tmp_path / "scene", kitchen())
     with pytest.raises(UsageError, match="needs a"):

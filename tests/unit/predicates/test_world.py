@@ -68,6 +68,7 @@ def test_actions_fail_by_their_rules() -> None:
 
 
 @pytest.mark.parametrize("domain", DOMAINS)
+@pytest.mark.slow
 def test_the_teachers_own_operators_reach_the_hardest_goals(domain: str) -> None:
     for task in tasks_of(domain, "combined", 2, 0):
         result = oracle(task, domain)

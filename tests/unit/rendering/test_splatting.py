@@ -61,6 +61,7 @@ def loss(picture: Picture, by: Picture) -> float:
 
 
 @pytest.mark.parametrize("name", ["means", "quaternions", "log_scales", "logit_opacities", "harmonics", "features"])
+@pytest.mark.slow
 def test_gradients_of_the_reference_are_finite_differences(name: str) -> None:
     gaussians, view, by = scene(14, 1, scale=0.35), view_of(SMALL), weights(SMALL, 2)
     analytic = getattr(ReferenceRasterizer().draw(gaussians, view).backward(by), name)

@@ -47,6 +47,7 @@ def test_masks_too_wide_or_too_thin_are_no_larger_or_smaller_needle(side: int) -
 
 
 @pytest.mark.parametrize("seed", [313, 327, 351])
+@pytest.mark.slow
 def test_the_deviation_holds_the_error(seed: int) -> None:
     """Tuning views whose radius was off by three to four of its deviations before growth and rivals were in them."""
     _, view = seen_scene(seed, calibration_error=0.15)

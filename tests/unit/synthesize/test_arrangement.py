@@ -33,7 +33,9 @@ def recipe_for_few_shapes(name: str) -> Recipe:
 
 
 @pytest.fixture(
-    scope="module", params=[("room", seed) for seed in SEEDS] + [(n, 0) for n in recipe_names() if n != "room"]
+    scope="module",
+    params=[(name, 0) for name in recipe_names()]
+    + [pytest.param(("room", seed), marks=pytest.mark.slow) for seed in SEEDS[1:]],
 )
 def arrangement(request: pytest.FixtureRequest, catalogue: Catalogue) -> Arrangement:
     name, seed = request.param

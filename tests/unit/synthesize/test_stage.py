@@ -175,6 +175,7 @@ def test_a_second_eye_sees_the_same_points_further_left(
         assert moved < 0.4 * np.abs(pair.right.astype(int) - pair.color)[seen].mean()
 
 
+@pytest.mark.slow
 def test_three_cameras_see_in_turn_ahead_and_to_both_sides(library: CadLibrary, tmp_path: Path) -> None:
     for name in ("several", "alone"):
         (tmp_path / name).mkdir()
@@ -201,6 +202,7 @@ def test_a_log_must_say_something_of_distance() -> None:
         check(SynthesizeParameters(depth=False), {})  # type: ignore[call-arg]
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes(library: CadLibrary, truth: GroundTruth, tmp_path: Path) -> None:
     again = make(library, tmp_path, depth_noise=False)
 

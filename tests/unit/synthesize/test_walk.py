@@ -30,7 +30,7 @@ def walk_through(catalogue: Catalogue, recipe: str, seed: int) -> Place:
     return arrangement, renderer, plan_walk(views, space, renderer, 0.5, np.random.default_rng([seed, 2]))
 
 
-@pytest.fixture(scope="module", params=[("room", 0), ("room", 2), ("office", 1)])
+@pytest.fixture(scope="module", params=[("room", 0), pytest.param(("room", 2), marks=pytest.mark.slow), ("office", 1)])
 def place(request: pytest.FixtureRequest, catalogue: Catalogue) -> Place:
     return walk_through(catalogue, *request.param)
 
