@@ -9,6 +9,7 @@ from tests.fuzz.harness import Harness
 MODULES = {
     "tests.fuzz.payloads": (
         "panoptic_zip",
+        "panoptic_png",
         "npz",
         "ply",
         "our_ply",
@@ -46,9 +47,11 @@ MODULES = {
         "layout_nerfstudio",
         "layout_replica",
         "layout_colmap",
+        "layout_colmap_text",
         "layout_images",
         "depth_array",
         "calibration_file",
+        "pose_list",
     ),
     "tests.fuzz.networks": ("service_reply", "service_info", "service_request", "label_table", "onnx_sidecar"),
     "tests.fuzz.language": ("model_reply", "model_answer", "transcript"),
