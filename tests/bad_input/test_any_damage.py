@@ -27,7 +27,18 @@ READ: dict[str, set[str]] = {
     "a zero byte": FOLDERS
     | {"stl", "message", "compressed_depth", "image_message", "depth_array", "calibration_file", "ros_definition"},
     "more behind its end": FOLDERS
-    | {"panoptic_zip", "panoptic_png", "npz", "obj", "stl", "rosbag2", "message", "compressed_depth", "image_message"}
+    | {
+        "panoptic_zip",
+        "panoptic_png",
+        "npz",
+        "obj",
+        "stl",
+        "rosbag2",
+        "message",
+        "compressed_depth",
+        "image_message",
+        "library_model",
+    }
     | {"depth_array", "service_request", "model_reply"},
     "nested": FOLDERS | {"obj", "image_message"},
     "nested objects": FOLDERS | {"obj", "image_message"},

@@ -25,6 +25,8 @@ from scenewright.stages.kit.formats.masks import (
 )
 from scenewright.stages.kit.formats.numpy_files import read_array, read_arrays
 
+from tests.bad_input.damages import flipped
+
 FILES = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -121,18 +123,14 @@ def test_archives_that_cannot_be(tmp_path: Path) -> None:
         read_arrays(path, "a")
 
 
-@pytest.mark.parametrize("place", range(30, 260, 3))
-def test_a_flipped_byte_never_raises_something_else(tmp_path: Path, place: int) -> None:
+def test_a_flipped_byte_is_refused_or_carries_nothing(tmp_path: Path) -> None:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, a=np.arange(40.0))
-    data = bytearray(buffer.getvalue())
-    data[place % len(data)] ^= 0x55
-    (tmp_path / "x.npz").write_bytes(data)
-    try:
-        (found,) = read_arrays(tmp_path / "x.npz", "a")
-    except BadInput:
-        return
-    assert np.array_equal(found, np.arange(40.0))  # a byte that carries nothing, such as the date
+    for place in range(30, len(buffer.getvalue()), 3):
+        (tmp_path / "x.npz").write_bytes(flipped(buffer.getvalue(), place, 0x55))
+        with contextlib.suppress(BadInput):
+            (found,) = read_arrays(tmp_path / "x.npz", "a")
+            assert np.array_equal(found, np.arange(40.0)), place
 
 
 # --- panoptic.zip -------------------------------------------------------------------------------------------------
@@ -237,14 +235,6 @@ def test_a_bomb_takes_no_memory(tmp_path: Path) -> None:
     with pytest.raises(BadInput):
         read_arrays(npz(tmp_path / "x.npz", npy(header("(40000, 1000000)"), bytes(10**6))), "a")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # kB; they claim 2.7 and 320 GB
-
-
-@FILES
-@given(st.binary(max_size=300))
-def test_garbage_is_no_picture(garbage: bytes) -> None:
-    for data in (garbage, encode_panoptic_png(IDS)[:33] + garbage):
-        with contextlib.suppress(BadInput):
-            assert decode_panoptic_png(data).dtype == np.int32
 
 
 def test_a_bare_array_is_read_and_refused_alike(tmp_path: Path) -> None:

@@ -650,10 +650,7 @@ BAG1_CHUNKS: dict[str, tuple[bytes, str]] = {
 BAG1_LIES = {
     **{
         f"chunk: {name}": Lie(
-            of("log.bag", _bag1(GOOD_BAG1_CHUNK, bad, bad, GOOD_BAG1_CHUNK)),
-            "",
-            [("/x", 0, b"good")] * 2,
-            words,
+            of("log.bag", _bag1(GOOD_BAG1_CHUNK, bad, bad, GOOD_BAG1_CHUNK)), "", [("/x", 0, b"good")] * 2, words
         )
         for name, (bad, words) in BAG1_CHUNKS.items()
     },

@@ -166,6 +166,8 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
         ("camera_intrinsic.json", "[" * 100_000, "camera_intrinsic.json"),
         ("camera_intrinsic.json", "{", "camera_intrinsic.json"),
         ("camera_intrinsic.json", "null", "camera_intrinsic.json"),
+        ("camera_intrinsic.json", Fields({"intrinsic_matrix": [0.0] * 9}), "camera_intrinsic.json"),
+        ("camera_intrinsic.json", Fields({"width": 640}), "camera_intrinsic.json"),
         ("camera_intrinsic.json", '{"intrinsic_matrix": [1], "width": 1, "height": 1}', "camera_intrinsic.json"),
         ("image/00001.jpg", None, "1 colour and 2 depth"),
     ],
@@ -278,6 +280,7 @@ UNPAIRED: dict[str, Change] = {
 }
 VIDEO = {"intrinsics.txt": "80 80 47.5 35.5"}
 SEVERAL_FILES: list[tuple[str, int, dict[str, Change], str]] = [
+    ("nothing", 0, {}, "is not a log in a format"),
     ("images", 3, UNPAIRED, "3 and 2 images have no names or numbers in common"),
     ("nothing", 0, {"video.mp4": b"", **VIDEO}, "no video that can be read|declares frames"),
     ("nothing", 0, {"video.mp4": b"\0\0\0\x20ftypisom" + bytes(200), **VIDEO}, "no video that can be read|declares"),
@@ -308,6 +311,13 @@ def test_refused(tmp_path: Path, layout: str, count: int, changes: dict[str, Cha
     with pytest.raises(BadInput, match=words) as caught:
         open_log(log, IngestParameters(**OPTIONS.get(layout, {})))
     assert "\n" not in str(caught.value)
+
+
+def test_a_path_that_is_no_log_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "words.txt").write_text("hello")
+    for name in ("missing", "words.txt"):
+        with pytest.raises(BadInput, match=name):
+            open_log(tmp_path / name, DEFAULTS)
 
 
 def test_loops_of_links_end(tmp_path: Path) -> None:

@@ -44,6 +44,9 @@ READERS = {
 }
 """Calls that code which reads users' files leaves to one guarded reader of ours."""
 
+LAST_WORDS = {name.split(".")[-1] for name in {*CALLS, *READERS}} | METHODS | {"load", "YAML", "extract"}
+"""Last words of every call that is looked at."""
+
 
 def dangers(tree: ast.AST, readers: dict[str, bool]) -> Iterator[tuple[int, str]]:
     """Yield (line, what) of what is forbidden; `readers`: guarded call -> whether this file may make it."""
@@ -55,9 +58,12 @@ def dangers(tree: ast.AST, readers: dict[str, bool]) -> Iterator[tuple[int, str]
                 yield node.lineno, f"import {name}"
         if not isinstance(node, ast.Call):
             continue
+        last = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        if last not in LAST_WORDS and not any(keyword.arg == "shell" for keyword in node.keywords):
+            continue
         name = ast.unparse(node.func)
         keywords = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
-        if name in CALLS or (isinstance(node.func, ast.Attribute) and node.func.attr in METHODS):
+        if name in CALLS or last in METHODS:
             yield node.lineno, name
         if keywords.get("shell", "False") != "False":
             yield node.lineno, f"{name}(shell=...)"

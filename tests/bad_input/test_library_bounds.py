@@ -69,7 +69,38 @@ INSTANCE = '<instance_geometry url="#g"/>'
 LADDER = "".join(f'<node id="n{k}">{f"<instance_node url={chr(34)}#n{k + 1}{chr(34)}/>" * 2}</node>' for k in range(14))
 BUFFERED = {"buffers": [{"uri": "data:;base64,AAAA", "byteLength": 3}], "accessors": [], "meshes": []}
 
+
+def meshed(name: str) -> str:
+    return urdf(f'<geometry><mesh filename="{name}"/></geometry>')
+
+
+ENTITIES = '<!DOCTYPE a [<!ENTITY x "y"><!ENTITY z "&x;&x;&x;">]><robot name="a"><link name="&z;"/></robot>'
+TWO_PARENTS = (
+    '<robot><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="fixed"><parent link="b"/>'
+    '<child link="c"/></joint><joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint></robot>'
+)
 REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
+    "entities": ({"chair.urdf": ENTITIES}, "document type or entities"),
+    "torn": ({"chair.urdf": "<robot"}, "well-formed"),
+    "a mesh of the system": ({"chair.urdf": meshed("/etc/passwd")}, "is not in the folder"),
+    "a mesh above": ({"chair.urdf": meshed("../secret.obj"), "../secret.obj": CUBE}, "is not in the folder"),
+    "a size that is no number": ({"chair.urdf": urdf(BOX.replace("1 1 1", "1 nan 1"))}, "is not finite"),
+    "two roots": ({"chair.urdf": '<robot><link name="a"/><link name="b"/></robot>'}, "2 root links"),
+    "links in a circle": ({"chair.urdf": TWO_PARENTS}, "circle"),
+    "a file that includes itself": (
+        {"chair.xml": '<mujoco><include file="chair.xml"/><worldbody/></mujoco>'},
+        "in a circle",
+    ),
+    "a box of no width": ({"chair.xml": mjcf('<geom type="box" size="0 1 1"/>')}, "without size"),
+    "no links": ({"chair.sdf": '<sdf><model name="chair"/></sdf>'}, "no links"),
+    "a negative unit": ({"chair.dae": "<COLLADA><asset><unit meter='-1'/></asset></COLLADA>"}, "unit of -1"),
+    "a corner that is not there": ({"chair.obj": "v 0 0 0\nv 1 0 0\nf 1 2 9\n"}, "element 9 of 2"),
+    "words": ({"chair.stl": "no mesh at all"}, "no STL"),
+    "a buffer above": (
+        {"chair.gltf": '{"buffers": [{"uri": "../secret.bin", "byteLength": 4}]}', "../secret.bin": b"abcd"},
+        "is not in the folder",
+    ),
+    "no model": ({"readme.txt": "nothing"}, "no model files"),
     "euler sequence": (
         {"chair.xml": mjcf('<geom type="box" size="1 1 1" euler="1 2 3"/>', '<compiler eulerseq="XXX"/>')},
         "chair.*eulerseq 'XXX'",

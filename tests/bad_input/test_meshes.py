@@ -130,19 +130,6 @@ def test_meshes_that_cannot_be(tmp_path: Path, name: str) -> None:
             load_entity_mesh(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", sorted(GOOD))
-def test_cut_anywhere(tmp_path: Path, name: str) -> None:
-    """A cut file is read as far as it is text and whole, or refused: never a raw exception."""
-    path = tmp_path / name
-    for length in range(0, len(GOOD[name]), max(1, len(GOOD[name]) // 60)):
-        path.write_bytes(GOOD[name][:length])
-        try:
-            mesh = read_mesh(path, may_be_empty=True)
-        except BadInput:
-            continue
-        assert np.isfinite(mesh.vertices).all()
-
-
 def test_missing_and_not_a_file(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="missing"):
         read_mesh(tmp_path / "none.ply")

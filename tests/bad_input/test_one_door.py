@@ -39,6 +39,7 @@ NAMES = {
 }
 METHODS = {"open", "read_text", "read_bytes", "model_validate_json", "parse_raw"}
 """Of paths, archives and models, whatever they are called."""
+LAST_WORDS = {name.split(".")[-1] for name in NAMES} | METHODS
 
 OURS = "a file of this repository, or of an installed package"
 WRITES = "flushes, locks or appends to what this process writes"
@@ -67,6 +68,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/disparity/training/raft_stereo/kept_pairs.py": {"cv2.imread": TAUGHT},
     "stages/engine/code/digests.py": {"json.loads": CACHE, "read_text": CACHE},
     "stages/engine/code/program.py": {"read_text": OURS},
+    "stages/kit/compiled.py": {"read_bytes": OURS},
     "stages/kit/exports.py": {"read_text": OURS},
     "stages/kit/formats/mosd_frames.py": {"cv2.imread": PICTURE},
     "stages/kit/training/run.py": {"json.loads": MADE, "read_text": MADE},
@@ -155,8 +157,10 @@ def reads(tree: ast.AST) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
             continue
-        name = ast.unparse(node.func)
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ""
+        if (method or getattr(node.func, "id", "")) not in LAST_WORDS:
+            continue
+        name = ast.unparse(node.func)
         if name not in NAMES and method not in METHODS:
             continue
         modes = [

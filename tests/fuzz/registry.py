@@ -53,6 +53,7 @@ MODULES = {
         "calibration_file",
         "pose_list",
     ),
+    "tests.fuzz.models": ("library_model",),
     "tests.fuzz.networks": ("service_reply", "service_info", "service_request", "label_table", "onnx_sidecar"),
     "tests.fuzz.language": ("model_reply", "model_answer", "transcript"),
 }
@@ -60,6 +61,7 @@ NAMES = tuple(name for names in MODULES.values() for name in names)
 INSTRUMENTED = [
     "scenewright.stages.ingest",
     "scenewright.stages.kit.labels",
+    "scenewright.stages.library",
     "scenewright.stages.segment.backends.onnx",
     "scenewright.stages.segment.backends.service",
     "scenewright.stages.kit.formats",
