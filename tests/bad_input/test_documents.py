@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,10 +14,12 @@ from hypothesis import strategies as st
 from scenewright.schemas.cad_library import LibraryFile
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.outside import file_toml
 from scenewright.schemas.panoptic_map import EntitiesFile
 from scenewright.stages.engine.pipelines import read_pipeline
 from scenewright.stages.kit.configuration import read_config
 from scenewright.stages.kit.formats.cad_models import read_model
+from scenewright.stages.library.importing.mapping import read_mapping
 
 from tests.fuzz.payloads import DOCUMENTS, GOLDEN, golden_documents
 
@@ -127,32 +131,58 @@ def test_models_that_do_not_hold_together(tmp_path: Path) -> None:
 
 # --- TOML ---------------------------------------------------------------------------------------------------------
 
-BAD_TOML = [
-    b"",
-    b"= 1",
-    b"a = ",
-    b"[step",
-    b"\xff\xfe",
-    b"a = 1\na = 2",
-    b"a = " + b"[" * 5000,
-    b"x" * 10**6,
-    b"\x00",
-    b'name = "x"',
-    b"step = 3",
-    b"[[step]]\nname = 1",
-    b"a = 99999-99-99",
-    b"[variables]\na = 1",
-    b'name = "p"\nsummary = "s"\n[[step]]\nname = "a"\nstage = "ingest"\ninputs = { log = "../../etc" }',
-]
+READERS: dict[str, Callable[[Path], object]] = {
+    "toml": file_toml,
+    "config": read_config,
+    "pipeline": read_pipeline,
+    "mapping": read_mapping,
+}
+ANY = {"toml", "config"}
+"""Readers that take whatever is TOML."""
+NESTED, DIGITS, UTF8 = "nested", "integer|digits", "UTF-8|utf-8"
+PIPELINE = 'name = "p"\nsummary = "s"\n[[step]]\nname = "a"\nstage = "ingest"\ninputs = { log = "../../etc" }'
+PATTERNS = "[models]\n" + "".join(f'"*x{k}*" = "chair"\n' for k in range(1001))
+TOML: dict[str, tuple[str | bytes, str, set[str]]] = {
+    "deep": ("x = " + "[" * 10_000, NESTED, set()),
+    "deep and closed": ("x = " + "[" * 1000 + "]" * 1000, NESTED, set()),
+    "an integer of 6000 digits": ("x = " + "9" * 6000, DIGITS, set()),
+    "an integer of 30 digits": ("x = " + "9" * 30, DIGITS, set()),
+    "a key of a million parts": ("a." * 1_000_000 + "b = 1", "", set()),
+    "a table of a thousand parts": ("[" + "a." * 1000 + "b]", "", set()),
+    "a key within a table": ("x = {" + "a . " * 1000 + "b = 1}", "", set()),
+    "a million letters": ("x" * 10**6, "", set()),
+    "no UTF-8": (b'x = "caf\xe9"', UTF8, set()),
+    "a byte order": (b"\xff\xfe", UTF8, set()),
+    "a zero byte": (b"\x00", "", set()),
+    "no key": ("= 3", "", set()),
+    "no value": ("a = ", "", set()),
+    "no end": ("[step", "", set()),
+    "a key twice": ("a = 1\na = 2", "", set()),
+    "no date": ("a = 99999-99-99", "", set()),
+    "nothing": ("", "", ANY | {"mapping"}),
+    "a name": ('name = "x"', "", ANY),
+    "a number of steps": ("step = 3", "", ANY),
+    "a step that is none": ("[[step]]\nname = 1", "", ANY),
+    "a variable that is none": ("[variables]\na = 1", "", ANY),
+    "an input that is none": (PIPELINE, "", ANY),
+    "too many patterns": (PATTERNS, "Field required|more than 1000 patterns", ANY),
+}
+"""Content -> (bytes, words of each refusal beside the file's name, the readers that take it)."""
 
 
-@pytest.mark.parametrize("number", range(len(BAD_TOML)))
-def test_settings_that_cannot_be_read(tmp_path: Path, number: int) -> None:
+@pytest.mark.parametrize("case", TOML)
+def test_toml_is_refused_by_every_reader_but_those_listed(tmp_path: Path, case: str) -> None:
+    content, words, takers = TOML[case]
     path = tmp_path / "a.toml"
-    path.write_bytes(BAD_TOML[number])
-    with pytest.raises(UsageError, match=r"a\.toml"):
-        read_pipeline(path)
-    try:
-        assert isinstance(read_config(path), dict)
-    except UsageError as error:
-        assert "a.toml" in str(error)
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    taken = set()
+    for name, read in READERS.items():
+        started = time.process_time()
+        try:
+            read(path)
+            taken.add(name)
+        except (BadInput, UsageError) as error:
+            assert "a.toml" in str(error) and re.search(words, str(error)) and "\n" not in str(error)
+            assert isinstance(error, BadInput) == (name in ("toml", "mapping"))
+        assert time.process_time() - started < 1
+    assert taken == takers
