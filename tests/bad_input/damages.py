@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -40,10 +40,15 @@ def spread(items: Sequence[Item], most: int) -> list[Item]:
     return list(items[::step])
 
 
-def small_damages(data: bytes, most: int = 60) -> Iterator[bytes]:
-    """Yield the bytes cut, with a bit flipped, and with a number replaced, at places all over them."""
-    for place in spread(range(len(data)), most):
-        yield data[:place]
-        yield flipped(data, place, 1 << place % 8)
-    for number, found in enumerate(spread(list(NUMBER.finditer(data)), most)):
-        yield data[: found.start()] + EXTREMES[number % len(EXTREMES)] + data[found.end() :]
+def cuts(data: bytes, most: int = 60) -> list[bytes]:
+    """Return beginnings of the bytes, none of them whole."""
+    return [data[:place] for place in spread(range(len(data)), most)]
+
+
+def changes(data: bytes, most: int = 60) -> list[bytes]:
+    """Return the bytes with a bit flipped, and with a number replaced, at places all over them."""
+    flips = [flipped(data, place, 1 << place % 8) for place in spread(range(len(data)), most)]
+    numbers = enumerate(spread(list(NUMBER.finditer(data)), most))
+    return flips + [
+        data[: found.start()] + EXTREMES[number % len(EXTREMES)] + data[found.end() :] for number, found in numbers
+    ]

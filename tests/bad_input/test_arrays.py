@@ -187,6 +187,8 @@ def test_panoptic_zips_that_cannot_be(tmp_path: Path) -> None:
         "words": (_with(b"no picture"), "not a COCO"),
         "nothing": (_with(b""), "not a COCO"),
     }
+    with pytest.raises(BadInput, match="missing"):
+        PanopticReader(tmp_path / "none.zip")
     for case, (data, complaint) in cases.items():
         path.write_bytes(data)
         with pytest.raises(BadInput, match=complaint), PanopticReader(path) as reader:
