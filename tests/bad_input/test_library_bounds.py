@@ -33,7 +33,7 @@ from scenewright.stages.library.importing.source_folder import SourceFolder
 from scenewright.stages.library.importing.source_model import SourceModel, Surface, painted_faces
 from scenewright.stages.library.surfaces import Sections, surface_planes
 
-from tests.bad_input.test_meshes import glb
+from tests.bad_input.payload_bytes import glb
 from tests.unit.library.test_addition import add, obj_box, write
 
 CUBE = str(trimesh.creation.box((0.4, 0.4, 0.8)).export(file_type="obj"))
