@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import functools
 import os
 import random
 import re
@@ -96,7 +97,32 @@ def _at_most(peak: float) -> Iterator[None]:
         tracemalloc.stop()
 
 
-# --- MCAP: cuts ------------------------------------------------------------------------------------------------
+# --- cuts --------------------------------------------------------------------------------------------------------
+
+
+def _mcap_ends(path: Path) -> list[int]:
+    """Return for every message the end of the chunk that holds it, or of itself."""
+    records = mcap_records(path.read_bytes())
+    chunks = [end for opcode, _, end in records if opcode == Opcode.CHUNK]
+    loose = [end for opcode, _, end in records if opcode == Opcode.MESSAGE]
+    with McapLog(path) as log:
+        places = [message.location for message in log.messages()]
+    return [chunks[place.chunk] if place.chunk >= 0 else loose[k] for k, place in enumerate(places)]
+
+
+def _bag1_ends(path: Path) -> list[int]:
+    """Return for every message the end of its chunk; chunks hold messages in the order of the list."""
+    data = path.read_bytes()
+    ends: list[int] = []
+    chunk = 0
+    for op, start, end in bag1_records(data):
+        if op == 5:
+            chunk = end
+        elif op == 4:
+            (length,) = struct.unpack_from("<I", data, start)
+            ends += [chunk] * (struct.unpack_from("<I", data, start + 4 + length)[0] // 12)
+    return ends
+
 
 WRITERS: dict[str, dict[str, Any]] = {
     "zstd": {},
@@ -105,39 +131,41 @@ WRITERS: dict[str, dict[str, Any]] = {
     "no chunks": {"use_chunking": False},
     "checksum of all data": {"enable_data_crcs": True, "enable_crcs": False},
 }
+MCAP = {
+    f"{name}.mcap": functools.partial(write_mcap, messages=MESSAGES, **options) for name, options in WRITERS.items()
+}
+BAG1 = {f"{k}.bag": functools.partial(write_bag1, messages=MESSAGES, packing=k) for k in ("none", "bz2", "lz4")}
 
 
-def _ends(path: Path, records: list[tuple[int, int, int]]) -> list[int]:
-    """Return for every message the end of the chunk that holds it, or of itself."""
-    chunks = [end for opcode, _, end in records if opcode == Opcode.CHUNK]
-    loose = [end for opcode, _, end in records if opcode == Opcode.MESSAGE]
-    with McapLog(path) as log:
-        places = [message.location for message in log.messages()]
-    return [chunks[place.chunk] if place.chunk >= 0 else loose[k] for k, place in enumerate(places)]
-
-
-@pytest.mark.parametrize("name", WRITERS)
-def test_mcap_cut_at_every_record_boundary(tmp_path: Path, name: str) -> None:
-    path = write_mcap(tmp_path / "log.mcap", MESSAGES, **WRITERS[name])
+@pytest.mark.parametrize("name", [*MCAP, *BAG1])
+def test_what_is_cut_gives_the_messages_of_its_whole_chunks(tmp_path: Path, name: str) -> None:
+    path = (MCAP | BAG1)[name](tmp_path / name)
     whole = path.read_bytes()
-    records = mcap_records(whole)
-    ends = _ends(path, records)
-    data_end = next(start for opcode, start, _ in records if opcode == Opcode.DATA_END)
+    records = (mcap_records if name in MCAP else bag1_records)(whole)
+    ends = (_mcap_ends if name in MCAP else _bag1_ends)(path)
+    assert len(ends) == len(MESSAGES)
     cuts = {place + step for _, start, end in records for place in (start, end) for step in (-1, 0, 1)}
-    for cut in sorted({*cuts, len(whole) - 1, len(whole) - 4}):
-        _write(path, whole[:cut])
-        _refused(path)
-        if cut < len(MAGIC):
-            assert "wrong first bytes" in _refused(path)
+    for cut in sorted({cut for cut in {*cuts, len(whole) - 4} if cut < len(whole)}):
+        words = _refused(_write(path, whole[:cut]))
+        if cut < records[0][1]:
+            assert name in BAG1 or "wrong first bytes" in words
             continue
         messages, damage = _salvaged(path)
         assert messages == [message for message, end in zip(MESSAGES, ends, strict=True) if end <= cut], cut
         assert len(damage) == 1, damage
-        if cut >= data_end + 13:
-            assert "no message is lost" in damage[0]
-        elif cut not in {start for _, start, _ in records}:
-            start = max(start for _, start, _ in records if start < cut)
-            assert f"byte {start}" in damage[0] and f"last {cut - start} bytes" in damage[0]
+        if name in MCAP:
+            _says_where(damage[0], records, cut)
+
+
+def _says_where(damage: str, records: list[tuple[int, int, int]], cut: int) -> None:
+    """Check that what is said of a cut MCAP names the place, and what is lost."""
+    starts = [start for _, start, _ in records]
+    data_end = next(start for opcode, start, _ in records if opcode == Opcode.DATA_END)
+    if cut >= data_end + 13:
+        assert "no message is lost" in damage
+    elif cut not in starts:
+        start = max(start for start in starts if start < cut)
+        assert f"byte {start}" in damage and f"last {cut - start} bytes" in damage
 
 
 def test_mcap_that_was_not_closed(tmp_path: Path) -> None:
@@ -146,7 +174,7 @@ def test_mcap_that_was_not_closed(tmp_path: Path) -> None:
     whole = path.read_bytes()
     records = mcap_records(whole)
     cut = [start for opcode, start, _ in records if opcode == Opcode.CHUNK][-1]
-    kept = [m for m, end in zip(MESSAGES, _ends(path, records), strict=True) if end <= cut]
+    kept = [m for m, end in zip(MESSAGES, _mcap_ends(path), strict=True) if end <= cut]
     for tail, complaint in ((b"", "was not closed"), (bytes(10_000), "last 10000 bytes are lost")):
         messages, damage = _salvaged(_write(path, whole[:cut] + tail))
         assert messages == kept and complaint in damage[0]
@@ -197,7 +225,7 @@ def test_mcap_damage_costs_no_more_than_its_chunk(tmp_path: Path) -> None:
     path = write_mcap(tmp_path / "log.mcap", MESSAGES)
     whole = path.read_bytes()
     records = mcap_records(whole)
-    chunk_of = _ends(path, records)
+    chunk_of = _mcap_ends(path)
     for opcode, start, end in records:
         for place in (start, start + 1, start + 2, start + 7, start + 9):
             if place >= end - 1:
@@ -218,7 +246,7 @@ def test_mcap_says_how_many_messages_a_lost_chunk_had(tmp_path: Path) -> None:
     whole = path.read_bytes()
     records = mcap_records(whole)
     start, end = [(start, end) for opcode, start, end in records if opcode == Opcode.CHUNK][1]
-    lost = _ends(path, records).count(end)
+    lost = _mcap_ends(path).count(end)
     _write(path, flipped(whole, start + 9 + 28))  # the length of the compression's name
     messages, damage = _salvaged(path)
     assert len(messages) == len(MESSAGES) - lost
@@ -231,7 +259,7 @@ def test_mcap_chunk_with_a_wrong_checksum_is_skipped(tmp_path: Path) -> None:
     whole = path.read_bytes()
     chunks = [(start, end) for opcode, start, end in mcap_records(whole) if opcode == Opcode.CHUNK]
     start, end = chunks[2]
-    lost = [m for m, chunk in zip(MESSAGES, _ends(path, mcap_records(whole)), strict=True) if chunk == end]
+    lost = [m for m, chunk in zip(MESSAGES, _mcap_ends(path), strict=True) if chunk == end]
     messages, damage = _salvaged(_write(path, flipped(whole, end - 5)))
     assert messages == [m for m in MESSAGES if m not in lost]
     assert damage == [f"chunk at byte {start} ({len(lost)} messages by its index) has a wrong checksum: it is lost"]
@@ -316,37 +344,6 @@ def test_paths_that_are_no_files(tmp_path: Path, suffix: str) -> None:
 # --- ROS 1 bags ------------------------------------------------------------------------------------------------
 
 
-def _bag1_ends(data: bytes) -> list[int]:
-    """Return for every message the end of its chunk; chunks hold messages in the order of the list."""
-    ends: list[int] = []
-    chunk = 0
-    for op, start, end in bag1_records(data):
-        if op == 5:
-            chunk = end
-        elif op == 4:
-            (length,) = struct.unpack_from("<I", data, start)
-            ends += [chunk] * (struct.unpack_from("<I", data, start + 4 + length)[0] // 12)
-    return ends
-
-
-@pytest.mark.parametrize("packing", ["none", "bz2", "lz4"])
-def test_bag1_cut_at_every_record_boundary(tmp_path: Path, packing: str) -> None:
-    path = write_bag1(tmp_path / "log.bag", MESSAGES, packing=packing)
-    whole = path.read_bytes()
-    ends, records = _bag1_ends(whole), bag1_records(whole)
-    assert len(ends) == len(MESSAGES)
-    for cut in sorted({place + step for _, start, end in records for place in (start, end) for step in (-1, 0, 1)}):
-        if cut >= len(whole):
-            continue
-        _write(path, whole[:cut])
-        _refused(path)
-        if cut < 13:
-            continue
-        messages, damage = _salvaged(path)
-        assert messages == [message for message, end in zip(MESSAGES, ends, strict=True) if end <= cut], cut
-        assert len(damage) == 1, damage
-
-
 def test_bag1_that_was_not_closed(tmp_path: Path) -> None:
     """As a power failure leaves it: the header has no place of an index, and there is none."""
     path = write_bag1(tmp_path / "log.bag", MESSAGES)
@@ -364,7 +361,7 @@ def test_bag1_that_was_not_closed(tmp_path: Path) -> None:
 def test_bag1_with_a_changed_byte_in_every_record(tmp_path: Path) -> None:
     path = write_bag1(tmp_path / "log.bag", MESSAGES, packing="bz2")
     whole = path.read_bytes()
-    ends = _bag1_ends(whole)
+    ends = _bag1_ends(path)
     for op, start, end in bag1_records(whole):
         for place in {start, start + 1, start + 3, start + 5, start + 9, (start + end) // 2, end - 1}:
             messages, damage = _salvaged(_write(path, flipped(whole, place)))
