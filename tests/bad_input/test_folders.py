@@ -265,13 +265,13 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
 """Layout -> (the file, what is done to it, the words of the refusal)."""
 
 ELSEWHERE = ["../secret.png", "/etc/hostname", "rgb/../../secret.png", "link/secret.png", "a" * 5000]
-NAMES: dict[str, Callable[[str], tuple[str, Change]]] = {
-    "tum": lambda name: ("rgb.txt", lambda text: "\n".join([*text.splitlines()[:2], f"1305031103.5 {name}"])),
-    "nerfstudio": lambda name: ("transforms.json", in_frames(file_path=[name])),
-    "nerfstudio ": lambda name: ("transforms.json", in_frames(depth_file_path=[name])),
-    "colmap_text": lambda name: ("sparse/0/images.txt", f"1 1 0 0 0 0 0 0 1 {name}\n\n"),
-}
-"""Layout -> how an image gets another name."""
+NAMES: list[tuple[str, str, Callable[[str], Change]]] = [
+    ("tum", "rgb.txt", lambda name: lambda text: "\n".join([*text.splitlines()[:2], f"1305031103.5 {name}"])),
+    ("nerfstudio", "transforms.json", lambda name: in_frames(file_path=[name])),
+    ("nerfstudio", "transforms.json", lambda name: in_frames(depth_file_path=[name])),
+    ("colmap_text", "sparse/0/images.txt", lambda name: f"1 1 0 0 0 0 0 0 1 {name}\n\n"),
+]
+"""(layout, file, how an image in it gets another name)."""
 
 UNPAIRED: dict[str, Change] = {
     "depth/depth_1.png": None,
@@ -289,8 +289,8 @@ SEVERAL_FILES: list[tuple[str, int, dict[str, Change], str]] = [
 REFUSED = [
     *[(layout, 2, {file: change}, words) for layout, rows in ONE_FILE.items() for file, change, words in rows],
     *[
-        (layout.strip(), 2, dict([rename(name)]), "leads out of the folder|is no file name")
-        for layout, rename in NAMES.items()
+        (layout, 2, {file: renamed(name)}, "leads out of the folder|is no file name")
+        for layout, file, renamed in NAMES
         for name in ELSEWHERE
     ],
     *SEVERAL_FILES,
