@@ -7,11 +7,15 @@ import struct
 import time
 import tracemalloc
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from scenewright.stages.ingest.messages.container import Channel
 from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
+from scenewright.stages.ingest.messages.json_messages import LARGEST_MESSAGE
 from scenewright.stages.ingest.messages.pixels import color_pixels, depth_pixels, label_pixels
 from scenewright.stages.ingest.messages.records import ImageRecord, Record, Undecodable
 from scenewright.stages.ingest.source import Unusable
@@ -47,6 +51,88 @@ def test_reasons_hold_no_values_so_that_messages_can_be_counted_by_them() -> Non
             except Undecodable as error:
                 reasons.add(str(error))
         assert len(reasons) < 30, (where.type_name, reasons)
+
+
+# --- messages that cannot be -------------------------------------------------------------------------------------
+
+
+def _raw_json(**changes: Any) -> bytes:
+    return _as_json("RawImage", {"sec": 1, "nsec": 2}, **changes)
+
+
+def _in_json(name: str) -> Channel:
+    return Channel(1, "/t", f"foxglove.{name}", "json", "jsonschema", b"{}")
+
+
+def _in_protobuf(name: str) -> Channel:
+    return Channel(1, "/t", f"foxglove.{name}", "protobuf", "protobuf", b"")
+
+
+BROKEN_JSON: list[tuple[bytes, str]] = [
+    (b"", "no JSON"),
+    (b"{", "no JSON"),
+    (b"[]", "no object"),
+    (b"\xff\xfe", "no JSON"),
+    (b"[" * 100_000, "no JSON"),
+    (b'{"a":' * 100_000, "no JSON"),
+    (b'{"width": NaN}', "NaN is no number"),
+    (b'{"width": -Infinity}', "-Infinity is no number"),
+    (b'{"width": ' + b"9" * 5000 + b"}", "no JSON"),
+    (_raw_json(data="no base64!"), "no base64"),
+    (_raw_json(data="AAA"), "no base64"),
+    (_raw_json(data="Grüße"), "no base64"),
+    (_raw_json(data=[1, 2, 3]), "no array of bytes"),
+    (_raw_json(width=-1), "'width' is no size"),
+    (_raw_json(width=1e300), "'width' is no size"),
+    (_raw_json(width=True), "'width' is no size"),
+    (_raw_json(height=2**32), "'height' is no size"),
+    (_raw_json(encoding=None), "'encoding' is no text"),
+    (_raw_json(frame_id="x" * 5000), "more than 4096 characters"),
+    (_raw_json(timestamp=5), "the stamp is no pair"),
+    (_raw_json(timestamp={"sec": 1.5, "nsec": 0}), "no whole number 'sec'"),
+    (_raw_json(timestamp={"sec": 1}), "no whole number 'nsec'"),
+    (b'{"timestamp": {"sec": 1, "nsec": 2}}', "no field 'frame_id'"),
+    (bytes(LARGEST_MESSAGE + 1), "more than"),
+]
+BROKEN_CALIBRATIONS: list[tuple[dict[str, Any], str]] = [
+    ({"K": [1.0] * 8}, "'k' has not as many"),
+    ({"K": ["1"] * 9}, "'k' is no number"),
+    ({"K": [1e999] * 9}, "not finite|no number"),
+    ({"D": [0.0] * 300}, "'d' has not as many"),
+    ({"D": 0.5}, "'d' is no list"),
+    ({"P": [1.0] * 9}, "'p' has not as many"),
+    ({"D": [10**400]}, "not finite"),
+]
+UNDECODABLE: list[tuple[Channel, bytes, str]] = [
+    *[(_in_json("RawImage"), data, reason) for data, reason in BROKEN_JSON],
+    *[
+        (_in_json("CameraCalibration"), _as_json("CameraCalibration", {"sec": 1, "nsec": 2}, **changes), reason)
+        for changes, reason in BROKEN_CALIBRATIONS
+    ],
+    *[(_in_protobuf(name), b"\xff" * 20, f"no foxglove.{name} in protobuf") for name in CASES],
+    (
+        _in_protobuf("FrameTransform"),
+        FrameTransform(parent_frame_id="a", child_frame_id="b").SerializeToString(),
+        "no rigid transform",
+    ),
+    *[
+        (
+            _in_protobuf("PointCloud"),
+            PointCloud(timestamp={"seconds": seconds, "nanos": nanos}).SerializeToString(),
+            "the stamp is negative",
+        )
+        for seconds, nanos in ((-1, 0), (1, -1), (1, 10**9), (2**62, 0))
+    ],
+]
+"""(channel, message, words of the refusal)."""
+
+
+@pytest.mark.parametrize(("where", "data", "words"), UNDECODABLE, ids=[f"{c.type_name} {w}" for c, _, w in UNDECODABLE])
+def test_undecodable(where: Channel, data: bytes, words: str) -> None:
+    decoder = decoder_for(where)
+    assert decoder is not None and why_unreadable(where) == ""
+    with pytest.raises(Undecodable, match=words):
+        decoder(data)
 
 
 def test_every_truncation_of_a_ros_message_is_noticed() -> None:
