@@ -184,7 +184,7 @@ def test_mcap_that_was_not_closed(tmp_path: Path) -> None:
 # --- MCAP: changed bytes ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("name", ["zstd", "lz4, no summary", "no chunks"])
 def test_mcap_with_a_changed_byte_in_every_record(tmp_path: Path, name: str) -> None:
     """Refused or harmless; salvaged without what was changed; never anything that was not written."""
     path = write_mcap(tmp_path / "log.mcap", MESSAGES, **WRITERS[name])
