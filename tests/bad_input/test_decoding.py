@@ -9,93 +9,21 @@ import tracemalloc
 from collections.abc import Callable
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from scenewright.stages.ingest.messages.container import Channel
 from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
-from scenewright.stages.ingest.messages.pixels import (
-    color_pixels,
-    depth_pixels,
-    depth_unit,
-    label_pixels,
-    role_of,
-    why_other,
-)
-from scenewright.stages.ingest.messages.records import (
-    CalibrationRecord,
-    ImageRecord,
-    ImuRecord,
-    PointsRecord,
-    PoseRecord,
-    Record,
-    TransformRecord,
-    Undecodable,
-)
+from scenewright.stages.ingest.messages.json_messages import LARGEST_MESSAGE
+from scenewright.stages.ingest.messages.pixels import color_pixels, depth_pixels, label_pixels
+from scenewright.stages.ingest.messages.records import ImageRecord, Record, Undecodable
 from scenewright.stages.ingest.source import Unusable
-from scenewright.stages.kit.geometry.transforms import is_rigid
 
-from tests.unit.ingest.ros_writing import ROS1, ROS2, channel, header, serialized, xyz
-from tests.unit.ingest.rvl_writing import compressed_depth
-from tests.unit.ingest.test_decoding_definitions import IDL
+from tests.unit.ingest.sample_messages import check_record, foxglove_messages, ros_messages
 from tests.unit.ingest.test_decoding_foxglove import CASES, LINE, _as_json
 
-STAMP = 1_700_000_000_000_000_001
-POSE = {"position": xyz((1, 2, 3)), "orientation": xyz((0, 0, 0.6, 0.8))}
-TRANSFORM = {"translation": xyz((1, 2, 3)), "rotation": xyz((0, 0, 0.6, 0.8))}
-
-
-def _ros_messages() -> list[tuple[Channel, bytes]]:
-    found = []
-    for store in (ROS1, ROS2):
-        head = header(store, STAMP, "camera")
-        edge = {"header": head, "child_frame_id": "c", "transform": TRANSFORM}
-        image = {"height": 2, "width": 3, "encoding": "mono8", "step": 3, "data": np.arange(6, dtype=np.uint8)}
-        messages: dict[str, dict[str, Any]] = {
-            "sensor_msgs/Image": image,
-            "sensor_msgs/CompressedImage": {"format": "png", "data": np.arange(9, dtype=np.uint8)},
-            "sensor_msgs/CameraInfo": {"height": 2, "width": 3, "d": [0.1] * 5, "k": [1.0] * 9},
-            "sensor_msgs/Imu": {"linear_acceleration": xyz((0, 0, 9.8))},
-            "sensor_msgs/PointCloud2": {"fields": [{"name": "x", "count": 1}], "data": np.zeros(4, np.uint8)},
-            "geometry_msgs/PoseStamped": {"pose": POSE},
-            "nav_msgs/Odometry": {"child_frame_id": "base", "pose": {"pose": POSE}},
-        }
-        found += [(channel(store, n), serialized(store, n, header=head, **fields)) for n, fields in messages.items()]
-        found.append(
-            (channel(store, "tf2_msgs/TFMessage"), serialized(store, "tf2_msgs/TFMessage", transforms=[edge] * 3))
-        )
-    return found
-
-
-def _foxglove_messages() -> list[tuple[Channel, bytes]]:
-    found = []
-    for name, (kind, fields) in CASES.items():
-        found.append(
-            (Channel(1, "/t", f"foxglove.{name}", "protobuf", "protobuf", b""), kind(**fields).SerializeToString())
-        )
-        found.append((Channel(1, "/t", f"foxglove.{name}", "json", "", b""), _as_json(name, {"sec": 1, "nsec": 2})))
-    return found
-
-
-VALID = _ros_messages() + _foxglove_messages()
-
-
-def _check(record: Record) -> None:
-    """A record that comes out of a decoder holds what its description promises."""
-    assert 0 <= record.stamp < 2**63
-    if isinstance(record, TransformRecord | PoseRecord):
-        assert record.parent_from_child.shape == (4, 4) and is_rigid(record.parent_from_child)
-    elif isinstance(record, ImuRecord):
-        assert record.acceleration.shape == (3,) and np.isfinite(record.acceleration).all()
-    elif isinstance(record, CalibrationRecord):
-        assert (len(record.K), len(record.R) in (0, 9), len(record.P) in (0, 12)) == (9, True, True)
-        assert np.isfinite([*record.D, *record.K, *record.R, *record.P]).all()
-    elif isinstance(record, ImageRecord):
-        assert isinstance(record.data, bytes) and min(record.width, record.height, record.step) >= 0
-    else:
-        assert isinstance(record, PointsRecord)
+VALID = ros_messages() + foxglove_messages()
 
 
 def _decode(decoder: Callable[[bytes], tuple[Record, ...]], data: bytes) -> None:
@@ -105,44 +33,7 @@ def _decode(decoder: Callable[[bytes], tuple[Record, ...]], data: bytes) -> None
         assert str(error) and len(str(error)) < 1000
         records = error.records
     for record in records:
-        _check(record)
-
-
-def _damaged(draw: st.DrawFn, whole: bytes) -> bytes:
-    data = bytearray(whole)
-    for _ in range(draw(st.integers(1, 3))):
-        kind = draw(st.sampled_from(["flip", "fill", "number", "cut", "insert"]))
-        place = draw(st.integers(0, max(0, len(data) - 1)))
-        if kind == "flip" and data:
-            data[place] ^= 1 << draw(st.integers(0, 7))
-        elif kind == "fill":
-            data[place : place + 8] = b"\xff" * len(data[place : place + 8])
-        elif kind == "number":
-            number = draw(st.sampled_from([0, 1, 2**31 - 1, 2**31, 2**32 - 1, 1 << 20]))
-            data[place : place + 4] = struct.pack("<I", number)[: len(data[place : place + 4])]
-        elif kind == "cut":
-            del data[place:]
-        else:
-            data[place:place] = draw(st.binary(max_size=9))
-    return bytes(data)
-
-
-@pytest.mark.parametrize("index", range(len(VALID)), ids=[f"{c.type_name}-{c.message_encoding}" for c, _ in VALID])
-def test_any_bytes_and_any_damage_decode_or_say_why_not(index: int) -> None:
-    where, whole = VALID[index]
-    decoder = decoder_for(where)
-    assert decoder is not None, why_unreadable(where)
-    assert decoder(whole)
-
-    @settings(max_examples=40, deadline=None)
-    @given(st.data())
-    def run(data: st.DataObject) -> None:
-        _decode(decoder, _damaged(data.draw, whole))
-        _decode(decoder, data.draw(st.binary(max_size=300)))
-
-    run()
-    for cut in range(len(whole)):
-        _decode(decoder, whole[:cut])
+        check_record(record)
 
 
 def test_reasons_hold_no_values_so_that_messages_can_be_counted_by_them() -> None:
@@ -162,8 +53,90 @@ def test_reasons_hold_no_values_so_that_messages_can_be_counted_by_them() -> Non
         assert len(reasons) < 30, (where.type_name, reasons)
 
 
+# --- messages that cannot be -------------------------------------------------------------------------------------
+
+
+def _raw_json(**changes: Any) -> bytes:
+    return _as_json("RawImage", {"sec": 1, "nsec": 2}, **changes)
+
+
+def _in_json(name: str) -> Channel:
+    return Channel(1, "/t", f"foxglove.{name}", "json", "jsonschema", b"{}")
+
+
+def _in_protobuf(name: str) -> Channel:
+    return Channel(1, "/t", f"foxglove.{name}", "protobuf", "protobuf", b"")
+
+
+BROKEN_JSON: list[tuple[bytes, str]] = [
+    (b"", "no JSON"),
+    (b"{", "no JSON"),
+    (b"[]", "no object"),
+    (b"\xff\xfe", "no JSON"),
+    (b"[" * 100_000, "no JSON"),
+    (b'{"a":' * 100_000, "no JSON"),
+    (b'{"width": NaN}', "NaN is no number"),
+    (b'{"width": -Infinity}', "-Infinity is no number"),
+    (b'{"width": ' + b"9" * 5000 + b"}", "no JSON"),
+    (_raw_json(data="no base64!"), "no base64"),
+    (_raw_json(data="AAA"), "no base64"),
+    (_raw_json(data="Grüße"), "no base64"),
+    (_raw_json(data=[1, 2, 3]), "no array of bytes"),
+    (_raw_json(width=-1), "'width' is no size"),
+    (_raw_json(width=1e300), "'width' is no size"),
+    (_raw_json(width=True), "'width' is no size"),
+    (_raw_json(height=2**32), "'height' is no size"),
+    (_raw_json(encoding=None), "'encoding' is no text"),
+    (_raw_json(frame_id="x" * 5000), "more than 4096 characters"),
+    (_raw_json(timestamp=5), "the stamp is no pair"),
+    (_raw_json(timestamp={"sec": 1.5, "nsec": 0}), "no whole number 'sec'"),
+    (_raw_json(timestamp={"sec": 1}), "no whole number 'nsec'"),
+    (b'{"timestamp": {"sec": 1, "nsec": 2}}', "no field 'frame_id'"),
+    (bytes(LARGEST_MESSAGE + 1), "more than"),
+]
+BROKEN_CALIBRATIONS: list[tuple[dict[str, Any], str]] = [
+    ({"K": [1.0] * 8}, "'k' has not as many"),
+    ({"K": ["1"] * 9}, "'k' is no number"),
+    ({"K": [1e999] * 9}, "not finite|no number"),
+    ({"D": [0.0] * 300}, "'d' has not as many"),
+    ({"D": 0.5}, "'d' is no list"),
+    ({"P": [1.0] * 9}, "'p' has not as many"),
+    ({"D": [10**400]}, "not finite"),
+]
+UNDECODABLE: list[tuple[Channel, bytes, str]] = [
+    *[(_in_json("RawImage"), data, reason) for data, reason in BROKEN_JSON],
+    *[
+        (_in_json("CameraCalibration"), _as_json("CameraCalibration", {"sec": 1, "nsec": 2}, **changes), reason)
+        for changes, reason in BROKEN_CALIBRATIONS
+    ],
+    *[(_in_protobuf(name), b"\xff" * 20, f"no foxglove.{name} in protobuf") for name in CASES],
+    (
+        _in_protobuf("FrameTransform"),
+        FrameTransform(parent_frame_id="a", child_frame_id="b").SerializeToString(),
+        "no rigid transform",
+    ),
+    *[
+        (
+            _in_protobuf("PointCloud"),
+            PointCloud(timestamp={"seconds": seconds, "nanos": nanos}).SerializeToString(),
+            "the stamp is negative",
+        )
+        for seconds, nanos in ((-1, 0), (1, -1), (1, 10**9), (2**62, 0))
+    ],
+]
+"""(channel, message, words of the refusal)."""
+
+
+@pytest.mark.parametrize(("where", "data", "words"), UNDECODABLE, ids=[f"{c.type_name} {w}" for c, _, w in UNDECODABLE])
+def test_undecodable(where: Channel, data: bytes, words: str) -> None:
+    decoder = decoder_for(where)
+    assert decoder is not None and why_unreadable(where) == ""
+    with pytest.raises(Undecodable, match=words):
+        decoder(data)
+
+
 def test_every_truncation_of_a_ros_message_is_noticed() -> None:
-    for where, whole in _ros_messages():
+    for where, whole in ros_messages():
         decoder = decoder_for(where)
         assert decoder is not None
         for cut in range(len(whole)):
@@ -233,71 +206,6 @@ def test_a_large_json_message_costs_a_bounded_multiple_of_its_size() -> None:
 
 # --- definitions ---------------------------------------------------------------------------------------------------
 
-MSG = (
-    "std_msgs/Header header\nuint32 height\nPart[<=3] parts\nstring<=9 format\nuint8[] data\n"
-    f"{LINE}\nMSG: sensor_msgs/Part\nfloat64[3] x\nint8 KIND=3\nstring[] names\n"
-)
-WORDS = [
-    "struct",
-    "module",
-    "sequence<",
-    ">",
-    "{",
-    "}",
-    ";",
-    "[",
-    "]",
-    "(",
-    ")",
-    "@",
-    "const",
-    "=",
-    "<<",
-    "::",
-    "typedef",
-    "Part",
-    "x",
-    "string",
-    "float64",
-    "Header",
-    "MSG: a/B",
-    LINE,
-    "\n",
-    "#",
-    '"',
-    "/*",
-    "\0",
-    "9" * 30,
-    "a/b/c/d",
-    "-1",
-]
-
-
-@settings(max_examples=150, deadline=None)
-@given(st.data(), st.sampled_from(["ros2msg", "ros2idl", "ros1msg"]))
-def test_any_definition_is_read_or_refused_in_words(data: st.DataObject, encoding: str) -> None:
-    text = IDL if encoding == "ros2idl" else MSG
-    for _ in range(data.draw(st.integers(0, 4))):
-        place = data.draw(st.integers(0, len(text)))
-        kind = data.draw(st.sampled_from(["insert", "cut", "remove", "noise"]))
-        if kind == "insert":
-            text = text[:place] + " " + data.draw(st.sampled_from(WORDS)) + " " + text[place:]
-        elif kind == "cut":
-            text = text[:place]
-        elif kind == "remove":
-            text = text[:place] + text[place + data.draw(st.integers(1, 30)) :]
-        else:
-            text = text[:place] + data.draw(st.text(max_size=8)) + text[place:]
-    message_encoding = "ros1" if encoding == "ros1msg" else "cdr"
-    type_name = "sensor_msgs/msg/CameraInfo" if encoding == "ros2idl" else "sensor_msgs/msg/CompressedImage"
-    where = Channel(1, "/t", type_name, message_encoding, encoding, text.encode("utf-8", "replace"))
-    decoder = decoder_for(where)
-    if decoder is None:
-        assert 0 < len(why_unreadable(where)) < 300
-    else:
-        _decode(decoder, data.draw(st.binary(max_size=200)))
-        _decode(decoder, b"\0\1\0\0" + bytes(500))
-
 
 @pytest.mark.parametrize(
     ("encoding", "text"),
@@ -338,77 +246,6 @@ def test_names_of_types_are_shown_short() -> None:
 
 # --- pixels --------------------------------------------------------------------------------------------------------
 
-READERS: list[Callable[[ImageRecord], Any]] = [color_pixels, depth_pixels, label_pixels]
-ENCODINGS = [
-    "rgb8",
-    "bgr8",
-    "rgba8",
-    "mono8",
-    "mono16",
-    "16UC1",
-    "32FC1",
-    "rgb16",
-    "bayer_rggb8",
-    "bayer_gbrg8",
-    "yuv422",
-    "yuyv",
-    "nv12",
-    "nv21",
-    "32SC1",
-    "8UC4",
-    "jpeg",
-    "",
-    "rgb8; jpeg compressed rgb8",
-    "16UC1; compressedDepth png",
-    "16UC1; compressedDepth rvl",
-    "32FC1; compressedDepth rvl",
-    "h264",
-    "\0",
-    "TYPE",
-]
-SIZES = st.one_of(st.integers(0, 9), st.sampled_from([2**16, 2**31, 2**32 - 1]))
-
-
-def _look(record: ImageRecord) -> None:
-    for topic in ("/camera/depth", "/camera/color", "/labels", "/x"):
-        assert role_of(record, topic) in ("color", "depth", "labels", "other")
-        why_other(record, topic)
-    assert depth_unit(record) in (1, 1000)
-    for read in READERS:
-        try:
-            image = read(record)
-        except Unusable as error:
-            assert error.reason and len(str(error)) < 400
-        else:
-            assert isinstance(image, bytes) or (image.ndim in (2, 3) and image.size > 0)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.sampled_from(ENCODINGS), st.booleans(), SIZES, SIZES, SIZES, st.booleans(), st.binary(max_size=400))
-def test_any_image_has_pixels_or_a_reason(
-    encoding: str, is_compressed: bool, width: int, height: int, step: int, big_endian: bool, data: bytes
-) -> None:
-    if is_compressed:
-        width = height = step = 0
-    _look(ImageRecord(1, "f", encoding, is_compressed, width, height, step, big_endian, data))
-
-
-SMALL = np.random.default_rng(0).integers(1, 3000, (12, 17)).astype(np.uint16)
-FILES = {
-    "jpeg": cv2.imencode(".jpg", np.dstack([SMALL] * 3).astype(np.uint8))[1].tobytes(),
-    "png": cv2.imencode(".png", SMALL)[1].tobytes(),
-    "webp": cv2.imencode(".webp", np.dstack([SMALL] * 3).astype(np.uint8))[1].tobytes(),
-    "16UC1; compressedDepth png": compressed_depth(SMALL, "png"),
-    "16UC1; compressedDepth rvl": compressed_depth(SMALL, "rvl"),
-    "32FC1; compressedDepth rvl": compressed_depth(SMALL.astype(np.float32) / 1000, "rvl"),
-}
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.data(), st.sampled_from(sorted(FILES)))
-def test_any_damaged_picture_has_pixels_or_a_reason(data: st.DataObject, encoding: str) -> None:
-    _look(ImageRecord(1, "f", encoding, True, 0, 0, 0, False, _damaged(data.draw, FILES[encoding])))
-
 
 def test_sizes_are_checked_before_memory_is_taken() -> None:
     raw = ImageRecord(1, "f", "rgb8", False, 2**16, 2**16, 0, False, bytes(1000))
@@ -416,7 +253,7 @@ def test_sizes_are_checked_before_memory_is_taken() -> None:
         1, "f", "16UC1; compressedDepth rvl", True, 0, 0, 0, False, bytes(12) + struct.pack("<II", 2**20, 2**20)
     )
     for record in (raw, rvl):
-        for read in READERS:
+        for read in (color_pixels, depth_pixels, label_pixels):
             peak, seconds = _peak(lambda read=read, record=record: pytest.raises(Unusable, read, record))
             assert peak < MEGABYTE and seconds < 1
 

@@ -33,7 +33,7 @@ from scenewright.stages.library.importing.source_folder import SourceFolder
 from scenewright.stages.library.importing.source_model import SourceModel, Surface, painted_faces
 from scenewright.stages.library.surfaces import Sections, surface_planes
 
-from tests.bad_input.test_meshes import glb
+from tests.bad_input.payload_bytes import glb
 from tests.unit.library.test_addition import add, obj_box, write
 
 CUBE = str(trimesh.creation.box((0.4, 0.4, 0.8)).export(file_type="obj"))
@@ -69,7 +69,38 @@ INSTANCE = '<instance_geometry url="#g"/>'
 LADDER = "".join(f'<node id="n{k}">{f"<instance_node url={chr(34)}#n{k + 1}{chr(34)}/>" * 2}</node>' for k in range(14))
 BUFFERED = {"buffers": [{"uri": "data:;base64,AAAA", "byteLength": 3}], "accessors": [], "meshes": []}
 
+
+def meshed(name: str) -> str:
+    return urdf(f'<geometry><mesh filename="{name}"/></geometry>')
+
+
+ENTITIES = '<!DOCTYPE a [<!ENTITY x "y"><!ENTITY z "&x;&x;&x;">]><robot name="a"><link name="&z;"/></robot>'
+TWO_PARENTS = (
+    '<robot><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="fixed"><parent link="b"/>'
+    '<child link="c"/></joint><joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint></robot>'
+)
 REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
+    "entities": ({"chair.urdf": ENTITIES}, "document type or entities"),
+    "torn": ({"chair.urdf": "<robot"}, "well-formed"),
+    "a mesh of the system": ({"chair.urdf": meshed("/etc/passwd")}, "is not in the folder"),
+    "a mesh above": ({"chair.urdf": meshed("../secret.obj"), "../secret.obj": CUBE}, "is not in the folder"),
+    "a size that is no number": ({"chair.urdf": urdf(BOX.replace("1 1 1", "1 nan 1"))}, "is not finite"),
+    "two roots": ({"chair.urdf": '<robot><link name="a"/><link name="b"/></robot>'}, "2 root links"),
+    "links in a circle": ({"chair.urdf": TWO_PARENTS}, "circle"),
+    "a file that includes itself": (
+        {"chair.xml": '<mujoco><include file="chair.xml"/><worldbody/></mujoco>'},
+        "in a circle",
+    ),
+    "a box of no width": ({"chair.xml": mjcf('<geom type="box" size="0 1 1"/>')}, "without size"),
+    "no links": ({"chair.sdf": '<sdf><model name="chair"/></sdf>'}, "no links"),
+    "a negative unit": ({"chair.dae": "<COLLADA><asset><unit meter='-1'/></asset></COLLADA>"}, "unit of -1"),
+    "a corner that is not there": ({"chair.obj": "v 0 0 0\nv 1 0 0\nf 1 2 9\n"}, "element 9 of 2"),
+    "words": ({"chair.stl": "no mesh at all"}, "no STL"),
+    "a buffer above": (
+        {"chair.gltf": '{"buffers": [{"uri": "../secret.bin", "byteLength": 4}]}', "../secret.bin": b"abcd"},
+        "is not in the folder",
+    ),
+    "no model": ({"readme.txt": "nothing"}, "no model files"),
     "euler sequence": (
         {"chair.xml": mjcf('<geom type="box" size="1 1 1" euler="1 2 3"/>', '<compiler eulerseq="XXX"/>')},
         "chair.*eulerseq 'XXX'",
@@ -232,29 +263,6 @@ def test_a_flat_collision_hull_is_thickened(tmp_path: Path, shape: str) -> None:
     write(tmp_path / "in" / "chair.urdf", urdf(BOX, f"<geometry>{shape}</geometry>"))
     (model,) = add(tmp_path / "in", tmp_path / "out").info.models
     assert 0 < model.mass < 1
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("a = " + "[" * 1000 + "]" * 1000, "nested"),
-        ("a = " + "9" * 6000, "integer|digits"),
-        ("[models]\n" + "".join(f'"*x{k}*" = "chair"\n' for k in range(1001)), "more than 1000 patterns"),
-        (b"\xff = 1", "UTF-8|utf-8"),
-    ],
-)
-def test_mappings(tmp_path: Path, text: str | bytes, reason: str) -> None:
-    path = tmp_path / "map.toml"
-    path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(BadInput, match=reason) as caught:
-        read_mapping(path)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_mapping_that_is_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "map.toml")
-    with pytest.raises(BadInput, match="regular file"):
-        read_mapping(tmp_path / "map.toml")
 
 
 def test_a_mapping_takes_the_first_that_fits(tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
-"""What a fuzz harness is: a parser, bytes for it, and the only errors it may raise."""
+"""What a fuzz harness is: a door for bytes from outside, bytes for it, and the only errors it may raise."""
 
 from __future__ import annotations
 
 import atexit
+import contextlib
 import functools
 import os
 import shutil
@@ -12,7 +13,22 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from scenewright.schemas.plain_text import LONGEST_LINE
+
 CORPUS = Path(__file__).resolve().parent / "corpus"
+_answers: list[str] = []
+
+
+@contextlib.contextmanager
+def refused(*errors: type[Exception]) -> Iterator[None]:
+    """Take these errors as refusals: each is one line of bounded length."""
+    try:
+        yield
+        _answers.append("read")
+    except errors as error:
+        words = str(error)
+        assert words and "\n" not in words and len(words) <= LONGEST_LINE + 200, words
+        _answers.append("refused")
 
 
 @dataclass(frozen=True)
@@ -25,6 +41,14 @@ class Harness:
     """Name -> bytes of valid samples, from which the corpus is made."""
     largest: int = 8192
     """Bytes that a fuzzer may come up with."""
+    choosing: int = 0
+    """Leading bytes that choose among several readers; the content follows."""
+
+    def outcome(self, data: bytes) -> str:
+        """Return what comes of bytes: "read", "refused", or "in part" where only some was read, or by some readers."""
+        _answers.clear()
+        self.target(data)
+        return "in part" if len(set(_answers)) > 1 else "".join(_answers[:1])
 
 
 def corpus_of(name: str) -> list[Path]:

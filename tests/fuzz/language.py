@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Callable
 
@@ -19,7 +18,7 @@ from scenewright.stages.kit.language.reply_text import Unreadable
 from scenewright.stages.kit.language.transcripts import exchange_of, read_transcript
 from scenewright.stages.kit.services.connection import Answer, Connection, GivenUp, TryAgain
 
-from tests.fuzz.harness import Harness, as_file
+from tests.fuzz.harness import Harness, as_file, refused
 
 LANGUAGE = ActionLanguage(
     (ActionType("pick", ("box",)), ActionType("place", ("box",), {"x": NumberRange(0, 1), "y": NumberRange(-1, 1)})),
@@ -39,7 +38,7 @@ PLAN = {
 def model_reply(data: bytes) -> None:
     """Read a plan out of what a model wrote; one that is taken says only what may be said."""
     raw = RawReply(data.decode("utf-8", "replace"), "stop", Usage(0, 0, True))
-    with contextlib.suppress(Unreadable, DoesNotFollow):
+    with refused(Unreadable, DoesNotFollow):
         assert not check_calls(read_reply(raw, SCHEMA).plan, LANGUAGE)
 
 
@@ -69,7 +68,7 @@ class _Line(Connection):
 
 def model_answer(data: bytes) -> None:
     """Read what a server answered; what is taken can be written and sent on."""
-    with contextlib.suppress(LanguageFailed):
+    with refused(LanguageFailed):
         raw = OpenAICompatibleBackend(_Line(data), "m").ask(REQUEST)
         assert raw.finish in ("stop", "length", "declined") and raw.usage.prompt_tokens >= 0
         say("assistant", raw.text)
@@ -92,7 +91,7 @@ def _answer_seeds() -> dict[str, bytes]:
 
 def transcript(data: bytes) -> None:
     """Read a transcript."""
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         read = read_transcript(as_file("transcript.jsonl", data))
         assert all(read.find(exchange.digest, 0) is not None for exchange in read)
 

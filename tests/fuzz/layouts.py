@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import shutil
 from collections.abc import Callable
@@ -13,10 +12,12 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.stages.ingest.detection import open_log
 from scenewright.stages.ingest.folders.calibration_files import read_calibration
 from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
+from scenewright.stages.ingest.folders.pose_files import read_pose_list
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Unusable
 
-from tests.fuzz.harness import Harness, as_file, chosen, scratch
+from tests.fuzz.harness import Harness, as_file, chosen, refused, scratch
 from tests.unit.ingest.folder_writers import (
     write_colmap,
     write_image_folder,
@@ -38,6 +39,7 @@ WRITERS: dict[str, Callable[[Path, list], Path]] = {
     "nerfstudio": write_nerfstudio,
     "replica": write_replica,
     "colmap": write_colmap,
+    "colmap_text": lambda root, recorded: write_colmap(root, recorded, binary=False),
     "images": write_image_folder,
 }
 INTRINSICS = {"fx": 80.0, "fy": 80.0, "cx": 47.5, "cy": 35.5}
@@ -64,12 +66,13 @@ def _target(layout: str) -> Callable[[bytes], None]:
         path.write_bytes(rest)
         options = INTRINSICS if layout == "posed_images" else {}
         try:
-            with contextlib.suppress(BadInput, UsageError):
+            with refused(BadInput, UsageError):
                 source = open_log(log, IngestParameters(**options))
                 try:
                     for entry in source.entries[:2]:
+                        assert isinstance(entry.time, float)
                         assert entry.world_from_camera is None or np.shape(entry.world_from_camera) == (4, 4)
-                        with contextlib.suppress(Unusable):
+                        with refused(Unusable):
                             entry.load()
                 finally:
                     source.close()
@@ -86,7 +89,7 @@ def _seeds(layout: str) -> Callable[[], dict[str, bytes]]:
 def depth_array_file(data: bytes) -> None:
     """The first byte chooses the format of the array that follows."""
     number, rest = chosen(data, len(ARRAY_SUFFIXES))
-    with contextlib.suppress(Unusable):
+    with refused(Unusable):
         image = depth_array(rest, ARRAY_SUFFIXES[number])
         assert image.ndim == 2 and image.size * 2 <= len(rest)
 
@@ -110,7 +113,7 @@ def _array_seeds() -> dict[str, bytes]:
 def calibration_file(data: bytes) -> None:
     """The first byte chooses the name of the calibration file that follows."""
     number, rest = chosen(data, len(CALIBRATIONS))
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         found = read_calibration(as_file(CALIBRATIONS[number], rest))
         assert found.left.K[0] > 0 and np.isfinite(found.left.K).all()
 
@@ -118,7 +121,8 @@ def calibration_file(data: bytes) -> None:
 def _calibration_seeds() -> dict[str, bytes]:
     texts = {
         "calibration.yaml": "%YAML:1.0\n---\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
-        "   data: [ 80., 0., 47.5, 0., 80., 35.5, 0., 0., 1. ]\nD1: [0, 0, 0, 0]\nT: [-0.1, 0, 0]\n",
+        "   data: [ 80., 0., 47.5, 0., 80., 35.5, 0., 0., 1. ]\nD1: [0, 0, 0, 0]\n"
+        "M2: [80, 0, 47.5, 0, 80, 35.5, 0, 0, 1]\nR: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nT: [-0.1, 0, 0]\n",
         "camera.json": '{"width": 96, "height": 72, "camera": {"fx": 80, "fy": 80, "cx": 47.5, "cy": 35.5, "k1": 0.1}}',
         "calib.txt": "P0: 80 0 47.5 0 0 80 35.5 0 0 0 1 0\nP1: 80 0 47.5 -8 0 80 35.5 0 0 0 1 0\n",
         "intrinsics.txt": "cam0=[80 0 47; 0 80 35; 0 0 1]\ncam1=[80 0 50; 0 80 35; 0 0 1]\ndoffs=3\nbaseline=100\n",
@@ -126,7 +130,25 @@ def _calibration_seeds() -> dict[str, bytes]:
     return {name: bytes([CALIBRATIONS.index(name)]) + text.encode() for name, text in texts.items()}
 
 
-HARNESSES = {f"layout_{name}": Harness(_target(name), _seeds(name)) for name in WRITERS} | {
-    "depth_array": Harness(depth_array_file, _array_seeds),
-    "calibration_file": Harness(calibration_file, _calibration_seeds),
+def pose_list(data: bytes) -> None:
+    """Any bytes as the poses of two images, and as a stamp."""
+    with refused(BadInput):
+        found = read_pose_list(as_file("poses.txt", data), ["a", "b"])
+        assert isinstance(found, StampedPoses) or len(found) == 2
+    with refused(BadInput):
+        assert 0 <= exact_stamp(data.decode("utf-8", "replace"), "here") < 9 * 10**18
+
+
+def _pose_list_seeds() -> dict[str, bytes]:
+    return {
+        "rows": b"1 0 0 0 0 1 0 0 0 0 1 0\n" * 2,
+        "stamped": b"1.5 1 2 3 0 0 0 1\n2.5 1 2 3 0 0 0 1\n",
+        "stamp": b"1.5",
+    }
+
+
+HARNESSES = {f"layout_{name}": Harness(_target(name), _seeds(name), choosing=1) for name in WRITERS} | {
+    "depth_array": Harness(depth_array_file, _array_seeds, choosing=1),
+    "calibration_file": Harness(calibration_file, _calibration_seeds, choosing=1),
+    "pose_list": Harness(pose_list, _pose_list_seeds),
 }

@@ -17,17 +17,25 @@ from scenewright.stages.ingest.messages.compressed_depth import decode_compresse
 from scenewright.stages.ingest.messages.container import Channel
 from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
 from scenewright.stages.ingest.messages.opening import open_message_log
-from scenewright.stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels, role_of
-from scenewright.stages.ingest.messages.records import ImageRecord, Undecodable
+from scenewright.stages.ingest.messages.pixels import (
+    color_pixels,
+    depth_pixels,
+    depth_unit,
+    label_pixels,
+    role_of,
+    why_other,
+)
+from scenewright.stages.ingest.messages.records import ImageRecord, Record, Undecodable
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Unusable
 from scenewright.stages.kit.formats.frames import FrameReader, FrameWriter
 
-from tests.fuzz.harness import Harness, as_file, chosen, edited, scratch, script
+from tests.fuzz.harness import Harness, as_file, chosen, edited, refused, scratch, script
 from tests.unit.ingest.container_logs import some_messages, write_bag1, write_bag2, write_mcap
 from tests.unit.ingest.message_logs import FIRST, SECOND, record_room, recorder
 from tests.unit.ingest.ros_writing import ROS1, ROS2, definition
 from tests.unit.ingest.rvl_writing import compressed_depth
+from tests.unit.ingest.sample_messages import check_record, foxglove_messages, ros_messages
 from tests.unit.ingest.tiny_room import CAMERA, frames, jpeg, png
 
 DIALECTS = ("ros1", "ros2-mcap", "foxglove-protobuf", "foxglove-json")
@@ -38,11 +46,11 @@ SMALL = np.arange(48, dtype=np.uint16).reshape(6, 8) * 900
 def _read_container(path: Path) -> None:
     """Read a log to its end, whole and salvaging; fetch its first messages again."""
     for salvage in (True, False):
-        with contextlib.suppress(BadInput):
+        with refused(BadInput):
             log = open_message_log(path, salvage=salvage)
             try:
                 for message in itertools.islice(log.messages(), MOST_MESSAGES):
-                    with contextlib.suppress(BadInput):
+                    with refused(BadInput):
                         assert log.fetch(message.location).data == message.data
             finally:
                 log.close()
@@ -68,9 +76,15 @@ def _whole_bag2() -> Path:
     return write_bag2(scratch() / "bag2", some_messages(4, 20))
 
 
+@functools.cache
+def _bag2_metadata() -> bytes:
+    return (_whole_bag2() / "metadata.yaml").read_bytes()
+
+
 def rosbag2_metadata(data: bytes) -> None:
     """Any bytes as the metadata.yaml of a whole ROS 2 bag."""
     folder = _whole_bag2()
+    _bag2_metadata()  # kept before it is written over
     (folder / "metadata.yaml").write_bytes(data)
     _read_container(folder)
 
@@ -92,18 +106,17 @@ def _container_seeds() -> dict[str, dict[str, bytes]]:
         seeds["rosbag1"][packing] = path.read_bytes()
     bag = write_bag2(folder / "sqlite", messages[:2])
     seeds["rosbag2"]["sqlite"] = next(bag.glob("*.db3")).read_bytes()
-    seeds["rosbag2_metadata"] = {"metadata": (bag / "metadata.yaml").read_bytes()}
     mcap_bag = write_bag2(folder / "mcap", messages[:2], storage=StoragePlugin.MCAP)
-    seeds["rosbag2_metadata"]["of mcap"] = (mcap_bag / "metadata.yaml").read_bytes()
+    seeds["rosbag2_metadata"] = {"metadata": _bag2_metadata(), "of mcap": (mcap_bag / "metadata.yaml").read_bytes()}
     return seeds
 
 
 def frames_mcap(data: bytes) -> None:
     """Any bytes as the frames of a sequence."""
-    with contextlib.suppress(BadInput), FrameReader(as_file("frames.mcap", data)) as reader:
+    with refused(BadInput), FrameReader(as_file("frames.mcap", data)) as reader:
         reader.poses()
         for index in range(min(3, len(reader))):
-            with contextlib.suppress(BadInput):
+            with refused(BadInput):
                 reader.read(index)
 
 
@@ -140,14 +153,17 @@ def samples() -> tuple[tuple[Channel, bytes], ...]:
                 seen.add(message.channel.topic)
                 found.append((message.channel, message.data))
         opened.close()
-    return tuple(found)
+    return (*found, *ros_messages(), *foxglove_messages())
 
 
 def _read_image(record: ImageRecord, topic: str) -> None:
-    role_of(record, topic)
-    for read in (color_pixels, depth_pixels, label_pixels, depth_unit):
-        with contextlib.suppress(Undecodable, Unusable):
-            read(record)
+    assert role_of(record, topic) in ("color", "depth", "labels", "other")
+    why_other(record, topic)
+    assert depth_unit(record) in (1, 1000)
+    for read in (color_pixels, depth_pixels, label_pixels):
+        with refused(Undecodable, Unusable):
+            image = read(record)
+            assert isinstance(image, bytes) or (image.ndim in (2, 3) and image.size > 0)
 
 
 def message(data: bytes) -> None:
@@ -155,13 +171,16 @@ def message(data: bytes) -> None:
     number, rest = chosen(data, len(samples()))
     channel = samples()[number][0]
     decode = decoder_for(channel)
-    if decode is None:
-        return
-    try:
-        records = decode(rest)
-    except Undecodable as error:
-        records = error.records
+    assert decode is not None, why_unreadable(channel)
+    records: tuple[Record, ...] = ()
+    with refused(Undecodable):
+        try:
+            records = decode(rest)
+        except Undecodable as error:
+            records = error.records
+            raise
     for record in records:
+        check_record(record)
         if isinstance(record, ImageRecord):
             _read_image(record, channel.topic)
 
@@ -187,8 +206,10 @@ def ros_definition(data: bytes) -> None:
     number, rest = chosen(data, len(ENCODINGS) * len(TYPES))
     (encoding, schema), name = ENCODINGS[number // len(TYPES)], TYPES[number % len(TYPES)]
     channel = Channel(1, "/topic", name if encoding == "cdr" else name.replace("/msg", ""), encoding, schema, rest)
-    why_unreadable(channel)
     decode = decoder_for(channel)
+    with refused(Undecodable):
+        if decode is None:
+            raise Undecodable(why_unreadable(channel))
     for message_bytes in (bytes(400), b"\0\1\0\0" + bytes(60), b"\xff" * 100):
         if decode is not None:
             with contextlib.suppress(Undecodable):
@@ -220,7 +241,7 @@ DEPTH_ENCODINGS = (
 def compressed_depth_image(data: bytes) -> None:
     """The first byte chooses the encoding of the compressed depth that follows."""
     number, rest = chosen(data, len(DEPTH_ENCODINGS))
-    with contextlib.suppress(Undecodable, Unusable):
+    with refused(Undecodable, Unusable):
         image = decode_compressed_depth(DEPTH_ENCODINGS[number], rest)
         assert image.ndim == 2
 
@@ -283,7 +304,9 @@ def image_message(data: bytes) -> None:
 def _image_seeds() -> dict[str, bytes]:
     seeds = {}
     for number, (encoding, size) in enumerate(IMAGE_ENCODINGS):
-        seeds[encoding] = bytes([number, 0, 8, 6, 8 * size, 0]) + bytes(range(240))[: 48 * min(size, 5)]
+        seeds[encoding] = (
+            bytes([number, 0, 8, 6, 8 * size, 0]) + bytes(range(240))[: 72 if encoding == "nv12" else 48 * min(size, 5)]
+        )
     color = np.full((6, 8, 3), 90, np.uint8)
     seeds["jpeg"] = bytes([0, 1, 0, 0, 0, 0]) + jpeg(color)
     seeds["png"] = bytes([1, 1, 0, 0, 0, 0]) + png(color)
@@ -312,11 +335,11 @@ def _edited_room(dialect: str):  # type: ignore[no-untyped-def]
         """A log of a room with some of its bytes changed by an edit script: opened, and its frames loaded."""
         file, whole = _room_file(dialect)
         file.write_bytes(edited(whole, data))
-        with contextlib.suppress(BadInput, UsageError):
+        with refused(BadInput, UsageError):
             source = open_log(_room(dialect), IngestParameters())
             try:
                 for entry in source.entries[:3]:
-                    with contextlib.suppress(Unusable):
+                    with refused(Unusable):
                         entry.load()
             finally:
                 source.close()
@@ -340,10 +363,10 @@ HARNESSES = {
     "rosbag2": Harness(rosbag2, lambda: _container_seeds()["rosbag2"], largest=65536),
     "rosbag2_metadata": Harness(rosbag2_metadata, lambda: _container_seeds()["rosbag2_metadata"]),
     "frames_mcap": Harness(frames_mcap, _frames_seeds),
-    "message": Harness(message, _message_seeds),
-    "ros_definition": Harness(ros_definition, _definition_seeds),
-    "compressed_depth": Harness(compressed_depth_image, _compressed_depth_seeds),
-    "image_message": Harness(image_message, _image_seeds),
+    "message": Harness(message, _message_seeds, choosing=1),
+    "ros_definition": Harness(ros_definition, _definition_seeds, choosing=1),
+    "compressed_depth": Harness(compressed_depth_image, _compressed_depth_seeds, choosing=1),
+    "image_message": Harness(image_message, _image_seeds, choosing=6),
     "room_mcap": Harness(_edited_room("foxglove-protobuf"), _script_seeds),
     "room_rosbag1": Harness(_edited_room("ros1"), _script_seeds),
     "room_rosbag2": Harness(_edited_room("ros2-mcap"), _script_seeds),

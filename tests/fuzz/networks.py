@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import contextlib
 import json
 
 import numpy as np
@@ -27,7 +26,7 @@ from scenewright.stages.kit.services.segmentation_protocol import (
 )
 from scenewright.stages.segment.backends.onnx.sidecar import read_sidecar
 
-from tests.fuzz.harness import Harness, as_file
+from tests.fuzz.harness import Harness, as_file, refused
 
 CATEGORIES = {3: Category(id=3, name="chair"), 7: Category(id=7, name="wall", isthing=0)}
 SHAPE = (4, 6)
@@ -36,7 +35,7 @@ BOUNDARY = b"--fuzz"
 
 def service_reply(data: bytes) -> None:
     """Judge a reply; one that is taken keeps what the protocol promises."""
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         reply = parse_reply(data, "application/json", SHAPE, CATEGORIES)
         assert reply.ids.shape == SHAPE and set(np.unique(reply.ids)) - {0} == set(reply.segments)
         assert all(s.class_id in CATEGORIES and 0 <= s.score <= 1 for s in reply.segments.values())
@@ -52,7 +51,7 @@ def _reply_seeds() -> dict[str, bytes]:
 
 def service_info(data: bytes) -> None:
     """Judge a description."""
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         info = parse_info(data, "application/json")
         assert (
             info.categories
@@ -67,7 +66,7 @@ def _info_seeds() -> dict[str, bytes]:
 
 def service_request(data: bytes) -> None:
     """Judge a request."""
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         request = parse_request(data, f"multipart/form-data; boundary={BOUNDARY[2:].decode()}")
         size = (request.camera.height, request.camera.width)
         assert request.frame.depth is None or request.frame.depth.shape == size
@@ -84,7 +83,7 @@ def _request_seeds() -> dict[str, bytes]:
 def label_table(data: bytes) -> None:
     """Read labels as TOML and as words."""
     for name in ("labels.toml", "labels.txt"):
-        with contextlib.suppress(BadInput):
+        with refused(BadInput):
             assert all(label.name for label in read_label_file(as_file(name, data)).labels)
 
 
@@ -95,7 +94,7 @@ def _label_seeds() -> dict[str, bytes]:
 
 def onnx_sidecar(data: bytes) -> None:
     """Read a sidecar."""
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         assert read_sidecar(as_file("net.toml", data)).scale > 0
 
 

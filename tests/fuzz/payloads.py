@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import hashlib
 import io
 import json
 import shutil
@@ -15,11 +17,17 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.kinds import KINDS
 from scenewright.schemas.manifest import MANIFEST_NAME, Manifest
 from scenewright.stages.engine import store
+from scenewright.stages.engine.digests import content_digest
 from scenewright.stages.engine.pipelines import read_pipeline
 from scenewright.stages.engine.reading import check_hashes, open_artifact
 from scenewright.stages.engine.verification import verify
 from scenewright.stages.kit.configuration import read_config
-from scenewright.stages.kit.formats.masks import PanopticReader, write_panoptic_zip
+from scenewright.stages.kit.formats.masks import (
+    PanopticReader,
+    decode_panoptic_png,
+    encode_panoptic_png,
+    write_panoptic_zip,
+)
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.formats.numpy_files import read_arrays
 from scenewright.stages.kit.formats.ply_files import ColoredMesh, read_ply, write_ply
@@ -34,13 +42,19 @@ from scenewright.stages.kit.formats.trajectories import (
 from scenewright.stages.kit.formats.urdf_check import check_urdf
 from scenewright.stages.kit.formats.urdf_file import parse_urdf
 
-from tests.fuzz.harness import Harness, as_file, chosen, scratch
+from tests.fuzz.harness import Harness, as_file, chosen, refused, scratch
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 PIPELINES = Path(__file__).resolve().parents[2] / "data" / "pipelines"
-MODELS: tuple[type[Model], ...] = tuple(
-    model for kind in sorted(KINDS) if not kind.startswith("test_") for model in KINDS[kind].json_files.values()
-)
+DOCUMENTS: dict[str, type[Model]] = {
+    f"{kind}/{name}": model
+    for optional in (False, True)
+    for kind in sorted(KINDS)
+    if not kind.startswith("test_")
+    for name, model in (KINDS[kind].optional_json_files if optional else KINDS[kind].json_files).items()
+} | {"manifest.json": Manifest}
+"""Kind and file -> the model that reads it."""
+MODELS = tuple(DOCUMENTS.values())
 MESH = trimesh.creation.box((1.0, 2.0, 3.0))
 
 
@@ -52,9 +66,9 @@ def _written(name: str, write) -> bytes:  # type: ignore[no-untyped-def]
 
 def panoptic_zip(data: bytes) -> None:
     """Open a zip of masks and read three of its images."""
-    with contextlib.suppress(BadInput), PanopticReader(as_file("panoptic.zip", data)) as reader:
+    with refused(BadInput), PanopticReader(as_file("panoptic.zip", data)) as reader:
         for frame in reader.frame_indices()[:3]:
-            with contextlib.suppress(BadInput):
+            with refused(BadInput):
                 assert reader.read(frame).ndim == 2
 
 
@@ -63,9 +77,15 @@ def _panoptic_seeds() -> dict[str, bytes]:
     return {"two frames": _written("a.zip", lambda p: write_panoptic_zip(p, [(0, ids), (1, ids * 70_000)]))}
 
 
+def panoptic_png(data: bytes) -> None:
+    """Decode one image of masks."""
+    with refused(BadInput):
+        assert decode_panoptic_png(data).dtype == np.int32
+
+
 def npz(data: bytes) -> None:
     """Read two arrays."""
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         for array in read_arrays(as_file("arrays.npz", data), "a", "b"):
             assert array.nbytes <= 1032 * (len(data) + 1024)
 
@@ -81,7 +101,7 @@ def _npz_seeds() -> dict[str, bytes]:
 
 def _mesh(suffix: str):  # type: ignore[no-untyped-def]
     def target(data: bytes) -> None:
-        with contextlib.suppress(BadInput):
+        with refused(BadInput):
             mesh = read_mesh(as_file(f"mesh.{suffix}", data), may_be_empty=True)
             assert np.isfinite(mesh.vertices).all() and mesh.faces.shape[1] == 3
 
@@ -95,7 +115,7 @@ def _ply_seeds() -> dict[str, bytes]:
 
 def our_ply(data: bytes) -> None:
     """The reader of the meshes that write_ply writes."""
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         read_ply(as_file("ours.ply", data))
 
 
@@ -108,7 +128,7 @@ def urdf(data: bytes) -> None:
     """Check a URDF, and parse it."""
     path = as_file("robot.urdf", data)
     check_urdf(path)
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         parse_urdf(path)
 
 
@@ -128,7 +148,7 @@ def trajectory(data: bytes) -> None:
     """Every reader of poses as text."""
     path = as_file("trajectory.txt", data)
     for read in (read_tum, read_open3d_log, read_matrix, lambda file: number_rows(file, 7)):
-        with contextlib.suppress(BadInput):
+        with refused(BadInput):
             read(path)
 
 
@@ -148,7 +168,7 @@ def manifest(data: bytes) -> None:
     root.mkdir(exist_ok=True)
     (root / "graph.json").write_bytes(b"{}")
     (root / MANIFEST_NAME).write_bytes(data)
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         artifact = open_artifact(root)
         assert artifact.manifest is not None
         check_hashes(root, artifact.manifest)
@@ -160,39 +180,59 @@ def manifest(data: bytes) -> None:
 
 def _manifest_seeds() -> dict[str, bytes]:
     whole = Manifest.read(GOLDEN / "v1/contact_graph" / MANIFEST_NAME)
-    small = whole.model_copy(update={"parameters": {}, "libraries": {}, "files": whole.files[:1]})
+    files = (whole.files[0].model_copy(update={"bytes": 2, "sha256": hashlib.sha256(b"{}").hexdigest()}),)
+    update = {"parameters": {}, "libraries": {}, "files": files, "content_digest": content_digest(files)}
+    small = whole.model_copy(update=update)
     return {"contact graph": small.model_dump_json().encode()}
 
 
 def json_payload(data: bytes) -> None:
     """The first byte chooses which payload model reads the rest."""
     number, rest = chosen(data, len(MODELS))
-    with contextlib.suppress(BadInput):
+    with refused(BadInput):
         MODELS[number].read(as_file("payload.json", rest))
 
 
+@functools.cache
+def golden_documents() -> dict[str, str]:
+    """Return name -> text of a golden document for each of DOCUMENTS that has one, with lists cut where they may be."""
+    found = {}
+    for name, model in DOCUMENTS.items():
+        place = "contact_graph/manifest.json" if model is Manifest else name
+        for path in sorted(GOLDEN.glob(f"v*/{place}"), reverse=True):
+            document = json.loads(path.read_text())
+            texts = (_shortened(document, most) for most in (1, 2, 4, 8, 16))
+            text = next((text for text in texts if _is_read(model, text)), "")
+            if text:
+                found[name] = text
+                break
+    return found
+
+
 def _json_seeds() -> dict[str, bytes]:
-    seeds = {}
-    for number, model in enumerate(MODELS):
-        for path in sorted(GOLDEN.glob("v*/*/*.json")):
-            text = _shortened(json.loads(path.read_text()))
-            try:
-                model.model_validate_json(text)
-            except ValueError:
-                continue
-            seeds[f"{path.parent.name} {path.stem}"] = bytes([number]) + text.encode()
-            break
-    return seeds
+    numbers = {name: number for number, name in enumerate(DOCUMENTS)}
+    return {
+        name.replace("/", " ").removesuffix(".json"): bytes([numbers[name]]) + text.encode()
+        for name, text in golden_documents().items()
+    }
 
 
-def _shortened(value: object) -> str:
-    """Return a document as JSON with lists cut to one entry where that leaves the shape (numbers stay together)."""
+def _is_read(model: type[Model], text: str) -> bool:
+    try:
+        model.read(as_file("seed.json", text.encode()))
+    except BadInput:
+        return False
+    return True
+
+
+def _shortened(value: object, most: int) -> str:
+    """Return a document as JSON with lists of objects cut to so many entries."""
 
     def cut(item: object) -> object:
         if isinstance(item, dict):
             return {key: cut(entry) for key, entry in item.items()}
         if isinstance(item, list) and item and isinstance(item[0], dict):
-            return [cut(entry) for entry in item[:1]]
+            return [cut(entry) for entry in item[:most]]
         if isinstance(item, list):
             return [cut(entry) for entry in item]
         return item
@@ -204,7 +244,7 @@ def settings(data: bytes) -> None:
     """TOML of pipelines and config files."""
     path = as_file("settings.toml", data)
     for read in (read_pipeline, read_config):
-        with contextlib.suppress(UsageError):
+        with refused(UsageError):
             read(path)
 
 
@@ -236,6 +276,9 @@ def journal(data: bytes) -> None:
 
 HARNESSES = {
     "panoptic_zip": Harness(panoptic_zip, _panoptic_seeds),
+    "panoptic_png": Harness(
+        panoptic_png, lambda: {"twelve": encode_panoptic_png(np.arange(12, dtype=np.int32).reshape(3, 4))}
+    ),
     "npz": Harness(npz, _npz_seeds),
     "ply": Harness(_mesh("ply"), _ply_seeds),
     "our_ply": Harness(our_ply, _our_ply_seeds),
@@ -248,7 +291,7 @@ HARNESSES = {
     "urdf": Harness(urdf, _urdf_seeds),
     "trajectory": Harness(trajectory, _trajectory_seeds),
     "manifest": Harness(manifest, _manifest_seeds),
-    "json_payload": Harness(json_payload, _json_seeds),
+    "json_payload": Harness(json_payload, _json_seeds, choosing=1),
     "settings": Harness(settings, _settings_seeds),
     "journal": Harness(journal, lambda: {"plan": b'{"partial": ".a.partial-1-00000000", "old": ".a.old-00000000"}'}),
 }

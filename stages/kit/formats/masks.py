@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import struct
 import zipfile
@@ -12,6 +13,7 @@ from types import TracebackType
 import cv2
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
 from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_decoded
 from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
 
@@ -95,8 +97,11 @@ class PanopticReader:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        with zip_errors(self.path, REMAKE):
-            self._archive = zipfile.ZipFile(self.path)
+        with contextlib.ExitStack() as stack:
+            file = stack.enter_context(opened(self.path, hint=REMAKE))
+            with zip_errors(self.path, REMAKE):
+                self._archive = stack.enter_context(zipfile.ZipFile(file))
+            self._files = stack.pop_all()
 
     def __enter__(self) -> PanopticReader:
         return self
@@ -108,7 +113,7 @@ class PanopticReader:
 
     def close(self) -> None:
         """Close the file."""
-        self._archive.close()
+        self._files.close()
 
     def frame_indices(self) -> list[int]:
         """Return the indices of the frames that have an image, ascending."""

@@ -19,8 +19,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scenewright.stages.ingest.messages.container import Channel
-from scenewright.stages.ingest.messages.decoding import decoder_for, why_unreadable
-from scenewright.stages.ingest.messages.json_messages import LARGEST_MESSAGE
+from scenewright.stages.ingest.messages.decoding import decoder_for
 from scenewright.stages.ingest.messages.records import (
     CalibrationRecord,
     ImageRecord,
@@ -28,7 +27,6 @@ from scenewright.stages.ingest.messages.records import (
     PoseRecord,
     Record,
     TransformRecord,
-    Undecodable,
 )
 
 from tests.real_data import real_data
@@ -169,95 +167,6 @@ def test_missing_stamps_are_zero() -> None:
     without = json.dumps({"frame_id": "c", "format": "png", "data": "eA=="}).encode()
     in_json = decoder_for(Channel(1, "/t", "foxglove.CompressedImage", "json", "", b""))
     assert in_json is not None and in_json(without)[0].stamp == 0
-
-
-def test_a_transform_without_rotation_is_no_rigid_transform() -> None:
-    decoder = decoder_for(Channel(1, "/t", "foxglove.FrameTransform", "protobuf", "protobuf", b""))
-    assert decoder is not None
-    with pytest.raises(Undecodable, match="no rigid transform"):
-        decoder(FrameTransform(parent_frame_id="a", child_frame_id="b").SerializeToString())
-
-
-@pytest.mark.parametrize("seconds, nanos", [(-1, 0), (1, -1), (1, 10**9), (2**62, 0)])
-def test_stamps_out_of_range(seconds: int, nanos: int) -> None:
-    decoder = decoder_for(Channel(1, "/t", "foxglove.PointCloud", "protobuf", "protobuf", b""))
-    assert decoder is not None
-    with pytest.raises(Undecodable, match="the stamp is negative"):
-        decoder(PointCloud(timestamp={"seconds": seconds, "nanos": nanos}).SerializeToString())
-
-
-def _raw_json(**changes: Any) -> bytes:
-    return _as_json("RawImage", {"sec": 1, "nsec": 2}, **changes)
-
-
-@pytest.mark.parametrize(
-    ("data", "reason"),
-    [
-        (b"", "no JSON"),
-        (b"{", "no JSON"),
-        (b"[]", "no object"),
-        (b"\xff\xfe", "no JSON"),
-        (b"[" * 100_000, "no JSON"),
-        (b'{"a":' * 100_000, "no JSON"),
-        (b'{"width": NaN}', "NaN is no number"),
-        (b'{"width": -Infinity}', "-Infinity is no number"),
-        (b'{"width": ' + b"9" * 5000 + b"}", "no JSON"),
-        (_raw_json(data="no base64!"), "no base64"),
-        (_raw_json(data="AAA"), "no base64"),
-        (_raw_json(data="Grüße"), "no base64"),
-        (_raw_json(data=[1, 2, 3]), "no array of bytes"),
-        (_raw_json(width=-1), "'width' is no size"),
-        (_raw_json(width=1e300), "'width' is no size"),
-        (_raw_json(width=True), "'width' is no size"),
-        (_raw_json(height=2**32), "'height' is no size"),
-        (_raw_json(encoding=None), "'encoding' is no text"),
-        (_raw_json(frame_id="x" * 5000), "more than 4096 characters"),
-        (_raw_json(timestamp=5), "the stamp is no pair"),
-        (_raw_json(timestamp={"sec": 1.5, "nsec": 0}), "no whole number 'sec'"),
-        (_raw_json(timestamp={"sec": 1}), "no whole number 'nsec'"),
-        (b'{"timestamp": {"sec": 1, "nsec": 2}}', "no field 'frame_id'"),
-    ],
-)
-def test_broken_json_is_undecodable(data: bytes, reason: str) -> None:
-    decoder = decoder_for(Channel(1, "/t", "foxglove.RawImage", "json", "jsonschema", b"{}"))
-    assert decoder is not None
-    with pytest.raises(Undecodable, match=reason):
-        decoder(data)
-
-
-def test_json_that_is_too_large_is_not_parsed() -> None:
-    decoder = decoder_for(Channel(1, "/t", "foxglove.RawImage", "json", "", b""))
-    assert decoder is not None
-    with pytest.raises(Undecodable, match="more than"):
-        decoder(bytes(LARGEST_MESSAGE + 1))
-
-
-@pytest.mark.parametrize(
-    ("changes", "reason"),
-    [
-        ({"K": [1.0] * 8}, "'k' has not as many"),
-        ({"K": ["1"] * 9}, "'k' is no number"),
-        ({"K": [1e999] * 9}, "not finite|no number"),
-        ({"D": [0.0] * 300}, "'d' has not as many"),
-        ({"D": 0.5}, "'d' is no list"),
-        ({"P": [1.0] * 9}, "'p' has not as many"),
-        ({"D": [10**400]}, "not finite"),
-    ],
-)
-def test_broken_calibration(changes: dict[str, Any], reason: str) -> None:
-    decoder = decoder_for(Channel(1, "/t", "foxglove.CameraCalibration", "json", "", b""))
-    assert decoder is not None
-    with pytest.raises(Undecodable, match=reason):
-        decoder(_as_json("CameraCalibration", {"sec": 1, "nsec": 2}, **changes))
-
-
-def test_broken_protobuf_is_undecodable() -> None:
-    for name in CASES:
-        channel = Channel(1, "/t", f"foxglove.{name}", "protobuf", "protobuf", b"")
-        decoder = decoder_for(channel)
-        assert decoder is not None and why_unreadable(channel) == ""
-        with pytest.raises(Undecodable, match=f"no foxglove.{name} in protobuf"):
-            decoder(b"\xff" * 20)
 
 
 def test_real_json_log_with_a_camera_model_of_its_own() -> None:

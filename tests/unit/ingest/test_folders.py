@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -218,25 +217,6 @@ def test_same_log_same_bytes(tmp_path: Path) -> None:
     first, second = ingest(log, tmp_path / "a"), ingest(log, tmp_path / "b")
     for name in ("frames.mcap", "sequence.json", "trajectory.tum"):
         assert first.path(name).read_bytes() == second.path(name).read_bytes()
-
-
-@pytest.mark.parametrize("name", ["nothing", "empty", "words.txt"])
-def test_unknown_layouts_are_named(tmp_path: Path, name: str) -> None:
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "words.txt").write_text("hello")
-    with pytest.raises(BadInput):
-        ingest(tmp_path / name, tmp_path / "out")
-
-
-def test_damaged_redwood_intrinsics(tmp_path: Path) -> None:
-    log = write_redwood(tmp_path / "log", frames(2))
-    document = json.loads((log / "camera_intrinsic.json").read_text())
-    for number, broken in enumerate(
-        ["{", "[]", json.dumps(document | {"intrinsic_matrix": [0.0] * 9}), json.dumps(document | {"width": 640})]
-    ):
-        (log / "camera_intrinsic.json").write_text(broken)
-        with pytest.raises(BadInput, match="camera_intrinsic.json"):
-            ingest(log, tmp_path / f"out{number}")
 
 
 def test_file_numbers_are_sorted_as_numbers() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenewright.cli.main import run as command_line
 from scenewright.schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile
@@ -29,13 +28,11 @@ from scenewright.stages.kit.stage import Context
 from scenewright.stages.library.addition import run
 from scenewright.stages.library.importing.classes import class_of
 from scenewright.stages.library.importing.collada_file import parse_collada
-from scenewright.stages.library.importing.discovery import find_models
 from scenewright.stages.library.importing.frames import AXES, model_rotation
-from scenewright.stages.library.importing.grouping import grouped, source_points
 from scenewright.stages.library.importing.pieces import convex_pieces
 from scenewright.stages.library.importing.placing import normal_limits
 from scenewright.stages.library.importing.source_folder import SourceFolder
-from scenewright.stages.library.importing.source_model import SourceModel, Surface, painted_faces
+from scenewright.stages.library.importing.source_model import Surface, painted_faces
 from scenewright.stages.library.importing.versions import coacd_version, uses_coacd
 from scenewright.stages.library.parameters import AdditionParameters
 
@@ -400,61 +397,6 @@ def test_unknown_class_is_left_out_or_an_object(tmp_path) -> None:
         add(tmp_path / "in", tmp_path / "d", mapping='[models]\n"a" = "spoon_rest"\n')
 
 
-BOMB = '<!DOCTYPE a [<!ENTITY x "y"><!ENTITY z "&x;&x;&x;">]><robot name="a"><link name="&z;"/></robot>'
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "reason"),
-    [
-        ("chair.urdf", BOMB, "document type or entities"),
-        ("chair.urdf", "<robot", "well-formed"),
-        (
-            "chair.urdf",
-            '<robot><link name="a"><visual><geometry><mesh filename="/etc/passwd"/></geometry></visual></link></robot>',
-            "is not in the folder",
-        ),
-        (
-            "chair.urdf",
-            '<robot><link name="a"><visual><geometry><mesh filename="../secret.obj"/></geometry></visual>'
-            "</link></robot>",
-            "is not in the folder",
-        ),
-        (
-            "chair.urdf",
-            '<robot><link name="a"><visual><geometry><box size="1 nan 1"/></geometry></visual></link></robot>',
-            "is not finite",
-        ),
-        ("chair.urdf", '<robot><link name="a"/><link name="b"/></robot>', "2 root links"),
-        (
-            "chair.urdf",
-            '<robot><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="fixed">'
-            '<parent link="b"/><child link="c"/></joint><joint name="k" type="fixed"><parent link="c"/>'
-            '<child link="b"/></joint></robot>',
-            "circle",
-        ),
-        ("chair.xml", '<mujoco><include file="chair.xml"/><worldbody/></mujoco>', "in a circle"),
-        (
-            "chair.xml",
-            '<mujoco><worldbody><body><geom type="box" size="0 1 1"/></body></worldbody></mujoco>',
-            "without size",
-        ),
-        ("chair.sdf", '<sdf><model name="chair"/></sdf>', "no links"),
-        ("chair.dae", "<COLLADA><asset><unit meter='-1'/></asset></COLLADA>", "unit of -1"),
-        ("chair.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n", "element 9 of 2"),
-        ("chair.stl", "no mesh at all", "no STL"),
-        ("chair.gltf", '{"buffers": [{"uri": "../secret.bin", "byteLength": 4}]}', "is not in the folder"),
-        ("readme.txt", "nothing", "no model files"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path, name, text, reason) -> None:
-    write(tmp_path / "in" / name, text)
-    obj_box(tmp_path / "secret.obj", (1, 1, 1))
-    (tmp_path / "secret.bin").write_bytes(b"abcd")
-    with pytest.raises(BadInput, match=reason) as caught:
-        add(tmp_path / "in", tmp_path / "out", class_name="chair")
-    assert "\n" not in str(caught.value) and caught.value.exit_code == 3
-
-
 def test_links_out_of_the_folder_are_not_followed(tmp_path) -> None:
     secret = obj_box(tmp_path / "secret" / "chair.obj", (1, 1, 1))
     (tmp_path / "in").mkdir()
@@ -583,56 +525,3 @@ def test_the_command_takes_a_folder_and_prints_a_table(tmp_path, capsys) -> None
     assert command_line(twice) == 2 and command_line(["library", "add", "--out", str(out)]) == 2
     assert command_line(["library", "add", str(tmp_path / "nowhere"), "--out", str(out)]) == 3
     assert all(line.startswith("error: ") for line in capsys.readouterr().err.splitlines())
-
-
-SEEDS = {
-    "old_cabinet.urdf": URDF,
-    "hutch.xml": MJCF.format(angle="degree", turn=30, low=-10, high=70)
-    .replace("../renamed/sub/", "")
-    .replace("/></body>", ' group="1"/></body>'),
-    "chair.dae": dae(0.01, "Y_UP", (45.0, 90.0, 50.0)),
-    "box.obj": "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\nf 1 2 4\n",
-    "shelf.sdf": '<sdf version="1.7"><model name="shelf"><link name="a"><visual name="v"><geometry><cylinder>'
-    "<radius>1</radius><length>2</length></cylinder></geometry></visual></link></model></sdf>",
-    "cup.gltf": '{"buffers":[{"uri":"data:;base64,AAAA","byteLength":3}],"bufferViews":[{"buffer":0,"byteLength":3}],'
-    '"accessors":[{"bufferView":0,"count":1,"type":"SCALAR","componentType":5121}],"meshes":[{"primitives":[{}]}]}',
-}
-PIECES = (
-    "",
-    "nan",
-    "-1",
-    "1e400",
-    "99999999999999999999",
-    "0",
-    '"',
-    "<",
-    "/",
-    "../",
-    "\0",
-    "\u20ac",
-    "mesh",
-    "box",
-    "#g",
-)
-
-
-CHANGE = st.tuples(st.floats(0, 1), st.integers(0, 12), st.sampled_from(PIECES))
-
-
-@given(st.sampled_from(sorted(SEEDS)), st.lists(CHANGE, max_size=4))
-@example(name="box.obj", changes=[(0.75, 0, "nan"), (0.9375, 1, "")])  # a face that lost corners
-@settings(max_examples=250, deadline=None)
-def test_damaged_files_are_bad_input_and_nothing_else(tmp_path_factory, name, changes) -> None:
-    text = SEEDS[name]
-    for place, length, piece in changes:
-        start = int(place * len(text))
-        text = text[:start] + piece + text[start + length :]
-    folder = tmp_path_factory.mktemp("damaged")
-    write(folder / "assets.xml", ASSETS)
-    obj_box(folder / "parts" / "carcass.obj", (60.0, 50.0, 80.0))
-    (folder / name).write_text(text, encoding="utf-8")
-    for model in find_models(SourceFolder(folder)):
-        if isinstance(model, SourceModel):
-            with contextlib.suppress(BadInput):
-                groups, _ = grouped(model)
-                assert source_points(groups).shape[1] == 3

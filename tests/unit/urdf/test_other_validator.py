@@ -8,7 +8,7 @@ import pytest
 from scenewright.cli.main import run
 from scenewright.stages.kit.formats.urdf_check import advice, check_urdf
 
-from tests.unit.urdf.test_urdf_file import BROKEN, INERTIA, link, robot
+from tests.bad_input.broken_urdf import BROKEN, INERTIA, link, robot
 
 pytest.importorskip("urdf_validator_main", reason="needs urdf-validator")
 BOX = '<geometry><box size="1 1 1"/></geometry>'

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
 from scenewright.stages.kit.formats.numpy_files import read_arrays
 from scenewright.stages.kit.formats.zip_files import zip_errors
 from scenewright.stages.segment.backends.masks.classes import read_classes, score_of
@@ -59,7 +60,7 @@ def open_source(listing: Listing) -> MaskSource | None:
 
 def _arrays(path: Path) -> set[str]:
     """Return the arrays of a file that are read here. Raises BadInput when they claim more than is held at a time."""
-    with zip_errors(path, HINT), zipfile.ZipFile(path) as archive:
+    with opened(path, hint=HINT) as file, zip_errors(path, HINT), zipfile.ZipFile(file) as archive:
         rows = [row for row in archive.infolist() if row.filename.removesuffix(".npy") in NAMES]
         if sum(row.file_size for row in rows) > LARGEST_FILE:
             raise BadInput(f"unpacks to more than {LARGEST_FILE} bytes", hint="write one file a picture")
