@@ -473,7 +473,7 @@ def test_the_server_refuses_in_words(room: Written) -> None:
     camera = Camera(width=16, height=12, fx=20, fy=20, cx=8, cy=6)
     body, kind = encode_request(SegmentRequest(frame, camera, 0), ("depth",))
     with serving(reference_server()) as address:
-        connection = Connection(address, timeout=5, retries=0, retry_wait=0)
+        connection = Connection(address, timeout=60, retries=0, retry_wait=0)
         assert json.loads(connection.get("/health").body) == {"status": "ok", "protocol": PROTOCOL}
         info = connection.get("/v1/info")
         assert parse_info(info.body, info.content_type).required == ("depth",)
