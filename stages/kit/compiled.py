@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numba import njit
@@ -19,10 +19,16 @@ from numba.core import caching, config, event
 from numba.core.dispatcher import Dispatcher
 from scenewright.stages.kit.progress import shown
 
+Function = TypeVar("Function", bound=Callable[..., Any])
+
 _ours: set[Any] = set()
 """Python functions whose compiled code is kept by what they hold."""
 
 
+@overload
+def compiled(function: Function, /) -> Function: ...
+@overload
+def compiled(*signatures: object, **options: Any) -> Callable[[Function], Function]: ...
 def compiled(*signatures: Any, **options: Any) -> Any:
     """Return what `numba.njit` makes of a function, kept on disk: `@compiled` or `@compiled(parallel=True)`.
 
@@ -32,7 +38,7 @@ def compiled(*signatures: Any, **options: Any) -> Any:
 
     def compile_function(function: Callable[..., Any]) -> Any:
         _ours.add(function)
-        return njit(*signatures, cache=True, **options)(function)
+        return njit(*signatures, cache=True, **options)(function)  # type: ignore[call-overload]
 
     if len(signatures) == 1 and callable(signatures[0]) and not options:
         function, signatures = signatures[0], ()
@@ -113,8 +119,8 @@ class _ShowsCompilation(event.Listener):  # type: ignore[misc]
 
 
 event.register("numba:compile", _ShowsCompilation())
-if not config.CACHE_LOCATOR_CLASSES:
-    config.CACHE_LOCATOR_CLASSES = ",".join(
+if not config.CACHE_LOCATOR_CLASSES:  # type: ignore[attr-defined]
+    config.CACHE_LOCATOR_CLASSES = ",".join(  # type: ignore[attr-defined]
         [f"{place.__module__}.{place.__name__}" for place in (InGivenFolder, BesideTheFile, InUserCache)]
         + [place.__name__ for place in caching.CacheImpl._locator_classes]  # of everybody else's functions
     )
