@@ -41,13 +41,15 @@ $(VENV)/.extras: requirements-extras.lock $(VENV)/.development
 	$(INSTALL) requirements-extras.lock
 	touch $@
 
-NAMES_OF = $$(sed 's/==.*//; s/^/--exclude /' $(1))
+NAMES_OF = $$(cat $(1) | sed 's/==.*//; s/^/--exclude /')
+# Two have no package for Linux on ARM; what needs them says so.
+MARKED = sed -E 's/\+cpu$$//; s/^(pycolmap|embreex)==.*/&; platform_machine != "aarch64"/'
 
 .PHONY: lock
 lock: development ## Write requirements.lock and requirements-dev.lock from what is installed
 	$(PYTHON) -m pip freeze --exclude-editable -r requirements-dev.lock | sed '/^##/,$$d' > requirements-dev.lock.new
 	mv requirements-dev.lock.new requirements-dev.lock
-	$(PYTHON) -m pip freeze --exclude-editable --exclude scenewright $(call NAMES_OF,requirements-dev.lock requirements-extras.lock) | sed 's/+cpu$$//' > requirements.lock
+	$(PYTHON) -m pip freeze --all --exclude-editable --exclude scenewright --exclude pip $(call NAMES_OF,requirements-dev.lock requirements-extras.lock) | $(MARKED) > requirements.lock
 
 # ---- checks -------------------------------------------------------------------------------------------------------
 

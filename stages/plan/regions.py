@@ -102,7 +102,7 @@ class _Shape:
         rays = np.tile(direction, (len(start), 1))
         places, ray, faces = self.mesh.ray.intersects_location(start, rays, multiple_hits=True)
         met: list[list[tuple[float, int]]] = [[] for _ in start]
-        distances = np.linalg.norm(places - start[ray], axis=1)
+        distances = np.linalg.norm(places.reshape(-1, 3) - start[ray], axis=1)  # without a hit trimesh may give (0,)
         for index, distance, owner in zip(ray.tolist(), distances.tolist(), self.owner[faces].tolist(), strict=True):
             met[index].append((distance, owner))
         return met
