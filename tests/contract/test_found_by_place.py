@@ -140,6 +140,7 @@ def test_the_kind_has_a_json_schema_opens_and_is_drawn(tree: Path) -> None:
     assert json.loads(python(tree, "-c", IN_PYTHON)) == ["as <new> as can be", [1.0, 1.0, 1.0], "draw_novelty"]
 
 
+@pytest.mark.slow
 def test_the_report_reads_it_and_shows_its_section(tree: Path) -> None:
     assert "--novelty" in python(tree, "-m", "scenewright", "report", "--help")
     python(tree, "-m", "scenewright", "report", "--novelty", "tests/golden/v1/novelty", "--out", "report")

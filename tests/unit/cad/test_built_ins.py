@@ -157,11 +157,13 @@ def test_a_lump_becomes_a_built_in(kitchen, replace_objects):
     assert parent.source == "object_2"
 
 
+@pytest.mark.slow
 def test_without_built_ins_it_keeps_its_mesh(kitchen, replace_objects):
     entry = next(e for e in replace_objects(*kitchen, built_ins=False).info.replacements if e.node == "object_2")
     assert entry.decision == "mesh"
 
 
+@pytest.mark.slow
 def test_the_thesis_builds_nothing(kitchen, replace_objects):
     entry = next(e for e in replace_objects(*kitchen, method="thesis").info.replacements if e.node == "object_2")
     assert entry.decision == "mesh"

@@ -143,6 +143,7 @@ def test_same_seed_same_bytes(furnished, replace_objects):
         assert first.path(file).read_bytes() == second.path(file).read_bytes()
 
 
+@pytest.mark.slow
 def test_thesis_method_runs_without_refinement(furnished, replace_objects):
     meshes, classes = {k: furnished[0][k] for k in (1, 2, 3)}, furnished[1]
     found = decisions(replace_objects(meshes, classes, method="thesis"))

@@ -128,6 +128,7 @@ def test_what_a_person_cut_is_demonstrated_and_learned_from(tmp_path: Path) -> N
         lambda trial: trial["trial"]["cuts"][0]["shifts"].append([0, 0, 0]),
     ],
 )
+@pytest.mark.slow
 def test_a_recording_that_was_changed_is_refused_in_a_line(
     tmp_path: Path, change: object, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -85,6 +85,7 @@ def test_parameters_out_of_range_are_clipped_not_refused(planner: MotionPlanner)
 
 
 @pytest.mark.parametrize("cell", ["easy", "medium", "hard", "hard_medium_basket", "hard_large_basket"])
+@pytest.mark.slow
 def test_ours_and_the_fixed_layout_solve_the_published_suite(planner: MotionPlanner, cell: str) -> None:
     with PackingWorld(published_instance(cell, 11), planner=planner) as world:
         for proposer in (OwnProposer(), FixedLayout()):

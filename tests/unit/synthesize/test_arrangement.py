@@ -34,8 +34,9 @@ def recipe_for_few_shapes(name: str) -> Recipe:
 
 @pytest.fixture(
     scope="module",
-    params=[(name, 0) for name in recipe_names()]
-    + [pytest.param(("room", seed), marks=pytest.mark.slow) for seed in SEEDS[1:]],
+    params=[("room", 0), ("office", 0)]
+    + [pytest.param(("room", seed), marks=pytest.mark.slow) for seed in SEEDS[1:]]
+    + [pytest.param((name, 0), marks=pytest.mark.slow) for name in recipe_names() if name not in ("room", "office")],
 )
 def arrangement(request: pytest.FixtureRequest, catalogue: Catalogue) -> Arrangement:
     name, seed = request.param
