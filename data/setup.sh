@@ -42,7 +42,7 @@ if [ -n "$python" ]; then
             missing+=("$(basename "$python")-dev")
     fi
 fi
-for library in libusb-1.0:libusb-1.0-0 libgomp:libgomp1 libGL:libgl1; do # of open3d
+for library in libusb-1.0:libusb-1.0-0 libgomp:libgomp1 libGL:libgl1 libEGL:libegl1; do # of open3d
     ldconfig -p 2>/dev/null | grep -q "${library%%:*}\.so" || missing+=("${library#*:}")
 done
 if [ ${#missing[@]} -gt 0 ]; then

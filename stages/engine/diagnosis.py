@@ -14,6 +14,8 @@ from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.engine.model_cache import cache_folder, cached_models
 from scenewright.stages.kit.library_versions import library_version
 
+SYSTEM_LIBRARIES = {"libusb-1.0-0": "usb-1.0", "libgomp1": "gomp", "libgl1": "GL", "libegl1": "EGL"}
+"""Debian's package -> library; open3d loads all of them."""
 CORE = {
     "typer": ("typer", "every command"),
     "pydantic": ("pydantic", "every command"),
@@ -79,8 +81,9 @@ def diagnose() -> list[Check]:
     python = ".".join(map(str, sys.version_info[:3]))
     supported = (3, 11) <= sys.version_info[:2] <= (3, 13)
     checks.append(Check("python", python, "" if supported else "use Python 3.11, 3.12 or 3.13"))
-    usb = ctypes.util.find_library("usb-1.0")
-    checks.append(Check("libusb-1.0-0", usb or "absent", "" if usb else "apt-get install libusb-1.0-0"))
+    for package, library in SYSTEM_LIBRARIES.items():
+        found = ctypes.util.find_library(library)
+        checks.append(Check(package, found or "absent", "" if found else f"open3d: apt-get install {package}"))
     for name, (module, purpose) in CORE.items():
         remedy = "make setup" if checkout() else f"pip install {name}"
         checks.append(_import_check(name, module, f"{purpose}: {remedy}", True))
