@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -24,9 +25,10 @@ KEY_FORMAT = 2
 def library_versions(stage: Stage, parameters: Parameters) -> dict[str, str]:
     """Return the versions of the libraries that decide the step's output, and of what else does so (`versions`).
 
-    Raises MissingDependency when that cannot be found out.
+    Python is one of them: from 3.12 on its `sum` rounds less. Raises MissingDependency when that cannot be found out.
     """
-    found = {name: library_version(name) for name in stage.libraries}
+    found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
+    found |= {name: library_version(name) for name in stage.libraries}
     if stage.versions:
         found.update(importlib.import_module(f"{package_of(stage)}.{stage.versions}").versions(parameters))
     return dict(sorted(found.items()))
