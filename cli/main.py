@@ -99,11 +99,23 @@ def _say_bug(error: Exception) -> int:
     return 1
 
 
-def _check_surroundings() -> None:
+def _leave_lost_folder() -> OSError | None:
+    """Return why the current folder cannot be, once out of it: libraries do not even load there (Python 3.13)."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        os.chdir(os.sep)
+        return error
+    return None
+
+
+def _check_surroundings(lost: OSError | None = None) -> None:
     """Raise MachineFailure where no command can work: in a folder that is gone."""
     from scenewright.schemas.errors import MachineFailure
 
     try:
+        if lost is not None:
+            raise lost
         os.getcwd()
     except OSError as error:
         raise MachineFailure(f"the current folder: {error.strerror}", hint="go to one that is there") from None
@@ -121,6 +133,7 @@ def main() -> None:
 
 
 def _run_and_exit() -> None:
+    lost = _leave_lost_folder()
     from scenewright.cli import streams
     from scenewright.cli.output import say_error
     from scenewright.schemas.errors import ScenewrightError
@@ -130,7 +143,7 @@ def _run_and_exit() -> None:
     try:
         interruption.install()
         interruption.end_with_parent()
-        _check_surroundings()
+        _check_surroundings(lost)
         os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first, warns about its version
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate when busy
         code = run(sys.argv[1:])

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.manifest import Manifest
+from scenewright.schemas.places import resolved
 
 KINDS: dict[str, type[Artifact]] = {}
 Content = TypeVar("Content", bound=Model)
@@ -118,7 +119,7 @@ class Artifact:
         """Role -> where the input stood when this was made. Raises BadInput for what can be no place."""
         records = self.manifest.inputs if self.manifest is not None else ()
         try:
-            return {record.role: (self.root / record.path).resolve() for record in records}
+            return {record.role: resolved(self.root / record.path) for record in records}
         except (OSError, ValueError, RuntimeError) as error:
             raise BadInput(f"{self.root}: an input is named that can be nowhere: {error}") from None
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from functools import cache
 from pathlib import Path
 
@@ -19,6 +21,14 @@ def data_file(name: str) -> Path:
 def checkout() -> Path | None:
     """Return the folder of the checkout that this code is run from; None where it was installed."""
     return HOME if (HOME / "scenewright" / "__init__.py").is_file() else None
+
+
+def resolved(path: Path) -> Path:
+    """Return the path without links. Raises OSError or RuntimeError for a loop of links, whatever the Python."""
+    place = path.resolve()
+    if place.is_symlink():  # from 3.13 on `resolve` stops at a loop and says nothing
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+    return place
 
 
 def import_folder() -> Path:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.outside import file_content, json_of
+from scenewright.schemas.places import resolved
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
 from scenewright.stages.ingest.images import decode_image, usable_color, usable_depth
@@ -92,7 +93,7 @@ def named_file(root: Path, name: Any, where: str) -> Path:
         raise BadInput(f"{where}: {name!r:.60} is no file name")
     path = root / name
     try:
-        inside = not Path(name).is_absolute() and path.resolve().is_relative_to(root.resolve())
+        inside = not Path(name).is_absolute() and resolved(path).is_relative_to(root.resolve())
     except (OSError, RuntimeError):  # a loop of links, a name too long
         inside = False
     if not inside:
