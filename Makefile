@@ -63,7 +63,7 @@ test-all: extras ## Run the slow tests and those of the extras too
 	$(PYTEST) -m ''
 
 # The hash of a commit is as good as a drawn number: of SLICES slices, twelve landings run nearly all.
-SLICES := 4
+SLICES := 5
 test-slice: extras ## Run the slice of the slow tests that the commit's hash draws
 	$(PYTEST) -m slow --slice $$((16#$$(git rev-parse HEAD | cut -c1-7) % $(SLICES)))/$(SLICES)
 
