@@ -54,7 +54,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_a_needle_is_rendered_found_and_judged(folder: Path) -> None:
     scene, needle, figures = (str(folder / name) for name in ("scene", "needle", "figures"))
-    assert run(["suture", "needle", "--sequence", scene, "--out", needle, QUIET]) == 0
+    assert run(["suture", "needle", "--sequence", scene, "--segmentation", "spoiled", "--out", needle, QUIET]) == 0
     assert run(["suture", "evaluate", "--scene", scene, "--needle", needle, "--out", figures, QUIET]) == 0
     truth = SutureSceneFile.read(folder / "scene" / "scene.json").views[0]
     found = SutureNeedleFile.read(folder / "needle" / "needle.json")
