@@ -22,24 +22,28 @@ choose_python() {
 }
 
 choose_python
+package="$(basename "${python:-python3}")"
 [ -n "$python" ] || [ -z "${BASE_PYTHON:-}" ] || stop "$BASE_PYTHON is no Python 3.11, 3.12 or 3.13: give one by BASE_PYTHON"
 if [ -e "$venv/bin/python" ]; then
     there="$(version_of "$venv/bin/python" || true)"
     [ -n "$there" ] || stop "$venv/bin/python does not run: remove the folder $venv"
-    [ "$there" = "$(version_of "${python:-false}")" ] ||
-        stop "$venv is of Python $there: remove it, or name another folder (make VENV=folder ...)"
+    # Whoever chose a Python once need not name it again.
+    case "${BASE_PYTHON:+$(version_of "$python")}" in
+    "" | "$there") python="$venv/bin/python" ;;
+    *) stop "$venv is of Python $there: remove it, or name another folder (make VENV=folder ...)" ;;
+    esac
 fi
 
 # What apt has to bring: packages by what shows that they are there.
 missing=()
 [ -n "$python" ] || missing+=(python3 python3-venv)
 if [ -n "$python" ]; then
-    "$python" -c 'import ensurepip, venv' 2>/dev/null || missing+=("$(basename "$python")-venv")
+    "$python" -c 'import ensurepip, venv' 2>/dev/null || missing+=("$package-venv")
     # pybullet has a wheel for 3.11 alone and is compiled for the others.
     if [ "$(version_of "$python")" != 3.11 ]; then
         command -v c++ >/dev/null || missing+=(g++)
         "$python" -c 'import os, sysconfig; open(os.path.join(sysconfig.get_path("include"), "Python.h"))' 2>/dev/null ||
-            missing+=("$(basename "$python")-dev")
+            missing+=("$package-dev")
     fi
 fi
 for library in libusb-1.0:libusb-1.0-0 libgomp:libgomp1 libGL:libgl1 libEGL:libegl1; do # of open3d
@@ -63,7 +67,7 @@ NEEDED=5 # GB
 free=$(($(df -Pk "$(dirname "$venv")" | awk 'NR == 2 {print $4}') / 1000000))
 [ -e "$venv/.installed" ] || [ "$free" -ge "$NEEDED" ] || stop "$NEEDED GB are needed for $venv, $free are free there"
 
-"$python" -m venv "$venv" || stop "$venv could not be made: see above"
+[ "$python" = "$venv/bin/python" ] || "$python" -m venv "$venv" || stop "$venv could not be made: see above"
 pip() {
     "$venv/bin/python" -m pip --disable-pip-version-check --no-input install --quiet --no-warn-script-location "$@" ||
         stop "pip could not install: see above. Behind a proxy set HTTPS_PROXY; without a network see docs/INSTALL.md"

@@ -87,7 +87,10 @@ def test_no_system_libraries(machine: Machine) -> None:
 
 def test_an_environment_of_another_python(machine: Machine) -> None:
     machine.python("3.12", machine.folder / ".venv/bin", "python")
-    assert ".venv is of Python 3.12: remove it" in machine.set_up()
+    assert ".venv is of Python 3.12: remove it" in machine.set_up(BASE_PYTHON="python3")
+    machine.python("3.11", machine.folder / ".venv/bin", "python")
+    machine.python("3.12")
+    assert "pip could not install" in machine.set_up()  # used as it is, unless another is named
     machine.program("python", "exit 127", machine.folder / ".venv/bin")
     assert ".venv/bin/python does not run" in machine.set_up()
 
