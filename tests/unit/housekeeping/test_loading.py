@@ -228,9 +228,9 @@ def test_type_checkers_know_what_is_loaded(run_folder: Path, tmp_path: Path) -> 
     subprocess.run(wheel, check=True, capture_output=True)
     (built,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(built) as archive:
-        held = archive.namelist()
-        archive.extractall(tmp_path / "installed")
-    assert "scenewright/py.typed" in held
+        assert "scenewright/py.typed" in archive.namelist()
+    install = [sys.executable, "-m", "pip", "install", "--no-deps", "-q", "--target", tmp_path / "installed", built]
+    subprocess.run(install, check=True, capture_output=True)
     script = tmp_path / "user.py"
     script.write_text(
         "from scenewright import as_networkx, as_tables, load, payload\n"
