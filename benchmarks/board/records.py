@@ -49,6 +49,8 @@ class Line(Model):
     """Whether both checkouts were as committed."""
     board: str
     """Commit of the checkout that judged."""
+    day: str
+    """When it was measured."""
     figures: dict[str, float] = {}
     facts: dict[str, str] = {}
     """In words: why a step ended without an artifact, which task it was."""

@@ -6,6 +6,7 @@ import hashlib
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from benchmarks.board.inputs import HEADLINE, LADDER, PUBLIC, RUNGS, Generator, RoomInputs
@@ -48,6 +49,7 @@ class Setting:
                 "digest": method.digest,
                 "clean": method.clean and self.board.clean,
                 "board": self.board.commit,
+                "day": datetime.now(UTC).date().isoformat(),
                 **told,
             }
         )
