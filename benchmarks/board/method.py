@@ -67,6 +67,11 @@ class Method:
         return self._git("rev-parse", "--short=10", "HEAD")
 
     @cached_property
+    def committed(self) -> str:
+        """When the commit of the checkout was made."""
+        return self._git("show", "--no-patch", "--format=%cI", "HEAD")
+
+    @cached_property
     def clean(self) -> bool:
         """Whether the files that git knows, and new ones of the method, are those of the commit."""
         return not self._git("status", "--porcelain", "--", "stages", "schemas", "cli", "scenewright", "benchmarks")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -43,12 +44,16 @@ class Line(Model):
     key: str
     commit: str
     """Of the method."""
+    committed: str
+    """When that commit was made: versions are told in this order."""
     digest: str
     """Of the method."""
     clean: bool
     """Whether both checkouts were as committed."""
     board: str
     """Commit of the checkout that judged."""
+    judge: str
+    """Sixteen digits of the code that judged: figures of two judges do not compare."""
     day: str
     """When it was measured."""
     figures: dict[str, float] = {}
@@ -58,7 +63,13 @@ class Line(Model):
     """Processor seconds of each step."""
 
 
-def key_of(trial: Trial, method: str, arm: object, judges: Iterable[str] = JUDGES) -> str:
+@cache
+def judge_digest(judges: tuple[str, ...] = JUDGES) -> str:
+    """Return sixteen digits of the code that judges, as it was when this process began."""
+    return code_of(*judges, also=("benchmarks",)).digest[:16]
+
+
+def key_of(trial: Trial, method: str, arm: object, judge: str) -> str:
     """Return what a trial is kept under: sixteen digits over the trial, its inputs, the method, the arm, the judge."""
     scripts = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(SCRIPTS.glob("*.py"))}
     facts = {
@@ -66,7 +77,7 @@ def key_of(trial: Trial, method: str, arm: object, judges: Iterable[str] = JUDGE
         "inputs": {"board": BOARD, "generator": GENERATOR, "scripts": scripts},
         "method": method,
         "arm": arm,
-        "judge": code_of(*judges, also=("benchmarks",)).digest,
+        "judge": judge,
     }
     return hashlib.sha256(canonical_json(facts).encode()).hexdigest()[:16]
 

@@ -13,7 +13,7 @@ from benchmarks.board.inputs import HEADLINE, LADDER, PUBLIC, RUNGS, Generator, 
 from benchmarks.board.judge import judge
 from benchmarks.board.method import Method, MethodFailed
 from benchmarks.board.reconstruct import ARMS, reconstruct
-from benchmarks.board.records import Line, Trial, key_of
+from benchmarks.board.records import Line, Trial, judge_digest, key_of
 
 PUBLIC_PART, SEALED_PART = "public", "sealed"
 OURS, THESIS, REFERENCE = "ours", "thesis", "reference"
@@ -44,11 +44,13 @@ class Setting:
         return Line.model_validate(
             {
                 "trial": trial,
-                "key": key_of(trial, method.digest, asdict(ARMS[arm])),
+                "key": key_of(trial, method.digest, asdict(ARMS[arm]), judge_digest()),
                 "commit": method.commit,
+                "committed": method.committed,
                 "digest": method.digest,
                 "clean": method.clean and self.board.clean,
                 "board": self.board.commit,
+                "judge": judge_digest(),
                 "day": datetime.now(UTC).date().isoformat(),
                 **told,
             }
@@ -112,7 +114,7 @@ def _measure(setting: Setting, trials: Mapping[Trial, tuple[Method, str]], room:
     """Yield the line of each trial of one room and rung, kept or measured."""
     inputs: RoomInputs | None = None
     for trial, (method, arm) in trials.items():
-        kept = setting.read_kept(key_of(trial, method.digest, asdict(ARMS[arm])))
+        kept = setting.read_kept(key_of(trial, method.digest, asdict(ARMS[arm]), judge_digest()))
         if kept is None:
             rung = RUNGS[trial.case]
             inputs = inputs or setting.generator.room(room, rung)
