@@ -56,9 +56,8 @@ def run(asked: argparse.Namespace) -> int:
     for name in asked.shards:
         if name not in shards:
             raise UsageError(f"no shard {name!r}", hint=f"there are {', '.join(shards)}")
-    say(
-        f"method {setting.method.commit}, digest {setting.method.digest}{'' if setting.method.clean else ', not clean'}"
-    )
+    clean = setting.method.clean and setting.board.clean  # before anything runs: what is edited meanwhile is not it
+    say(f"method {setting.method.commit}, digest {setting.method.digest}{'' if clean else ', uncommitted changes'}")
     setting.generator.prepare()
     code = 0
     for name in asked.shards or shards:
@@ -66,7 +65,7 @@ def run(asked: argparse.Namespace) -> int:
         written = [note_look(setting.method.digest, setting.method.commit)] if name.startswith("sealed") else []
         lines, problems = measure_shard(setting, units, lambda text, name=name: say(f"{name}: {text}"), asked.jobs)
         say(f"{name}: {len(lines)} lines, {(time.monotonic() - start) / 60:.1f} min")
-        if problems or not setting.method.clean or not setting.board.clean:
+        if problems or not clean:
             code = UNFINISHED if problems else code
             why = "; ".join(problems) if problems else "a checkout holds uncommitted changes"
             say(f"{name}: not recorded: {why}")
