@@ -18,12 +18,21 @@ from scenewright.schemas.errors import BadInput, ScenewrightError
 from benchmarks.board.figures import Version, rooms_figures, versions_figures
 from benchmarks.board.inputs import BOARD, GENERATOR
 from benchmarks.board.looks import LOOKS, Look, read_looks
-from benchmarks.board.records import RECORDS, Line, read_lines
+from benchmarks.board.records import RECORDS, read_lines
 from benchmarks.tabulation import Figure
 
 PUBLISHED = RECORDS.parent / "board.json"
 PLOT = RECORDS.parents[1] / "images" / "board.svg"
 MACHINE = "two cores"
+ABOUT = {
+    "simulated": "rooms, walks, pictures and noisy depth; masks are the true ones with lasting errors at a detector's "
+    "rates on real frames; in `everything` depth bends, poses are estimated, the library lacks the rooms' styles and "
+    "sizes are wrong by up to a fifth. Real logs are recorded",
+    "knows": "Frames, masks, a library",
+    "does_not_show": "How it works with a detector's own masks in a room that people live in: the errors of the masks "
+    "have the rates of real ones, not their shapes. Long walks and large pictures: forty frames of 320 x 240 a room. "
+    "Public rooms have been seen; sealed ones are of the same six recipes.",
+}
 SHOWN_OVER_VERSIONS = ("pq", "support_f1", "functional", "at_rest_of_true", "found_large")
 
 
@@ -55,13 +64,7 @@ def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, A
         "commit": newest.commit,
         "machine": MACHINE,
         "command": "make board",
-        "simulated": "rooms, walks, pictures and noisy depth; masks are the true ones with lasting errors at a detector's "
-        "rates on real frames; in `everything` depth bends, poses are estimated, the library lacks the rooms' styles and "
-        "sizes are wrong by up to a fifth. The part of real logs is of recorded logs",
-        "knows": "Frames, masks, a library",
-        "does_not_show": "How it works with a detector's own masks in a room that people live in: the errors of the masks "
-        "have the rates of real ones, not their shapes. Long walks and large pictures: forty frames of 320 x 240 a room. "
-        "Public rooms have been seen; sealed ones are of the same six recipes.",
+        **ABOUT,
         "notes": f"Board {BOARD}: rooms by the generator of {GENERATOR}. Looks at sealed rooms: {len(looks)}, of "
         f"{len({look.digest for look in looks})} methods. Judged by {len(judges)} version(s) of the measures: "
         f"{', '.join(judges)}.",
@@ -128,11 +131,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     draw(versions_figures(versions), versions, PLOT)
     print(f"{PUBLISHED}: `make figures` shows it", file=sys.stderr)
     return 0
-
-
-def lines_of(versions: Sequence[Version]) -> list[Line]:
-    """Return all lines of all versions."""
-    return [line for version in versions for line in version.lines]
 
 
 if __name__ == "__main__":
