@@ -193,13 +193,13 @@ def of_physics(
     seen = {entry.name for entry in room.evaluated(things_only=True)}
     true = loose_things(room.graph) & seen
     rest, of_true = len(stay & found.keys()), len(true)
-    showing = {name for name, shows in found.items() if shows in true}
+    standing = {found[name] for name in stay & found.keys()} & true  # one that came in two pieces counts once
     return _known(
         {
             "loose_true": float(of_true),
             "loose_found": float(len(found)),
             "at_rest_count": float(rest),
-            "at_rest_of_true": _share(len(stay & showing), of_true),
+            "at_rest_of_true": _share(len(standing), of_true),
             "at_rest_of_found": _share(rest, len(found)),
             "held_of_found": _share(len(found.keys() - free), len(found)),
             "colliding_of_found": _share(len(struck & found.keys()), len(found)),
