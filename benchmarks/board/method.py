@@ -10,13 +10,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.errors import BadInput, MachineFailure, UsageError
+from scenewright.stages.engine.interruption import PARENT_VARIABLE
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 STEPS = ("poses", "segment", "fuse", "graph", "cad", "urdf", "plan")
 """What the digest of a method covers; the generator of the rooms is no part of it."""
 EMPTY = 4
 """Exit code of a step whose artifact was written with another outcome than `ok`."""
+NOT_OF_THE_METHOD = (2, 5, 6, 130)
+"""Exit codes of a command that was not understood, lacks a library, met a full or busy machine, or was interrupted."""
 ASK_FOR_DIGESTS = (
     "import sys; from scenewright.stages.engine.code.digests import step_code; "
     "from scenewright.stages.engine.discovery import stage_by_name; "
@@ -41,7 +44,8 @@ class Method:
     def run(self, command: str, out: Path, *words: object) -> float:
         """Run a command that writes `out`; return its processor seconds, 0 where it was up to date already.
 
-        An artifact without content is a result too. Raises MethodFailed with the last line that the command said.
+        An artifact without content is a result too. Raises MethodFailed with the last line that the command said,
+        MachineFailure where that is no fault of the method.
         """
         before = (out / "manifest.json").stat().st_mtime_ns if (out / "manifest.json").is_file() else 0
         full = [*self._program(), *command.split(), *map(str, words), "--out", str(out), "--quiet"]
@@ -50,6 +54,8 @@ class Method:
         spent = os.times()
         if done.returncode not in (0, EMPTY):
             said = (done.stderr.strip() or done.stdout.strip() or "nothing was said").splitlines()[-1]
+            if done.returncode in NOT_OF_THE_METHOD or done.returncode < 0:
+                raise MachineFailure(f"{command} ended with {done.returncode}: {said}", hint="measure it again")
             raise MethodFailed(command, done.returncode, said)
         seconds = spent.children_user + spent.children_system - start.children_user - start.children_system
         return round(seconds, 2) if (out / "manifest.json").stat().st_mtime_ns != before else 0.0
@@ -59,7 +65,7 @@ class Method:
         return [sys.executable, "-P", "-m", "scenewright" if named else "cli"]
 
     def _environment(self) -> dict[str, str]:
-        return {**os.environ, "PYTHONPATH": str(self.checkout)}
+        return {**os.environ, "PYTHONPATH": str(self.checkout), PARENT_VARIABLE: str(os.getpid())}
 
     @cached_property
     def commit(self) -> str:

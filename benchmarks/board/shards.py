@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 
 from scenewright.schemas.errors import ScenewrightError
+from scenewright.stages.engine.interruption import PARENT_VARIABLE, end_with_parent
 
 from benchmarks.board import others, real_logs, rooms, tasks
 from benchmarks.board.records import Line
@@ -62,8 +63,9 @@ def measure_shard(
     """Return the lines of all units, and what failed in words: a unit that fails leaves the others alone."""
     lines: list[Line] = []
     problems: list[str] = []
-    os.environ.update({"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"})
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    own = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", PARENT_VARIABLE: str(os.getpid())}
+    os.environ.update(own)
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=end_with_parent) as pool:
         waiting = {pool.submit(measure_unit, setting, unit): unit for unit in units}
         for number, future in enumerate(as_completed(waiting), start=1):
             found, problem = future.result()
