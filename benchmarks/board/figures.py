@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from benchmarks.board.records import Line, by_case
 from benchmarks.board.statistics import Spread, over_rooms, paired
 from benchmarks.tabulation import Figure
@@ -135,6 +137,24 @@ def versions_figures(versions: Sequence[Version]) -> dict[str, Figure]:
                 figures |= differences(f"{version.commit} less {before}/versions/{part}/{case}", own, first[group])
             first.setdefault(group, own)
     return figures
+
+
+def line_for_a_lab(lines: Sequence[Line]) -> str:
+    """Return what a lab wants to know of rooms under one condition, in one sentence. `lines`: one arm's, a room each."""
+
+    def total(name: str) -> float:
+        return sum(line.figures.get(name, 0.0) for line in lines)
+
+    large = max(total("things_large"), 1.0)
+    found, named, standing = (10 * total(f"{name}_count_large") / large for name in ("found", "named", "standing"))
+    off = [line.figures["centre_off_mm"] for line in lines if "centre_off_mm" in line.figures]
+    minutes = [value for line in lines if (value := value_of(line, "minutes")) is not None]
+    return (
+        f"of ten large things {found:.1f} are found, {named:.1f} named right, {standing:.1f} stand where they stood; "
+        f"{total('false_things') / max(len(lines), 1):.1f} false things a room; "
+        f"{float(np.median(off)) if off else float('nan'):.0f} mm off; "
+        f"{float(np.mean(minutes)) if minutes else float('nan'):.1f} minutes of a processor"
+    )
 
 
 def shown(spread: Spread, unit: str) -> Figure:

@@ -15,10 +15,11 @@ from typing import Any
 
 from scenewright.schemas.errors import BadInput, ScenewrightError
 
-from benchmarks.board.figures import Version, rooms_figures, versions_figures
+from benchmarks.board.figures import Version, line_for_a_lab, rooms_figures, versions_figures
 from benchmarks.board.inputs import BOARD, GENERATOR
 from benchmarks.board.looks import LOOKS, Look, read_looks
-from benchmarks.board.records import RECORDS, read_lines
+from benchmarks.board.records import RECORDS, Line, by_case, read_lines
+from benchmarks.board.rooms import PUBLIC_PART, SEALED_PART
 from benchmarks.tabulation import Figure
 
 PUBLISHED = RECORDS.parent / "board.json"
@@ -69,7 +70,7 @@ def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, A
         f"{len({look.digest for look in looks})} methods. Judged by {len(judges)} version(s) of the measures: "
         f"{', '.join(judges)}.",
         "figures": {name: asdict(figure) for name, figure in sorted(figures.items())},
-        "rows": {"looks": looks_rows(looks)},
+        "rows": {"looks": looks_rows(looks), "lines": lab_rows(newest.lines)},
     }
 
 
@@ -79,6 +80,17 @@ def looks_rows(looks: Sequence[Look]) -> dict[str, Any]:
         "columns": ["day", "method", "commit", "who"],
         "rows": [[look.day, look.digest, look.commit, look.who] for look in looks],
     }
+
+
+def lab_rows(lines: Sequence[Line]) -> dict[str, Any]:
+    """Return a sentence for each condition of the generated rooms, and for each real log."""
+    rows = [
+        [f"{part} rooms, {case}, {arm}", line_for_a_lab(found)]
+        for (part, case, arm), found in sorted(by_case(lines).items())
+        if part in (PUBLIC_PART, SEALED_PART)
+    ]
+    rows += [[f"{line.trial.seed}, {line.trial.case}", line.facts["line"]] for line in lines if "line" in line.facts]
+    return {"columns": ["where", "in one line"], "rows": rows}
 
 
 def text_of(content: Mapping[str, Any]) -> str:
