@@ -140,7 +140,7 @@ def versions_figures(versions: Sequence[Version]) -> dict[str, Figure]:
 
 
 def line_for_a_lab(lines: Sequence[Line]) -> str:
-    """Return what a lab wants to know of rooms under one condition, in one sentence. `lines`: one arm's, a room each."""
+    """Return what a lab wants to know of rooms under one condition, in a sentence. `lines`: of one arm, one a room."""
 
     def total(name: str) -> float:
         return sum(line.figures.get(name, 0.0) for line in lines)
