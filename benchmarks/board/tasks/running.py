@@ -13,10 +13,10 @@ import numpy as np
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.plan import PlanFile
 from scenewright.schemas.sequence import Sequence
-from scenewright.stages.evaluate import EvaluateParameters, TrueRoom, load_truth
+from scenewright.stages.evaluate import load_truth
 
 from benchmarks.board.method import Method, MethodFailed
-from benchmarks.board.tasks.carrying import Carried, Counterparts, carry, counterparts
+from benchmarks.board.tasks.carrying import OPTIONS, Carried, Counterparts, carry, counterparts
 from benchmarks.board.tasks.drawing import Task, draw_tasks
 from benchmarks.board.tasks.room_facts import RoomFacts, room_facts
 from benchmarks.board.tasks.true_end import Ending, read_ending, which_hold
@@ -24,7 +24,7 @@ from benchmarks.steps import opened
 
 EYES = ("camera", "true")
 """What the robot sees by; with `true` it is told how things stand before it acts."""
-CHEAP = ("--video-rate", "0", "--image-width", "64")
+CHEAP = ("--video-rate", 0, "--image-width", 64)
 NOT_IN_MAP, NOT_USABLE, NO_SCENE, SOMETHING_ELSE = "not_in_map", "not_usable", "no_scene", "something_else"
 """Kinds of failure beside those of the plan: the map lacks a thing; it has it, but not as something that can be
 carried, or without its doors; there is no scene; the plan went well by its own account, and the goal does not hold."""
@@ -35,26 +35,19 @@ class TaskRoom:
     """A generated room whose tasks are tried."""
 
     name: str
-    log: Path
-    """RGB-D with poses."""
     truth: Path
     """Artifact `ground_truth` with `room/`."""
-    library: Path
-    """Artifact `cad_library`."""
-    segmentation: tuple[str, ...]
-    """Options of `segment`: where masks come from, such as `--backend masks --masks FOLDER`."""
     seed: int
-    """Of the tasks that are drawn, and of the steps."""
+    """Of the tasks that are drawn, and of the plans."""
 
 
 @dataclass(frozen=True)
-class Reconstruction:
-    """A room as the method made it."""
+class MadeScene:
+    """Artifacts that a method made of a room's log."""
 
-    root: Path
-    """Artifacts by kind: `sequence`, `panoptic_map`, `interactive_scene` and what lies between."""
-    seconds: dict[str, float]
-    """Command -> processor seconds, 0 where it was up to date."""
+    sequence: Path
+    panoptic_map: Path
+    scene: Path
 
 
 @dataclass(frozen=True)
@@ -87,40 +80,21 @@ class TaskRecord:
     """Processor seconds of the plan and its execution."""
 
 
-def facts_of(truth: Path) -> tuple[RoomFacts, TrueRoom]:
-    """Return what the tasks of a room are drawn from, and the room in its log's world. Raises BadInput."""
+def facts_of(truth: Path) -> RoomFacts:
+    """Return what the tasks of a room are drawn from. Raises BadInput for a truth that can't be read."""
     artifact = opened(GroundTruth, truth)
-    room = load_truth(artifact, np.eye(4), EvaluateParameters.model_validate({}).minimum_visible_points)
-    seen = [entry.name for entry in room.evaluated()]
-    return room_facts(artifact.path("room"), artifact.graph, seen), room
+    room = load_truth(artifact, np.eye(4), OPTIONS.minimum_visible_points)
+    return room_facts(artifact.path("room"), artifact.graph, [entry.name for entry in room.evaluated()])
 
 
-def reconstruct(method: Method, room: TaskRoom, root: Path) -> Reconstruction:
-    """Make a scene of a room's log by a method, each artifact in a folder of `root`. Raises MethodFailed."""
-    mapped, seed = ("--panoptic-map", root / "panoptic_map"), ("--seed", room.seed)
-    given: dict[str, tuple[object, ...]] = {
-        "ingest": ("sequence", "--log", room.log),
-        "segment": ("segments", "--sequence", root / "sequence", *room.segmentation, *seed),
-        "fuse": ("panoptic_map", "--sequence", root / "sequence", "--segments", root / "segments"),
-        "graph": ("contact_graph", *mapped),
-        "cad": ("cad_scene", "--contact-graph", root / "contact_graph", *mapped, "--library", room.library),
-        "urdf": ("interactive_scene", "--cad-scene", root / "cad_scene"),
-    }
-    seconds = {name: method.run(name, root / str(out), *words) for name, (out, *words) in given.items()}
-    return Reconstruction(root, seconds)
-
-
-def run_tasks(
-    method: Method, room: TaskRoom, made: Reconstruction | None, scratch: Path, eyes: str
-) -> Iterator[TaskRecord]:
+def run_tasks(method: Method, room: TaskRoom, made: MadeScene | None, scratch: Path, eyes: str) -> Iterator[TaskRecord]:
     """Yield what came of each task of a room, by some eyes. Plans are written to folders of `scratch`.
 
     `made` None: the method makes no scene of this room, and fails every task. Raises BadInput for a truth that can't
     be read, or artifacts of the method that this program can't read.
     """
-    facts, _ = facts_of(room.truth)
     known = None if made is None else _counterparts(room, made)
-    for number, task in enumerate(draw_tasks(facts, room.seed)):
+    for number, task in enumerate(draw_tasks(facts_of(room.truth), room.seed)):
         carried = Carried((), ()) if known is None else carry(task, known)
         if made is None or not carried.literals:
             found = _nothing_planned()
@@ -129,12 +103,10 @@ def run_tasks(
         yield _record(room, number, task, eyes, carried, found, has_scene=known is not None)
 
 
-def _counterparts(room: TaskRoom, made: Reconstruction) -> Counterparts:
-    sequence = opened(Sequence, made.root / "sequence")
-    pose = np.array(sequence.info.gravity.world_from_log)
-    least = EvaluateParameters.model_validate({}).minimum_visible_points
-    truth = load_truth(opened(GroundTruth, room.truth), pose, least)
-    return counterparts(truth, made.root / "panoptic_map", made.root / "interactive_scene")
+def _counterparts(room: TaskRoom, made: MadeScene) -> Counterparts:
+    pose = np.array(opened(Sequence, made.sequence).info.gravity.world_from_log)
+    truth = load_truth(opened(GroundTruth, room.truth), pose, OPTIONS.minimum_visible_points)
+    return counterparts(truth, made.panoptic_map, made.scene)
 
 
 @dataclass(frozen=True)
@@ -153,10 +125,10 @@ def _nothing_planned() -> _Found:
 
 
 def _planned(
-    method: Method, room: TaskRoom, made: Reconstruction, literals: tuple[str, ...], out: Path, eyes: str
+    method: Method, room: TaskRoom, made: MadeScene, literals: tuple[str, ...], out: Path, eyes: str
 ) -> _Found:
     goal = [word for literal in literals for word in ("--goal", literal)]
-    given = ("--scene", made.root / "interactive_scene", "--ground-truth", room.truth, *goal, "--eyes", eyes)
+    given: tuple[object, ...] = ("--scene", made.scene, "--ground-truth", room.truth, *goal, "--eyes", eyes)
     try:
         seconds = method.run("plan", out, *given, *CHEAP, "--seed", room.seed)
     except MethodFailed as failed:

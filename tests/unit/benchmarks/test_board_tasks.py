@@ -17,9 +17,11 @@ from scenewright.stages.kit.motion.recording import Snapshot
 from scenewright.stages.plan.execution_log import write_execution
 from scenewright.stages.plan.pictures import picture_camera
 
+from benchmarks.board.records import Line, Trial
 from benchmarks.board.tasks.carrying import Counterparts, carry, one_to_one
 from benchmarks.board.tasks.drawing import Task, draw_tasks, load_tray
 from benchmarks.board.tasks.figures import failure_counts, task_shares
+from benchmarks.board.tasks.measuring import records_of, told_of
 from benchmarks.board.tasks.room_facts import RoomFacts, room_facts
 from benchmarks.board.tasks.running import TaskRecord
 from benchmarks.board.tasks.true_end import Ending, read_ending, which_hold
@@ -226,6 +228,16 @@ def test_shares_are_by_room_and_what_the_map_lacks_is_no_success() -> None:
     assert (shares["camera/literals"].hits, shares["camera/literals"].tries) == (3, 6)
     assert shares["camera/success in the map"].by_room == {"a": 1.0, "b": 0.0}
     assert failure_counts(records) == {"camera": {"not_in_map": 2, "no_path": 1}}
+
+
+def test_a_line_of_a_room_holds_the_records_of_its_tasks() -> None:
+    records = [record("a", (True, True)), replace(record("a", (False,), "not_in_map", ("can_6",)), task=1)]
+    told = told_of(records, {"fuse": 5.0})
+    assert told["figures"]["success"] == 0.5 and told["figures"]["failed by not_in_map"] == 1.0
+    assert told["seconds"] == {"fuse": 5.0, "plan": 18.0}
+    who = {"key": "0", "commit": "0", "digest": "0", "clean": True, "board": "0", "day": "2026-11-29"}
+    line = Line.model_validate({"trial": Trial(part="tasks", case="camera", seed="a", arm="ours"), **who, **told})
+    assert records_of([line]) == records
 
 
 def test_nothing_measured_is_no_figure() -> None:
