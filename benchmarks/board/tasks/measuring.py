@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
+from pydantic import TypeAdapter
 from scenewright.schemas.base import canonical_json
 
 from benchmarks.board.inputs import RUNGS, RoomInputs
@@ -29,6 +29,8 @@ JUDGES = (
     "benchmarks.board.inputs:Generator",
 )
 """What of this checkout decides what a room's tasks come to."""
+RECORD = TypeAdapter(TaskRecord)
+"""Reads the record of a task."""
 
 
 def measure_room(setting: Setting, number: int) -> Iterator[Line]:
@@ -91,8 +93,4 @@ def told_of(records: list[TaskRecord], seconds: dict[str, float], problem: str =
 def records_of(lines: Iterable[Line]) -> list[TaskRecord]:
     """Return the records of the tasks in lines of this part."""
     texts = [text for line in lines for name, text in sorted(line.facts.items()) if name.isdigit()]
-    return [TaskRecord(**{key: _frozen(value) for key, value in json.loads(text).items()}) for text in texts]
-
-
-def _frozen(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
+    return [RECORD.validate_json(text) for text in texts]
