@@ -259,11 +259,8 @@ scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTI
 .PHONY: bench-planning
 # 200 reporting seeds a query set (QUICK=1: 10); SCENE is an interactive scene (or several), for the case reconstructed_room.
 SCENE ?= $(OUTPUTS)/demo/interactive_scene
-PLANNING := $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
 bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)
-	$(EXPERIMENT) planning_motion $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(PLANNING)/motion $(ASKED)
-	$(EXPERIMENT) planning_tamp --out $(PLANNING)/tamp $(ASKED) $(if $(PUBLISH),--publish)
-	$(EXPERIMENT) gather $(PLANNING)
+	$(EXPERIMENT) planning_motion $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: tidy
 # Fast: 30 reporting seeds a tier, minutes of one core; seen: images before each action, a second each;

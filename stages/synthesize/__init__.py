@@ -9,11 +9,8 @@ from scenewright.stages.kit.exports import exported
 if TYPE_CHECKING:
     from scenewright.stages.synthesize.arrangement import Arrangement, arrange, world_meshes
     from scenewright.stages.synthesize.furniture import Catalogue
-    from scenewright.stages.synthesize.placement import PlacedObject
     from scenewright.stages.synthesize.recipes import load_recipe, recipe_names
     from scenewright.stages.synthesize.seen_surface import SeenSurface
     from scenewright.stages.synthesize.shell import build_room
-    from scenewright.stages.synthesize.truth import object_boxes, scene_bodies, true_graph
-    from scenewright.stages.synthesize.viewpoints import blocked_floor
 
 __getattr__ = exported(__name__)

@@ -1,5 +1,0 @@
-ROOMS = 12
-
-
-def measure_room(setting, number):
-    yield from ()
