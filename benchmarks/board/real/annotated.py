@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,12 +47,18 @@ def measure_annotated(method: Method, log_name: str, data: Path, scratch: Path) 
     log = LOGS[log_name].within(data)
     run = run_chain(method, log, scratch / log.name, scratch / "cad_library", masks_of(data))
     sequence = run.made(Sequence) or own_sequence(log, scratch / log.name)
-    facts = {"frames": sequence.info.frame_count, "seconds": run.seconds, "failed": run.failed}
-    settling = settling_of(run.made(InteractiveScene))
-    if log.name not in ANNOTATED:
-        return AnnotatedRecord(log.name, annotated=False, settling=settling, **facts)
+    record = AnnotatedRecord(
+        log.name,
+        annotated=log.name in ANNOTATED,
+        settling=settling_of(run.made(InteractiveScene)),
+        frames=sequence.info.frame_count,
+        seconds=run.seconds,
+        failed=run.failed,
+    )
+    if not record.annotated:
+        return record
     things, supports = judge_run(annotated_room(log.name, sequence, scratch / log.name), run)
-    return AnnotatedRecord(log.name, annotated=True, things=things, supports=supports, settling=settling, **facts)
+    return replace(record, things=things, supports=supports)
 
 
 def own_sequence(log: Log, folder: Path) -> Sequence:

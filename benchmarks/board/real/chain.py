@@ -9,6 +9,7 @@ from pathlib import Path
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.cad_scene import CadScene
 from scenewright.schemas.contact_graph import ContactGraph
+from scenewright.schemas.errors import BadInput
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.sequence import Sequence
@@ -34,6 +35,8 @@ FOLDERS: dict[type[Artifact], str] = {
     CadScene: "cad_scene",
     InteractiveScene: "interactive_scene",
 }
+NOT_OF_THE_METHOD = (5, 6, 130)
+"""Exit codes of a missing dependency, a machine that failed, and somebody who stopped it."""
 SECONDS = "seconds.json"
 """Beside the artifacts: processor seconds of each command, which stay known when nothing is made anew."""
 
@@ -62,14 +65,15 @@ def run_chain(
     """Run the chain of a log in `folder`, to the command `last`; nothing is made twice.
 
     `library`: where the method's CAD library stands, or is made. `masks`: options of `segment`. A command that fails
-    stops the chain, which is a result.
+    stops the chain, which is a result; MethodFailed is raised where the machine failed.
     """
     kept = folder / SECONDS
     seconds: dict[str, float] = json.loads(kept.read_text()) if kept.is_file() else {}
     done: list[str] = []
     try:
-        method.run("library build", library, "--seed", 1)
         for command, out, needed in CHAIN:
+            if command == "cad":
+                method.run("library build", library, "--seed", 1)
             words = [word for name in needed for word in (f"--{name.replace('_', '-')}", str(folder / name))]
             words += {"ingest": log.words, "segment": masks, "cad": ("--library", str(library))}.get(command, ())
             if spent := method.run(command, folder / out, *words):
@@ -79,10 +83,18 @@ def run_chain(
             if command == last:
                 break
     except MethodFailed as failure:
+        if failure.exit_code in NOT_OF_THE_METHOD:
+            raise
         return Run(folder, seconds, tuple(done), failure.message)
     return Run(folder, seconds, tuple(done))
 
 
 def masks_of(data: Path) -> tuple[str, ...]:
-    """Options of `segment` for the recorded logs: a detector trained on photographs, of the data folder."""
-    return ("--backend", "detector", "--weights", str(data / "detectors" / "yolox_nano.onnx"))
+    """Options of `segment` for the recorded logs: a detector trained on photographs, of the data folder.
+
+    Raises BadInput when it is not there.
+    """
+    weights = data / "detectors" / "yolox_nano.onnx"
+    if not weights.is_file():
+        raise BadInput(f"{weights}: no detector", hint="docs/DATA.md says what the data folder holds")
+    return ("--backend", "detector", "--weights", str(weights))

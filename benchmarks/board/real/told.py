@@ -62,11 +62,13 @@ def measure_truth(method: Method, folder: Path, scratch: Path, masks: tuple[str,
     Raises BadInput when the folder does not hold what it should, or the log shows nothing of the truth.
     """
     told = read_truth(folder)
-    run = run_chain(method, told.log, scratch / told.log.name, scratch / "cad_library", masks)
-    sequence = run.made(Sequence) or own_sequence(told.log, scratch / told.log.name)
+    folder, library = scratch / told.log.name, scratch / "cad_library"
+    run = run_chain(method, told.log, folder, library, masks, last="ingest")
+    sequence = run.made(Sequence) or own_sequence(told.log, folder)
     if "pose" not in sequence.info.streams:
         raise BadInput(f"{told.log.path}: has no poses, so that nobody knows where the truth is", hint="add them")
     room = room_of(told, sequence)
+    run = run if run.failed else run_chain(method, told.log, folder, library, masks)
     things, supports = judge_told(room, run)
     return TruthRecord(
         told.log.name,
