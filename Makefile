@@ -117,6 +117,16 @@ ASKED = $(if $(QUICK),--quick) $(if $(FRESH),--fresh) $(OPTIONS)
 # The folder that holds the real logs (see docs/DATA.md); none of it is part of the project.
 REAL_DATA ?= ../shared/data
 
+.PHONY: board board-check
+# Nine shards of at most twenty minutes on two cores: SHARDS="public-1 real" runs some, METHOD=commit measures another
+# commit, COMMIT=1 commits the records of each. QUICK=1: one small room and whatever else five minutes allow.
+board: setup ## The benchmark whose rooms stay the same: METHOD=commit SHARDS="..." TRUTH=folder COMMIT=1 (QUICK=1: 5 minutes)
+	$(PYTHON) -m benchmarks.board --out $(OUTPUTS)/board $(if $(QUICK),--quick) $(if $(METHOD),--method $(METHOD)) $(if $(SHARDS),--shards $(SHARDS)) $(if $(TRUTH),--truth $(TRUTH)) $(if $(COMMIT),--commit) --data $(REAL_DATA)
+	$(if $(or $(QUICK),$(TRUTH)),,$(PYTHON) -m benchmarks.board.publishing)
+
+board-check: setup ## Measure one published trial again, drawn by the commit, and compare every digit
+	$(PYTHON) -m benchmarks.board.checking --out $(OUTPUTS)/board-check
+
 .PHONY: real real-all bench bench-preflight
 # A quarter of an hour of one core; with OPTIONS=--halves half an hour. What it makes stays: bench-scene, real-plan take it.
 real: setup ## The chain on real logs, held against what was annotated there (REAL_DATA=folder; TRUTH=folder: one's own log)

@@ -46,7 +46,7 @@ if [ -n "$python" ]; then
             missing+=("$package-dev")
     fi
 fi
-for library in libusb-1.0:libusb-1.0-0 libgomp:libgomp1 libGL:libgl1 libEGL:libegl1; do # of open3d
+for library in libusb-1.0:libusb-1.0-0 libgomp:libgomp1 libGL:libgl1 libEGL:libegl1 libidn2:libidn2-0; do # of open3d
     ldconfig -p 2>/dev/null | grep -q "${library%%:*}\.so" || missing+=("${library#*:}")
 done
 if [ ${#missing[@]} -gt 0 ]; then

@@ -56,7 +56,7 @@ class Method:
 
     def _program(self) -> list[str]:
         named = (self.checkout / "scenewright" / "__main__.py").is_file()
-        return [sys.executable, "-m", "scenewright" if named else "cli"]
+        return [sys.executable, "-P", "-m", "scenewright" if named else "cli"]
 
     def _environment(self) -> dict[str, str]:
         return {**os.environ, "PYTHONPATH": str(self.checkout)}
@@ -65,6 +65,11 @@ class Method:
     def commit(self) -> str:
         """The commit of the checkout, ten digits."""
         return self._git("rev-parse", "--short=10", "HEAD")
+
+    @cached_property
+    def committed(self) -> str:
+        """When the commit of the checkout was made."""
+        return self._git("show", "--no-patch", "--format=%cI", "HEAD")
 
     @cached_property
     def clean(self) -> bool:
@@ -78,7 +83,7 @@ class Method:
         A checkout that cannot tell it (before the code was in the key) is known by its files.
         """
         if (self.checkout / "stages" / "engine" / "code").is_dir():
-            asked = [sys.executable, "-c", ASK_FOR_DIGESTS, *STEPS]
+            asked = [sys.executable, "-P", "-c", ASK_FOR_DIGESTS, *STEPS]
             said = subprocess.run(asked, env=self._environment(), capture_output=True, text=True, check=False)
             if said.returncode:
                 raise UsageError(f"{self.checkout}: no digest of its steps", hint=said.stderr.strip()[-300:])

@@ -19,7 +19,7 @@ case "$*" in
 esac
 """
 TOOLS = ("bash", "sh", "dirname", "basename", "grep", "awk", "wc", "mkdir", "cp")
-LIBRARIES = "libusb-1.0.so libgomp.so libGL.so libEGL.so"
+LIBRARIES = "libusb-1.0.so libgomp.so libGL.so libEGL.so libidn2.so"
 
 
 class Machine:
@@ -82,7 +82,7 @@ def test_no_compiler_where_one_is_needed(machine: Machine) -> None:
 
 def test_no_system_libraries(machine: Machine) -> None:
     machine.program("ldconfig", "echo libGL.so.1")
-    assert "sudo apt-get install libusb-1.0-0 libgomp1 libegl1" in machine.set_up()
+    assert "sudo apt-get install libusb-1.0-0 libgomp1 libegl1 libidn2-0" in machine.set_up()
 
 
 def test_an_environment_of_another_python(machine: Machine) -> None:

@@ -68,7 +68,7 @@ def test_a_user_is_told_what_to_install(tmp_path: Path) -> None:
 
 
 def test_a_user_sets_up_once_it_is_there(tmp_path: Path) -> None:
-    packages = ("python3", "python3-venv", "libusb-1.0-0", "libgomp1", "libgl1", "libegl1")
+    packages = ("python3", "python3-venv", "libusb-1.0-0", "libgomp1", "libgl1", "libegl1", "libidn2-0")
     root = fresh_root(tmp_path / "root", "bookworm", packages)
     inside(root, f"chown -R nobody /{SOURCE}")
     for command in ("make setup", ".venv/bin/scenewright doctor"):

@@ -1,0 +1,56 @@
+"""The part of the other systems: their own experiments, small, as a checkout declares them, with their rivals."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from benchmarks.board.method import MethodFailed
+from benchmarks.board.records import Line, Trial
+from benchmarks.board.rooms import Setting
+
+PART = "others"
+QUICK_RUN = "--quick"
+
+
+@dataclass(frozen=True)
+class System:
+    """One system: which experiment, which of its arms and cases, which figures."""
+
+    title: str
+    experiment: str
+    figures: Sequence[str]
+    """Last parts of the figures' names."""
+    options: Sequence[str] = field(default=())
+
+
+SYSTEMS: dict[str, System] = {}
+
+
+def measure_system(setting: Setting, name: str) -> Iterator[Line]:
+    """Yield a line for each arm and case of a system's small run. Raises MethodFailed."""
+    system = SYSTEMS[name]
+    out = setting.work / PART / name / setting.method.commit
+    command = [sys.executable, "-P", "-m", "benchmarks", system.experiment, QUICK_RUN, "--out", str(out)]
+    told = {**os.environ, "PYTHONPATH": str(setting.method.checkout)}
+    start = os.times()
+    done = subprocess.run(
+        [*command, *system.options], cwd=setting.method.checkout, env=told, capture_output=True, text=True, check=False
+    )
+    spent = os.times()
+    if done.returncode not in (0, 4):
+        said = (done.stderr.strip() or "nothing was said").splitlines()[-1]
+        raise MethodFailed(f"benchmarks {system.experiment}", done.returncode, said)
+    seconds = spent.children_user + spent.children_system - start.children_user - start.children_system
+    by_arm: dict[tuple[str, str], dict[str, float]] = {}
+    for key, figure in json.loads((out / "figures.json").read_bytes())["figures"].items():
+        arm, *case, measure = key.split("/")
+        if measure in system.figures and figure["value"] is not None:
+            by_arm.setdefault((arm, "/".join(case)), {})[measure] = figure["value"]
+    for (arm, case), figures in by_arm.items():
+        trial = Trial(part=PART, case=f"{name}/{case}", seed="quick", arm=arm)
+        yield setting.line(trial, "ours", setting.method, figures=figures, seconds={"all": round(seconds, 1)})

@@ -1,0 +1,137 @@
+"""`python -m benchmarks.board.publishing`: docs/results/board.json out of the records, and the plot over versions.
+
+Nothing is measured here and nothing can be told by hand: whoever runs it gets the file that is published.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from scenewright.schemas.errors import BadInput, ScenewrightError
+
+from benchmarks.board.figures import Version, rooms_figures, versions_figures
+from benchmarks.board.inputs import BOARD, GENERATOR
+from benchmarks.board.looks import LOOKS, Look, read_looks
+from benchmarks.board.records import RECORDS, read_lines
+from benchmarks.tabulation import Figure
+
+PUBLISHED = RECORDS.parent / "board.json"
+PLOT = RECORDS.parents[1] / "images" / "board.svg"
+MACHINE = "two cores"
+ABOUT = {
+    "simulated": "rooms, walks, pictures and noisy depth; masks are the true ones with lasting errors at a detector's "
+    "rates on real frames; in `everything` depth bends, poses are estimated, the library lacks the rooms' styles and "
+    "sizes are wrong by up to a fifth. Real logs are recorded",
+    "knows": "Frames, masks, a library",
+    "does_not_show": "How it works with a detector's own masks in a room that people live in: the errors of the masks "
+    "have the rates of real ones, not their shapes. Long walks and large pictures: forty frames of 320 x 240 a room. "
+    "Public rooms have been seen; sealed ones are of the same six recipes.",
+}
+SHOWN_OVER_VERSIONS = ("pq", "support_f1", "functional", "at_rest_of_true", "found_large")
+
+
+def read_versions(folder: Path = RECORDS / "records") -> list[Version]:
+    """Return the records of every method that was measured, the oldest commit first. Raises BadInput for a file that no
+    program wrote, and for lines of a checkout that was not as committed."""
+    versions = []
+    for records in sorted(path for path in folder.glob("*") if path.is_dir()):
+        lines = [line for file in sorted(records.glob("*.jsonl")) for line in read_lines(file)]
+        for line in lines:
+            if not line.clean or line.commit != records.name:
+                raise BadInput(f"{records}: {line.trial} is not of that commit", hint="measure it anew: make board")
+        if lines:
+            versions.append(Version(records.name, lines))
+    return sorted(versions, key=lambda version: (version.lines[0].committed, version.commit))
+
+
+def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, Any]:
+    """Return what docs/results/board.json holds, of the newest version and of all. Raises BadInput without any."""
+    if not versions:
+        raise BadInput("nothing is measured yet", hint="make board")
+    newest = versions[-1]
+    figures = rooms_figures(newest.lines) | versions_figures(versions)
+    judges = sorted({line.judge for version in versions for line in version.lines})
+    return {
+        "experiment": "board",
+        "title": "The board: figures that versions can be compared by",
+        "date": max(line.day for line in newest.lines),
+        "commit": newest.commit,
+        "machine": MACHINE,
+        "command": "make board",
+        **ABOUT,
+        "notes": f"Board {BOARD}: rooms by the generator of {GENERATOR}. Looks at sealed rooms: {len(looks)}, of "
+        f"{len({look.digest for look in looks})} methods. Judged by {len(judges)} version(s) of the measures: "
+        f"{', '.join(judges)}.",
+        "figures": {name: asdict(figure) for name, figure in sorted(figures.items())},
+        "rows": {"looks": looks_rows(looks)},
+    }
+
+
+def looks_rows(looks: Sequence[Look]) -> dict[str, Any]:
+    """Return the table of who looked at sealed rooms."""
+    return {
+        "columns": ["day", "method", "commit", "who"],
+        "rows": [[look.day, look.digest, look.commit, look.who] for look in looks],
+    }
+
+
+def text_of(content: Mapping[str, Any]) -> str:
+    """Return the file's text."""
+    return json.dumps(content, indent=1, sort_keys=True) + "\n"
+
+
+def draw(figures: Mapping[str, Figure], versions: Sequence[Version], file: Path) -> None:
+    """Draw the headline of the public rooms over versions."""
+    import matplotlib as mpl
+
+    mpl.use("svg")
+    mpl.rcParams["svg.hashsalt"] = "board"
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
+    names = [version.commit for version in versions]
+    for measure in SHOWN_OVER_VERSIONS:
+        found = [figures.get(f"{name}/versions/public/everything/{measure}") for name in names]
+        known = [(place, one) for place, one in enumerate(found) if one is not None]
+        if known:
+            places, values = [place for place, _ in known], [one.value for _, one in known]
+            reach = [
+                [one.value - (one.low or one.value) for _, one in known],
+                [(one.high or one.value) - one.value for _, one in known],
+            ]
+            axes.errorbar(places, values, reach, marker="o", capsize=3, label=measure.replace("_", " "))
+    axes.set_xticks(range(len(names)), names)
+    axes.set_ylim(0, 1)
+    axes.set_ylabel("mean over public rooms")
+    axes.legend(fontsize="small", ncols=2)
+    figure.savefig(file, metadata={"Date": None})
+    plt.close(figure)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the file, or compare it; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.board.publishing", description=__doc__)
+    parser.add_argument("--check", action="store_true", help="change nothing; fail where the file says another thing")
+    asked = parser.parse_args(argv)
+    try:
+        versions = read_versions()
+        content = published(versions, read_looks(LOOKS))
+    except ScenewrightError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_code
+    if asked.check:
+        return 0 if PUBLISHED.is_file() and PUBLISHED.read_text(encoding="utf-8") == text_of(content) else 4
+    PUBLISHED.write_text(text_of(content), encoding="utf-8")
+    draw(versions_figures(versions), versions, PLOT)
+    print(f"{PUBLISHED}: `make figures` shows it", file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,5 @@
+ROOMS = 12
+
+
+def measure_room(setting, number):
+    yield from ()
