@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +74,7 @@ def run_chain(
     try:
         for command, out, needed in CHAIN:
             if command == "cad":
-                method.run("library build", library, "--seed", 1)
+                make_library(method, library)
             words = [word for name in needed for word in (f"--{name.replace('_', '-')}", str(folder / name))]
             words += {"ingest": log.words, "segment": masks, "cad": ("--library", str(library))}.get(command, ())
             if spent := method.run(command, folder / out, *words):
@@ -87,6 +88,15 @@ def run_chain(
             raise
         return Run(folder, seconds, tuple(done), failure.message)
     return Run(folder, seconds, tuple(done))
+
+
+def make_library(method: Method, library: Path) -> None:
+    """Make the method's CAD library where it is missing; of processes that want it together one makes it, the others
+    wait. Raises MethodFailed."""
+    library.parent.mkdir(parents=True, exist_ok=True)
+    with library.with_name(f".{library.name}.wait").open("w") as gate:
+        fcntl.flock(gate, fcntl.LOCK_EX)
+        method.run("library build", library, "--seed", 1)
 
 
 def masks_of(data: Path) -> tuple[str, ...]:

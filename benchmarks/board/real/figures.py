@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
@@ -80,6 +81,27 @@ def truth_figures(record: TruthRecord) -> Figures:
         "unseen": float(record.unseen),
         "minutes": minutes([record]),
     }
+
+
+def counts(record: AnnotatedRecord | HalvesRecord | TruthRecord) -> dict[str, float]:
+    """Return every number of a record by a name of its own (`large_found`, `supports_agreed`, `even_things`), of lists
+    the median under the name of the list, of words how many there are. What was not measured is left out; seconds stand in the record."""
+    plain = asdict(record)
+    del plain["seconds"]
+    things = plain.pop("things", {})
+    return dict(_numbers("", {**things, **plain}))
+
+
+def _numbers(name: str, value: object) -> Iterator[tuple[str, float]]:
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from _numbers(f"{name}_{key}" if name else key, part)
+    elif isinstance(value, tuple):
+        words = [entry for entry in value if isinstance(entry, str)]
+        if value:
+            yield name, float(len(words)) if words else float(np.median(value))
+    elif isinstance(value, int | float):
+        yield name, float(value)
 
 
 def minutes(records: Iterable[AnnotatedRecord | HalvesRecord | TruthRecord]) -> float:

@@ -66,7 +66,8 @@ def measure_halves(method: Method, log: Log, scratch: Path, masks: tuple[str, ..
     """Run the chain on both halves of a log below `scratch`, up to `cad`, and compare. masks: options of `segment`."""
     library = scratch / "cad_library"
     runs = [run_chain(method, half, scratch / half.name, library, masks, last="cad") for half in log.halves()]
-    seconds = {name: round(sum(run.seconds.get(name, 0.0) for run in runs), 2) for name in runs[0].seconds}
+    commands = dict.fromkeys(name for run in runs for name in run.seconds)
+    seconds = {name: round(sum(run.seconds.get(name, 0.0) for run in runs), 2) for name in commands}
     halves = [half_of(run) for run in runs]
     failed = next((run.failed for run in runs if run.failed), "")
     scenes = [scene_of(run) for run in runs]

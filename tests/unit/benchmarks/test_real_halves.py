@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from scenewright.stages.truth import read_support_annotation
 
 from benchmarks.board.real import ANNOTATED, ANNOTATIONS, LOGS
 from benchmarks.board.real.annotated import WORLDS, moved
-from benchmarks.board.real.figures import annotated_figures, halves_figures, line, truth_figures
+from benchmarks.board.real.figures import annotated_figures, counts, halves_figures, line, truth_figures
 from benchmarks.board.real.halves import Scene, Thing, agreement, matches
 from benchmarks.board.real.logs import Log
 from benchmarks.board.real.records import (
@@ -102,18 +103,22 @@ def test_figures_of_annotated_logs_are_pooled_counts() -> None:
     )
     assert line(record) == expected
     assert annotated_figures([])["support_f1"] is None
+    told = counts(record)
+    assert (told["large_found"], told["large_off_mm"], told["supports_agreed"], told["false"]) == (6, 20, 9, 3)
+    assert (
+        told["settling_stay"] == 9 and told["annotated"] == 1 and "settling" not in counts(AnnotatedRecord("x", True))
+    )
 
 
 def test_of_a_truth_without_supports_no_f1_is_told() -> None:
     record = TruthRecord("room", Things(Tally(true=2, found=1), Tally(), 0), Edges(0, 3, 0))
     assert truth_figures(record)["support_f1"] is None
+    assert counts(replace(record, unknown_words=("astrolabe", "orrery")))["unknown_words"] == 2
     assert truth_figures(replace(record, supports=Edges(4, 4, 2)))["support_f1"] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("name", ANNOTATED)
 def test_every_annotation_knows_its_log_and_its_world(name: str) -> None:
-    import json
-
     matrix = np.array(json.loads(WORLDS.read_text())[name])
     assert name in LOGS and np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-6)
 
