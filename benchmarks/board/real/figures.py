@@ -84,8 +84,10 @@ def truth_figures(record: TruthRecord) -> Figures:
 
 
 def counts(record: AnnotatedRecord | HalvesRecord | TruthRecord) -> dict[str, float]:
-    """Return every number of a record by a name of its own (`large_found`, `supports_agreed`, `even_things`), of lists
-    the median under the name of the list, of words how many there are. What was not measured is left out; seconds stand in the record."""
+    """Return every number of a record by a name of its own (`large_found`, `supports_agreed`, `even_things`).
+
+    Of lists the median, of words how many there are. What was not measured is left out; seconds stand in the record.
+    """
     plain = asdict(record)
     del plain["seconds"]
     things = plain.pop("things", {})
