@@ -128,8 +128,9 @@ board-check: setup ## Measure one published trial again, drawn by the commit, an
 	$(PYTHON) -m benchmarks.board.checking --out $(OUTPUTS)/board-check
 
 .PHONY: real real-all bench bench-preflight
-real: setup ## The chain on real logs, one table; fails unless it finds what the pictures show (REAL_DATA=folder)
-	$(EXPERIMENT) real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real $(ASKED)
+# A quarter of an hour of one core; with OPTIONS=--halves half an hour. What it makes stays: bench-scene, real-plan take it.
+real: setup ## The chain on real logs, held against what was annotated there (REAL_DATA=folder; TRUTH=folder: one's own log)
+	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.board.real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real$(if $(TRUTH),-truth --truth $(TRUTH)) $(if $(QUICK),--quick) $(OPTIONS)
 
 # Under an hour of two cores; a stopped run goes on where it was. `OPTIONS="--detector FILE.onnx"`.
 real-all: setup ## Every real log through every backend that runs here; fails unless each run explains itself (QUICK=1: few frames)
@@ -207,14 +208,6 @@ bench-scene: setup ## Contact graphs, CAD replacement and physics beside the the
 .PHONY: mosd train-pairs pair-rules
 mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: every fifth frame; REAL_DATA=folder)
 	$(EXPERIMENT) mosd --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd$(if $(QUICK),-quick) $(ASKED)
-
-.PHONY: real-supports
-real-supports: setup ## Contact graphs of the real logs against what stands on what there, after `make real`
-	$(EXPERIMENT) real_supports --runs $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/real-supports $(ASKED)
-
-.PHONY: real-things
-real-things: setup ## Which things of the real logs are found, in how many pieces, and how many names are wrong, after `make real`
-	$(EXPERIMENT) real_things --runs $(OUTPUTS)/experiments/real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real-things $(ASKED)
 
 .PHONY: real-plan
 # Twenty plans, about a minute each.

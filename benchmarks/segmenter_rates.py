@@ -35,7 +35,7 @@ from scenewright.stages.segment.settings import geometric_settings
 from scenewright.stages.truth.annotated_points import instances_of
 from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
-from benchmarks.experiments.real_things import ANNOTATIONS
+from benchmarks.board.real import ANNOTATIONS
 from benchmarks.options import Recipe, asked
 from benchmarks.steps import opened
 

@@ -1,6 +1,7 @@
-"""Pictures of the real logs: python docs/real_pictures.py outputs/experiments/real outputs/experiments/real-plan.
+"""Pictures of the real logs: python docs/real_pictures.py RUNS outputs/experiments/real-plan.
 
-Map and CAD scene side by side after `make real`; the robot in the kitchen's scene after `make real-plan`.
+Map and CAD scene side by side, of RUNS/kitchen and RUNS/livingroom, which `scenewright run reconstruct` wrote with the
+detector; the robot in the kitchen's scene after `make real-plan`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def pair(report: Path) -> np.ndarray:
 
 
 def main(runs: Path, plans: Path) -> None:
-    """Write docs/images/real_scenes.jpg from the runs of `make real`, real_plan.jpg from those of `make real-plan`."""
+    """Write docs/images/real_scenes.jpg from the reports of runs, real_plan.jpg from those of `make real-plan`."""
     images = Path(__file__).resolve().parent / "images"
     rows = np.vstack([pair(runs / log / "report" / "report.html") for log in LOGS])
     cv2.imwrite(str(images / "real_scenes.jpg"), rows, [cv2.IMWRITE_JPEG_QUALITY, 88])

@@ -14,6 +14,9 @@ from scenewright.schemas.errors import ScenewrightError, UsageError
 from benchmarks.board.inputs import Generator
 from benchmarks.board.looks import note_look
 from benchmarks.board.method import REPOSITORY, Method, checkout_of
+from benchmarks.board.quick import quick_table, quick_units
+from benchmarks.board.real.figures import line
+from benchmarks.board.real.told import measure_truth
 from benchmarks.board.records import RECORDS, write_lines
 from benchmarks.board.rooms import Setting
 from benchmarks.board.shards import JOBS, all_shards, measure_shard
@@ -43,6 +46,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--out", type=Path, default=Path("outputs/board"), help="rooms, artifacts, kept lines")
     made.add_argument("--method", default="", help="commit that is measured; default: this checkout")
     made.add_argument("--shards", nargs="+", default=[], metavar="SHARD", help=f"only these: {', '.join(all_shards())}")
+    made.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder with the recorded logs")
+    made.add_argument("--truth", type=Path, help="a log with a truth of one's own (docs/TRUTH.md), and nothing else")
+    made.add_argument("--quick", action="store_true", help="five minutes: what they allow of every part, not recorded")
     made.add_argument("--jobs", type=int, default=JOBS, help="units at a time")
     made.add_argument("--keep", action="store_true", help="leave the artifacts (100 MB a room)")
     made.add_argument("--commit", action="store_true", help="commit the records of each shard")
@@ -51,7 +57,12 @@ def parser() -> argparse.ArgumentParser:
 
 def run(asked: argparse.Namespace) -> int:
     """Measure shard after shard. Raises ScenewrightError."""
-    setting = setting_of(asked.out.resolve(), asked.method, keep=asked.keep)
+    setting = setting_of(asked.out.resolve(), asked.method, keep=asked.keep, data=asked.data.resolve())
+    if asked.truth is not None:
+        print(line(measure_truth(setting.method, asked.truth.resolve(), setting.work / "truth")))
+        return 0
+    if asked.quick:
+        return quick(setting, asked.jobs)
     shards = all_shards()
     for name in asked.shards:
         if name not in shards:
@@ -77,7 +88,17 @@ def run(asked: argparse.Namespace) -> int:
     return code
 
 
-def setting_of(out: Path, method: str, *, keep: bool) -> Setting:
+def quick(setting: Setting, jobs: int) -> int:
+    """Measure what five minutes allow, and print a row for everything that the board has."""
+    setting.generator.prepare()
+    lines, problems = measure_shard(setting, quick_units(), lambda text: say(f"quick: {text}"), jobs)
+    print(quick_table(lines))
+    for problem in problems:
+        say(problem)
+    return UNFINISHED if problems else 0
+
+
+def setting_of(out: Path, method: str, *, keep: bool, data: Path = Path()) -> Setting:
     """Return what is measured, against what, and where everything lies."""
     checkouts = out / "checkouts"
     return Setting(
@@ -87,6 +108,7 @@ def setting_of(out: Path, method: str, *, keep: bool) -> Setting:
         work=out / "work",
         kept=out / "kept",
         board=Method(),
+        data=data,
         keep=keep,
     )
 

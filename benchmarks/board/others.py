@@ -21,21 +21,53 @@ QUICK_RUN = "--quick"
 class System:
     """One system: which experiment, which of its arms and cases, which figures."""
 
-    title: str
     experiment: str
     figures: Sequence[str]
     """Last parts of the figures' names."""
     options: Sequence[str] = field(default=())
 
 
-SYSTEMS: dict[str, System] = {}
+SYSTEMS = {
+    "told robot": System(
+        "come_robot",
+        ("success", "step_success", "recovery"),
+        ("--cases", "mixed/fast", "--arms", "open_loop", "thesis", "ours", "--count", "40"),
+    ),
+    "needles": System(
+        "stitch_needle",
+        ("within_tolerance", "abstained"),
+        ("--cases", "geometry", "--arms", "thesis", "ours", "--count", "40"),
+    ),
+    "sutures": System(
+        "stitch_trials",
+        ("sutures_to_failure",),
+        ("--cases", "trials", "--arms", "thesis", "ours_thesis_eyes", "ours", "--count", "40"),
+    ),
+    "packing": System(
+        "llm3",
+        ("success", "motion_planner_calls", "seconds"),
+        ("--cases", "hard/unreachable", "--arms", "backtracking_corners", "ours", "--count", "20"),
+    ),
+    "tables": System(
+        "tidy_fast",
+        ("time", "objects_per_trip", "failure_rate"),
+        ("--cases", "tier2/fast", "--arms", "stack", "pull", "ours", "--count", "20"),
+    ),
+    "words learned": System(
+        "interpret", ("success", "sentences"), ("--cases", "set_table/combined", "--arms", "thesis", "ours")
+    ),
+    "cutting": System(
+        "cutting", ("iou", "count_exact"), ("--cases", "n2m2", "--arms", "bc", "thesis", "ours", "--count", "6")
+    ),
+    "splats": System("legs", ("psnr",), ("--cases", "rooms/10s", "--arms", "thesis", "ours")),
+}
 
 
 def measure_system(setting: Setting, name: str) -> Iterator[Line]:
     """Yield a line for each arm and case of a system's small run. Raises MethodFailed."""
     system = SYSTEMS[name]
     out = setting.work / PART / name / setting.method.commit
-    command = [sys.executable, "-P", "-m", "benchmarks", system.experiment, QUICK_RUN, "--out", str(out)]
+    command = [sys.executable, "-P", "-m", "benchmarks", system.experiment, QUICK_RUN, "--jobs", "1", "--out", str(out)]
     told = {**os.environ, "PYTHONPATH": str(setting.method.checkout)}
     start = os.times()
     done = subprocess.run(

@@ -36,6 +36,8 @@ class Setting:
     kept: Path
     board: Method
     """The checkout that judges."""
+    data: Path
+    """Folder of the recorded logs."""
     keep: bool = False
     """Leave the artifacts (100 MB a room)."""
 
@@ -77,7 +79,7 @@ def sealed_seed(digest: str, number: int, draw: int) -> int:
 
 def measure_public(setting: Setting, room: str, rungs: Sequence[str] = ()) -> Iterator[Line]:
     """Yield the lines of a public room: every rung where it is one of the ladder, else the headline alone."""
-    chosen = rungs or (tuple(RUNGS) if room in LADDER else (HEADLINE,))
+    chosen = rungs or (RUNGS if room in LADDER else (HEADLINE,))
     for rung in chosen:
         trials = {Trial(part=PUBLIC_PART, case=rung, seed=room, arm=OURS): (setting.method, OURS)}
         yield from _measure(setting, trials, room)

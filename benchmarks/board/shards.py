@@ -11,7 +11,8 @@ from multiprocessing import get_context
 from scenewright.schemas.errors import ScenewrightError
 from scenewright.stages.engine.interruption import PARENT_VARIABLE, end_with_parent
 
-from benchmarks.board import others, real_logs, rooms, tasks
+from benchmarks.board import others, rooms, tasks
+from benchmarks.board.real import part as real_logs
 from benchmarks.board.records import Line
 from benchmarks.board.rooms import SEALED_RECIPES, Setting, public_rooms
 
@@ -31,12 +32,18 @@ class Unit:
 
 
 MEASURES: dict[str, Callable[[Setting, str], Iterator[Line]]] = {
-    "public": lambda setting, name: rooms.measure_public(setting, name),
+    "public": lambda setting, name: rooms.measure_public(setting, *_room_and_rungs(name)),
     "sealed": lambda setting, name: rooms.measure_sealed(setting, int(name)),
     "tasks": lambda setting, name: tasks.measure_room(setting, int(name)),
     "real": real_logs.measure_log,
     "others": others.measure_system,
 }
+
+
+def _room_and_rungs(name: str) -> tuple[str, tuple[str, ...]]:
+    """Return the room of a unit, and the rungs that are named behind it; none are all of that room."""
+    room, *rungs = name.split()
+    return room, tuple(rungs)
 
 
 def all_shards() -> dict[str, list[Unit]]:
@@ -52,7 +59,7 @@ def all_shards() -> dict[str, list[Unit]]:
         "sealed-2": sealed[6:],
         "tasks-1": tasked[: tasks.ROOMS // 2],
         "tasks-2": tasked[tasks.ROOMS // 2 :],
-        "real": [Unit("real", name) for name in real_logs.LOGS],
+        "real": [Unit("real", name) for name in real_logs.names()],
         "others": [Unit("others", name) for name in others.SYSTEMS],
     }
 

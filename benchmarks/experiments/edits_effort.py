@@ -21,10 +21,9 @@ from scenewright.stages.kit.geometry.boxes import upright_box
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.truth import SupportAnnotation, instances_of, read_support_annotation
 
+from benchmarks.board.real import ANNOTATED, ANNOTATIONS
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean
 from benchmarks.experiments.edits.effort import Told, TrueNode, is_layout, put_room_right
-from benchmarks.experiments.real_supports import ANNOTATIONS, LOGS
-from benchmarks.experiments.real_supports import seeds_of as seeds_of_log
 from benchmarks.generated_rooms import STEPS, make_library, make_room
 from benchmarks.graph_scores import read_room
 from benchmarks.steps import opened, step
@@ -49,7 +48,8 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The rooms; of recordings, those of which `make real` has made the map."""
     if case == "spoiled":
         return TUNING if bench.tuning else REPORTING
-    return [log for log in LOGS if seeds_of_log(bench, log)]
+    runs = bench.parameters.runs
+    return [log for log in ANNOTATED if (runs / log / "panoptic_map" / "manifest.json").is_file()]
 
 
 def inputs(bench: Bench, trial: Trial) -> list[Path]:

@@ -31,11 +31,9 @@ from scenewright.stages.kit.geometry.ray_scenes import triangles_of
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.measurement.average_precision import Candidates, average_precision, pool, precision_recall
 from scenewright.stages.kit.stage import Parameters
-from scipy.spatial import cKDTree
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.experiments.real_all.made_logs import bin_frame, boxed_points
-from benchmarks.experiments.real_things import Told, counted
 from benchmarks.generated_rooms import STEPS as ROOM_STEPS
 from benchmarks.generated_rooms import RoomFolder, make_room
 from benchmarks.graph_scores import OPTIONS
@@ -54,8 +52,6 @@ ROOMS = ("kitchen-1210", "office-1210", "bedroom-1210", "room-1210")
 FRAMES, SIZE = 40, (320, 240)
 SPARSE = 0.04
 """Points of generated rooms without labels are about as far apart as those of the scan [m]."""
-NEAR = 0.05
-"""A vertex is of the true thing of which a seen point lies so near [m]."""
 LEAST_PIXELS = 100
 """Of a thing in a view that counts."""
 HIDES = 0.05
@@ -82,11 +78,6 @@ class Compared:
     """Intersection over union of every thing's whole outline."""
     hidden: tuple[float, ...] = ()
     """The same of things that something hides in part."""
-    large: int = 0
-    large_found: int = 0
-    """Large things (as in real_things), and those of them that one entity is."""
-    quality: float | None = None
-    """Panoptic quality without classes, 0..1."""
 
 
 def seeds_of(bench: Bench, case: str) -> list[str]:
@@ -161,18 +152,10 @@ def of_room(room: RoomFolder, out: Path, arm: str) -> Compared:
     panoptic_map = opened(PanopticMap, made)
     sizes = {entity.instance: entity.vertices for entity in panoptic_map.info.entities}
     found = box_candidates(truth, graph, sizes, "box", 0.5)[ANY_CLASS]
-    distance, nearest = cKDTree(truth.points).query(read_mesh(panoptic_map.path("mesh.ply")).vertices)
-    number = {entry.instance: k for k, entry in enumerate(truth.objects, 1)}
-    owner = np.array([number.get(int(k), 0) for k in truth.instances])[nearest]
-    told = [Told(entry.class_name, entry.instance in truth.optional) for entry in truth.objects]
-    things = counted(np.where(distance < NEAR, owner, 0), told, panoptic_map)
     return Compared(
         iou=tuple(tuple(float(value) for value in row) for row in found.iou),
         confidence=tuple(float(value) for value in found.confidence),
         true=found.iou.shape[1],
-        large=things.large,
-        large_found=things.large_found,
-        quality=things.quality,
     )
 
 
@@ -288,22 +271,6 @@ def mean_of(name: str) -> Measure:
     return Measure(figure, "%", interval=False)
 
 
-def total(name: str) -> Measure:
-    """Return a sum over rooms."""
-
-    def figure(records: Sequence[Compared]) -> float | None:
-        values = [getattr(record, name) for record in records if record.quality is not None]
-        return float(sum(values)) if values else None
-
-    return Measure(figure, "", interval=False)
-
-
-def mean_quality(records: Sequence[Compared]) -> float | None:
-    """Return the mean panoptic quality without classes over rooms."""
-    values = [record.quality for record in records if record.quality is not None]
-    return float(np.mean(values)) if values else None
-
-
 EXPERIMENT = Experiment(
     name="gap",
     title="Boxes of points, whole outlines of things: real and generated",
@@ -329,9 +296,6 @@ EXPERIMENT = Experiment(
         "AP50": precision_at(0.5),
         "amodal": mean_of("amodal"),
         "amodal_hidden": mean_of("hidden"),
-        "large": total("large"),
-        "large_found": total("large_found"),
-        "quality": Measure(mean_quality),
     },
     quick_seeds=1,
     parameters=GapParameters,

@@ -36,13 +36,13 @@ from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.splat import calibration_error, read_gaussians, recall_at_rejection
 from scenewright.stages.splat.language.pyramid import pyramid
 
+from benchmarks.board.real import ANNOTATED, ANNOTATIONS, LOGS
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
-from benchmarks.experiments.real import EXPECTED
 from benchmarks.generated_rooms import STEPS
 from benchmarks.reporting_seeds import Method, newest
 from benchmarks.splats.langsplat import langsplat
 from benchmarks.splats.lerf import Lerf
-from benchmarks.words.asked import ANNOTATIONS, NAMED_ROOMS, AskedLog, AskedPlace, AskedRoom, Query
+from benchmarks.words.asked import NAMED_ROOMS, AskedLog, AskedPlace, AskedRoom, Query
 
 GROUP = "asked rooms"
 REPORTING = newest(GROUP).seeds
@@ -50,7 +50,6 @@ TUNING = NAMED_ROOMS
 """The probabilities were fitted on them too, and our network has not learned from them."""
 GENERATED, REARRANGED = "rooms", "rearranged"
 MADE = (GENERATED, REARRANGED)
-LOGS = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))
 LEAST = 0.5
 """Probability from which on something is an answer: one for all rooms."""
 BOX_OVERLAP = 0.25
@@ -113,8 +112,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
     if trial.case in MADE:
         room = AskedRoom(bench.out / trial.case, trial.seed, given.steps, given.frames, int(trial.case == REARRANGED))
     else:
-        told = EXPECTED[trial.case]
-        room = AskedLog(bench.out, trial.case, given.steps, given.data / told["log"], told["every"])
+        log = LOGS[trial.case].within(given.data)
+        room = AskedLog(bench.out, trial.case, given.steps, log.path, log.every)
     for trial in trials:
         yield trial, asked(room, trial.arm, given.lerf_steps)
 
@@ -279,7 +278,7 @@ def inputs(bench: Bench, trial: Trial) -> list[Path]:
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     """The first rooms, or the one log of that name, where it is there."""
     if case not in MADE:
-        return [case] if (bench.parameters.data / EXPECTED[case]["log"]).is_dir() else []
+        return [case] if LOGS[case].within(bench.parameters.data).path.is_dir() else []
     return TUNING if bench.tuning else REPORTING[: bench.parameters.rooms]
 
 
@@ -298,7 +297,7 @@ EXPERIMENT = Experiment(
         "langsplat": "LangSplat",
         "lerf": "LERF",
     },
-    cases=(*MADE, *LOGS),
+    cases=(*MADE, *ANNOTATED),
     runs=lambda arm, case: arm not in ("entities", "pieces") or case in MADE,
     measure=measure,
     record=Asked,

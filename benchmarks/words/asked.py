@@ -34,6 +34,7 @@ from scenewright.stages.splat import MARGIN, PosedView, Sight, evenly, lexicon, 
 from scenewright.stages.splat.training.words.lexicon import FALSE, TRUE, Phrase, Thing, truth_of
 from scenewright.stages.truth import instances_of, read_support_annotation
 
+from benchmarks.board.real import ANNOTATIONS
 from benchmarks.generated_rooms import RoomFolder, make_room
 from benchmarks.perfect_maps import perfect_map
 from benchmarks.steps import made, opened, unrecorded
@@ -44,7 +45,6 @@ NAMED_ROOMS = tuple(f"{kind}-{1520 + k}" for k, kind in enumerate(2 * ("kitchen"
 SIZE = (320, 240)
 QUERIES = 15
 LEAST_PIXELS = 300
-ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from scenewright.stages.kit.open_words.embedded import EmbeddedEncoder
 from scenewright.stages.kit.open_words.finding import Finder
 from scenewright.stages.splat.training.word_probabilities import asked_places
 
-from benchmarks.experiments.real import EXPECTED
+from benchmarks.board.real import LOGS
 from benchmarks.options import Recipe, asked
 from benchmarks.words.asked import NAMED_ROOMS, AskedLog, AskedPlace, AskedRoom
 
@@ -24,8 +24,8 @@ ROOMS = {
     NAMED_SPLAT: NAMED_ROOMS,
 }
 LANGUAGE_OF = {"splat": "nameless", "panoptic_map": "entities", NAMED_SPLAT: "language"}
-LOGS = ("kitchen", "office")
-"""Real ones that were looked at."""
+LOOKED_AT = ("kitchen", "office")
+"""Real logs that were looked at."""
 
 
 class Options(Recipe):
@@ -43,8 +43,8 @@ def room_of(options: Options, name: str) -> AskedRoom:
 
 def log_of(options: Options, name: str) -> AskedLog:
     """Return a real log."""
-    told = EXPECTED[name]
-    return AskedLog(options.out / "logs", name, options.steps, options.data / told["log"], told["every"])
+    log = LOGS[name].within(options.data)
+    return AskedLog(options.out / "logs", name, options.steps, log.path, log.every)
 
 
 def answered(use: str, place: AskedPlace, language: LanguageMap) -> asked_places.AskedPlace:
@@ -62,7 +62,7 @@ def main() -> None:
     options = asked(Options)
     few = 1 if options.quick else None
     known = [room_of(options, name) for name in ROOMS["splat"][:few]]
-    logs = [log_of(options, name) for name in LOGS[:few]]
+    logs = [log_of(options, name) for name in LOOKED_AT[:few]]
     found = [answered(asked_places.KNOWN, room, room.language) for room in known]
     found += [answered(asked_places.STRANGE, log, log.language) for log in logs]
     for source, names in ROOMS.items():

@@ -1,7 +1,7 @@
 """`scenewright inspect` against faults that were planted: what is detected, what is named, what is a false alarm.
 
 Every log is opened once a fault, the fault is put into its frames in memory, and the pre-flight judges it. Logs: MCAP
-files of generated rooms, and the real logs of benchmarks/expectations/real.toml. Writes reasons.json too.
+files of generated rooms, and the real logs of benchmarks/board/real/logs.py. Writes reasons.json too.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from scenewright.stages.ingest import IngestParameters, InspectionReport, inspec
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Parameters
 
+from benchmarks.board.real import LOGS
 from benchmarks.experiment import Bench, Experiment, Results, Trial, mean, median
 from benchmarks.experiments.preflight.faults import FAULTS, NOTHING, Fault, Named
-from benchmarks.experiments.real import EXPECTED
 from benchmarks.steps import made
 
 REPORTED_SEEDS = tuple(str(seed) for seed in range(200, 212))
@@ -27,7 +27,6 @@ REPORTED_SEEDS = tuple(str(seed) for seed in range(200, 212))
 QUICK_SEEDS = 3
 RECIPES = ("room", "kitchen", "office", "bedroom")
 GENERATED, REAL = "generated", "real"
-LOGS = tuple(name for name, expected in EXPECTED.items() if not expected["log"].startswith("@"))
 
 
 class PreflightParameters(Parameters):
@@ -61,7 +60,7 @@ def seeds_of(bench: Bench, case: str) -> Sequence[str]:
     if case.startswith(GENERATED):
         return REPORTED_SEEDS[: QUICK_SEEDS if bench.quick else None]
     data = bench.parameters.data
-    return [name for name in LOGS if data and (data / EXPECTED[name]["log"]).exists()]
+    return [name for name in LOGS if data and LOGS[name].within(data).path.exists()]
 
 
 def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
@@ -80,9 +79,9 @@ def log_of(bench: Bench, trial: Trial) -> tuple[Path, IngestParameters]:
     if trial.case.startswith(GENERATED):
         rooms = bench.parameters.rooms or bench.out / "rooms"
         return rooms / trial.seed / "log.mcap", IngestParameters.model_validate({})
-    expected = EXPECTED[trial.seed]
-    settings = {key: float(value) for key, value in expected.get("settings", {}).items()}
-    return bench.parameters.data / expected["log"], IngestParameters.model_validate(settings)
+    log = LOGS[trial.seed].within(bench.parameters.data)
+    settings = {name: float(value) for name, value in log.settings.items()}
+    return log.path, IngestParameters.model_validate(settings)
 
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Inspection]]:

@@ -337,7 +337,7 @@ def run_real(folder: Path, scratch: Path, arms: Sequence[Arm]) -> Iterator[tuple
     given: dict[str, Any] = {"panoptic_map": opened(PanopticMap, map_folder)}
     truth = load_truth(truth_artifact, np.eye(4), OPTIONS.minimum_visible_points)
     overlaps = overlaps_of(truth, given["panoptic_map"])
-    library = opened(CadLibrary, folder / "cad_library")
+    library = opened(CadLibrary, folder.parent / "cad_library")
     for arm in arms:
         # `cad` takes every mesh that it finds in its folder for a thing of the scene, those of an earlier run too.
         shutil.rmtree(scratch / arm.name, ignore_errors=True)

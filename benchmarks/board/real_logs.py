@@ -1,8 +1,0 @@
-"""The part of real logs."""
-
-LOGS: tuple[str, ...] = ()
-
-
-def measure_log(setting, name):
-    """Yield."""
-    yield from ()
