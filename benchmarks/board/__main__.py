@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from scenewright.schemas.errors import ScenewrightError, UsageError
@@ -74,7 +75,7 @@ def run(asked: argparse.Namespace) -> int:
     for name in asked.shards or shards:
         units, start = shards[name], time.monotonic()
         written = [note_look(setting.method.digest, setting.method.commit)] if name.startswith("sealed") else []
-        lines, problems = measure_shard(setting, units, lambda text, name=name: say(f"{name}: {text}"), asked.jobs)
+        lines, problems = measure_shard(setting, units, partial(say_of, name), asked.jobs)
         say(f"{name}: {len(lines)} lines, {(time.monotonic() - start) / 60:.1f} min")
         if problems or not clean:
             code = UNFINISHED if problems else code
@@ -118,6 +119,11 @@ def commit(files: Sequence[Path], message: str) -> None:
     words = ["git", "-C", str(REPOSITORY)]
     subprocess.run([*words, "add", "--", *map(str, files)], check=True)
     subprocess.run([*words, "commit", "--quiet", "--message", message, "--", *map(str, files)], check=True)
+
+
+def say_of(shard: str, text: str) -> None:
+    """Print a line of progress of a shard."""
+    say(f"{shard}: {text}")
 
 
 def say(text: str) -> None:

@@ -93,7 +93,7 @@ class Generator:
     def prepare(self) -> None:
         """Make both libraries. Raises MethodFailed."""
         for name, seed in (("library", LIBRARY_SEED), ("other_library", OTHER_SEED)):
-            self._made(self.root / name, lambda out, seed=seed: self._run("library build", out, "--seed", seed))
+            self._made(self.root / name, lambda out, seed=seed: self._run("library build", out, "--seed", seed))  # type: ignore[misc]
 
     def room(self, name: str, rung: Rung, *, clutter: str = "medium") -> RoomInputs:
         """Return the inputs of a room, made where they are missing. Raises MethodFailed, for a seed without a room."""

@@ -112,7 +112,7 @@ def checkout_of(commit: str, folder: Path) -> Path:
     path = folder / commit
     if not (path / "pyproject.toml").is_file():
         words = ["git", "-C", REPOSITORY, "worktree", "add", "--force", "--detach", path, commit]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        done = subprocess.run(words, capture_output=True, text=True, check=False)  # type: ignore[arg-type]
         if done.returncode:
             hint = "clone the project with its history: git fetch --unshallow"
             raise UsageError(f"no commit {commit} here: {done.stderr.strip()[-200:]}", hint=hint)

@@ -33,13 +33,16 @@ def measure_log(setting: Setting, name: str) -> Iterator[Line]:
         yield kept
         return
     scratch = setting.work / PART / setting.method.commit
+    figures: dict[str, float | None]
     if case == ANNOTATED:
         annotated = measure_annotated(setting.method, log, setting.data, scratch)
-        figures, said, seconds = annotated_figures([annotated]) | counts(annotated), line(annotated), annotated.seconds
+        figures, said, seconds = annotated_figures([annotated]), line(annotated), annotated.seconds
+        figures |= counts(annotated)
     else:
         masks = masks_of(setting.data)
         halves = measure_halves(setting.method, LOGS[log].within(setting.data), scratch, masks)
-        figures, said, seconds = halves_figures([halves]) | counts(halves), line(halves), halves.seconds
+        figures, said, seconds = halves_figures([halves]), line(halves), halves.seconds
+        figures |= counts(halves)
     known = {name: float(f"{value:.6g}") for name, value in figures.items() if value is not None}
     told = setting.line(trial, OURS, setting.method, figures=known, facts={"line": said}, seconds=seconds)
     yield setting.keep_line(told.model_copy(update={"key": key, "judge": judge}))
