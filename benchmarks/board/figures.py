@@ -34,12 +34,17 @@ SHARES = (
     "held_of_found",
     "colliding_of_found",
     "settled",
+    "success",
+    "literals",
+    "success in the map",
 )
-"""Figures between 0 and 1."""
-UNDEFINED_WHEN_FAILED = frozenset(
-    name for name in SHARES if "of_found" in name or name.startswith("equal_") or name == "joints_found"
+"""Figures between 0 and 1; the last three are of tasks."""
+ALL_LOST = frozenset(
+    name
+    for name in SHARES
+    if "of_found" not in name and not name.startswith("equal_") and name not in ("joints_found", "success in the map")
 )
-"""Shares of what was found, which is nothing where there is no scene."""
+"""Those that are 0 where there is no scene; of what was found, which is nothing, there is no share."""
 NUMBERS = {
     "ghosts": "",
     "false_things": "",
@@ -77,7 +82,7 @@ def value_of(line: Line, name: str) -> float | None:
         return sum(line.seconds.values()) / PER_MINUTE if line.seconds else None
     if name == "failed":
         return line.figures.get("failed", 0.0)
-    if "failed" in line.figures and name in SHARES and name not in UNDEFINED_WHEN_FAILED:
+    if line.figures.get("failed") and name in ALL_LOST:
         return 0.0
     return line.figures.get(name)
 
