@@ -7,14 +7,15 @@ this checkout judges by other code than the record says, nothing can be compared
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenewright.schemas.errors import ScenewrightError
+from scenewright.schemas.errors import ScenewrightError, UsageError
 
 from benchmarks.board.__main__ import say, setting_of
-from benchmarks.board.method import Method
+from benchmarks.board.method import REPOSITORY, Method
 from benchmarks.board.publishing import read_versions
 from benchmarks.board.records import Line, judge_digest
 from benchmarks.board.rooms import measure_public
@@ -27,6 +28,15 @@ def drawn(lines: Sequence[Line], commit: str) -> Line | None:
     """Return the line that a commit draws; None where there is none."""
     known = [line for line in lines if line.trial.part == "public" and line.trial.case == CHEAPEST]
     return known[int(commit, 16) % len(known)] if known else None
+
+
+def commits_since(commit: str) -> int:
+    """Return how many commits changed what is measured since one. Raises UsageError where that is not in the history."""
+    words = ["git", "-C", str(REPOSITORY), "rev-list", "--count", f"{commit}..HEAD", "--", "stages", "schemas", "data"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise UsageError(f"no commit {commit} here", hint="clone the project with its history: git fetch --unshallow")
+    return int(done.stdout)
 
 
 def differing(one: Line, other: Line) -> list[str]:
@@ -47,12 +57,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         if line is None:
             say("no trial is published yet")
             return 0
+        say(f"{commits_since(line.commit)} commits changed the method since {line.commit}, whose figures are published")
         if line.judge != judge_digest():
             say(f"{line.trial}: judged by {line.judge}, this checkout judges by {judge_digest()}: nothing to compare")
             return 0
         setting = setting_of(asked.out.resolve(), line.commit, keep=False)
         setting.generator.prepare()
         (again,) = measure_public(setting, line.trial.seed, (CHEAPEST,))
+    except UsageError as error:  # a clone without history cannot be asked
+        say(f"nothing compared: {error}")
+        return 0
     except ScenewrightError as error:
         say(f"error: {error}")
         return error.exit_code

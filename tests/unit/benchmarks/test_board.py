@@ -11,13 +11,14 @@ import pytest
 from scenewright.schemas.errors import BadInput
 from scipy import stats
 
-from benchmarks.board import publishing
+from benchmarks.board import checking, publishing
 from benchmarks.board.figures import Version, rooms_figures, value_of, versions_figures
 from benchmarks.board.generator.lacking import without_styles
 from benchmarks.board.generator.spoil import DepthFaults, drawn_faults
 from benchmarks.board.inputs import LADDER, PUBLIC, RUNGS, Rung, error_seed
 from benchmarks.board.looks import note_look, read_looks
 from benchmarks.board.method import Method
+from benchmarks.board.quick import NOT_RUN, quick_table, quick_units
 from benchmarks.board.reconstruct import ARMS
 from benchmarks.board.records import Line, Trial, key_of, line_text, read_lines, write_lines
 from benchmarks.board.rooms import SEALED_RECIPES, sealed_seed
@@ -197,6 +198,25 @@ def test_versions_are_paired_with_the_first() -> None:
     figures = versions_figures(versions)
     assert figures["new less old/versions/public/everything/found"].value == pytest.approx(0.1)
     assert figures["old/versions/public/everything/found"].value == pytest.approx(0.3)
+
+
+def test_a_trial_is_drawn_by_the_commit_and_every_digit_counts() -> None:
+    def record(room: str, value: float = 0.5) -> Line:
+        trial = Trial(part="public", case=checking.CHEAPEST, seed=room, arm="ours")
+        return line().model_copy(update={"trial": trial, "figures": {"found": value}})
+
+    lines = [record(f"room-{k}") for k in range(3)]
+    assert checking.drawn([line(), *lines], "0a") is lines[10 % 3] and checking.drawn([line()], "0a") is None
+    assert not checking.differing(lines[0], lines[1])
+    assert checking.differing(lines[0], record("room-0", 0.500001)) == ["found: 0.5 in the record, 0.500001 now"]
+
+
+def test_a_quick_run_says_what_it_did_not_run() -> None:
+    measured = [line(LADDER[2], part="public", figures={"things_large": 4.0, "found_count_large": 3.0})]
+    text = quick_table(measured)
+    assert "of ten large things 7.5 are found" in text and text.count(NOT_RUN) > 10
+    units = {(unit.part, unit.name.split()[0]) for unit in quick_units()}
+    assert ("public", LADDER[2]) in units and not any(part == "sealed" for part, _ in units)
 
 
 def test_the_published_file_is_what_the_records_say() -> None:
