@@ -32,8 +32,8 @@ def drawn(lines: Sequence[Line], commit: str) -> Line | None:
 
 def commits_since(commit: str) -> int:
     """Return how many commits changed what is measured since one. Raises UsageError where that is not in the history."""
-    words = ["git", "-C", str(REPOSITORY), "rev-list", "--count", f"{commit}..HEAD", "--", "stages", "schemas", "data"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    words = ["git", "-C", str(REPOSITORY), "rev-list", "--count", f"{commit}..HEAD"]
+    done = subprocess.run([*words, "--", "stages", "schemas", "data"], capture_output=True, text=True, check=False)
     if done.returncode:
         raise UsageError(f"no commit {commit} here", hint="clone the project with its history: git fetch --unshallow")
     return int(done.stdout)
