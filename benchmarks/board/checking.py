@@ -31,7 +31,7 @@ def drawn(lines: Sequence[Line], commit: str) -> Line | None:
 
 
 def commits_since(commit: str) -> int:
-    """Return how many commits changed what is measured since one. Raises UsageError where that is not in the history."""
+    """Return how many commits changed what is measured since one. Raises UsageError for one of no history."""
     words = ["git", "-C", str(REPOSITORY), "rev-list", "--count", f"{commit}..HEAD"]
     done = subprocess.run([*words, "--", "stages", "schemas", "data"], capture_output=True, text=True, check=False)
     if done.returncode:

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from benchmarks.board.method import Method, MethodFailed, checkout_of
@@ -93,7 +94,10 @@ class Generator:
     def prepare(self) -> None:
         """Make both libraries. Raises MethodFailed."""
         for name, seed in (("library", LIBRARY_SEED), ("other_library", OTHER_SEED)):
-            self._made(self.root / name, lambda out, seed=seed: self._run("library build", out, "--seed", seed))  # type: ignore[misc]
+            self._made(self.root / name, partial(self._library, seed))
+
+    def _library(self, seed: int, out: Path) -> None:
+        self._run("library build", out, "--seed", seed)
 
     def room(self, name: str, rung: Rung, *, clutter: str = "medium") -> RoomInputs:
         """Return the inputs of a room, made where they are missing. Raises MethodFailed, for a seed without a room."""

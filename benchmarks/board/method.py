@@ -111,8 +111,8 @@ def checkout_of(commit: str, folder: Path) -> Path:
     """Return a worktree of a commit below `folder`, made where it is missing. Raises UsageError without that commit."""
     path = folder / commit
     if not (path / "pyproject.toml").is_file():
-        words = ["git", "-C", REPOSITORY, "worktree", "add", "--force", "--detach", path, commit]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)  # type: ignore[arg-type]
+        words = ["git", "-C", str(REPOSITORY), "worktree", "add", "--force", "--detach", str(path), commit]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode:
             hint = "clone the project with its history: git fetch --unshallow"
             raise UsageError(f"no commit {commit} here: {done.stderr.strip()[-200:]}", hint=hint)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from benchmarks.board.method import Method
 ARMS_FILE = Path(__file__).with_name("arms.toml")
 SCENE_OPTIONS = ("--no-rest", "--settle-seconds", "0")
 """The scene as it was reconstructed: the board lets it go itself."""
+PROCESSOR = "processor"
+"""Entry of an artifact's timings.json: processor time of all of its step."""
 LOST = ("--accept", "tracking_lost", "--accept", "contradictory")
 
 
@@ -75,27 +78,43 @@ class Reconstruction:
 def reconstruct(
     method: Method, arm: str, inputs: RoomInputs, folder: Path, *, estimated: bool = False
 ) -> tuple[Reconstruction, dict[str, float]]:
-    """Return the artifacts of an arm, and the processor seconds of each step. What arms share is made once.
+    """Return the artifacts of an arm, and the processor seconds of each step. What arms share is made once
+    and counts for each.
 
     Raises MethodFailed where a step ends without an artifact.
     """
-    made, own, seconds = Reconstruction(folder, folder / arm), ARMS[arm], {}
+    made, own = Reconstruction(folder, folder / arm), ARMS[arm]
     told: tuple[object, ...] = ("--log", inputs.log, *(("--every", inputs.every) if inputs.every > 1 else ()))
-    seconds["ingest"] = method.run("ingest", made.sequence, *told)
+    method.run("ingest", made.sequence, *told)
     pose: tuple[object, ...] = ()
     if estimated:
         method.run("ingest", folder / "recording", "--log", inputs.log)
         trajectory = folder / "trajectory"
-        seconds["poses"] = method.run("poses", trajectory, "--sequence", folder / "recording", *LOST)
+        method.run("poses", trajectory, "--sequence", folder / "recording", *LOST)
         pose = ("--trajectory", trajectory)
     frames = ("--sequence", made.sequence)
     given = ("--backend", "masks", "--masks", inputs.masks)
-    seconds["segment"] = method.run("segment", made.arm / "segments", *frames, *given, *own.segment)
+    method.run("segment", made.arm / "segments", *frames, *given, *own.segment)
     segments = ("--segments", made.arm / "segments")
-    seconds["fuse"] = method.run("fuse", made.panoptic_map, *frames, *segments, *pose, *own.fuse)
+    method.run("fuse", made.panoptic_map, *frames, *segments, *pose, *own.fuse)
     of_map = ("--panoptic-map", made.panoptic_map)
-    seconds["graph"] = method.run("graph", made.graph, *of_map, *own.graph)
+    method.run("graph", made.graph, *of_map, *own.graph)
     of_graph = ("--contact-graph", made.graph, *of_map, "--library", inputs.library)
-    seconds["cad"] = method.run("cad", made.cad_scene, *of_graph, *own.cad)
-    seconds["urdf"] = method.run("urdf", made.scene, "--cad-scene", made.cad_scene, *SCENE_OPTIONS)
-    return made, seconds
+    method.run("cad", made.cad_scene, *of_graph, *own.cad)
+    method.run("urdf", made.scene, "--cad-scene", made.cad_scene, *SCENE_OPTIONS)
+    steps = {
+        "ingest": made.sequence,
+        **({"poses": folder / "trajectory"} if estimated else {}),
+        "segment": made.arm / "segments",
+        "fuse": made.panoptic_map,
+        "graph": made.graph,
+        "cad": made.cad_scene,
+        "urdf": made.scene,
+    }
+    return made, {name: processor_seconds(artifact) for name, artifact in steps.items()}
+
+
+def processor_seconds(artifact: Path) -> float:
+    """Return what a step says that it took, whoever ran it and when [s]."""
+    told = json.loads((artifact / "timings.json").read_bytes())
+    return round(float(told[PROCESSOR]), 2)
