@@ -235,7 +235,16 @@ def test_a_line_of_a_room_holds_the_records_of_its_tasks() -> None:
     told = told_of(records, {"fuse": 5.0})
     assert told["figures"]["success"] == 0.5 and told["figures"]["failed by not_in_map"] == 1.0
     assert told["seconds"] == {"fuse": 5.0, "plan": 18.0}
-    who = {"key": "0", "commit": "0", "digest": "0", "clean": True, "board": "0", "day": "2026-11-29"}
+    who = {
+        "key": "0",
+        "commit": "0",
+        "digest": "0",
+        "clean": True,
+        "board": "0",
+        "day": "2026-11-29",
+        "committed": "",
+        "judge": "",
+    }
     line = Line.model_validate({"trial": Trial(part="tasks", case="camera", seed="a", arm="ours"), **who, **told})
     assert records_of([line]) == records
 
