@@ -34,8 +34,8 @@ from scenewright.stages.splat.build_stage import method_of, rasterizer_of
 from scenewright.stages.splat.building import placed_poses
 from scenewright.stages.splat.render_stage import figures_of
 
+from benchmarks.drifting import drifting_poses
 from benchmarks.experiment import Bench, Experiment, Interval, Results, Trial, mean, ratio
-from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS, error_seed, make_room
 from benchmarks.splats.lerf import Lerf
 from benchmarks.steps import made, opened

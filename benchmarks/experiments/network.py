@@ -43,7 +43,7 @@ from scenewright.stages.segment import (
 from scenewright.stages.segment.backends.network.weights import BUNDLED
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
-from benchmarks.experiments.mapping.figures_of_merit import summed_qualities
+from benchmarks.experiments.scenenn.figures_of_merit import summed_qualities
 from benchmarks.generated_rooms import FIRST_REPORTING, STEPS, make_room
 from benchmarks.steps import made, opened
 
