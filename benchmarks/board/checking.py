@@ -1,6 +1,6 @@
 """`python -m benchmarks.board.checking`: one published trial, drawn by the commit, measured again and compared.
 
-Drawn among the cheapest rung of the public rooms, of the newest version, measured in a worktree of its commit. Where
+Drawn among the cheapest rung of the public rooms, of the newest version, and measured in a worktree of its commit. If
 this checkout judges by other code than the record says, nothing can be compared, and it says so.
 """
 
