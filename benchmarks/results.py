@@ -83,7 +83,6 @@ def described(results: Results, figures: Mapping[str, Figure], command: Sequence
         "knows": experiment.knows,
         "does_not_show": experiment.does_not_show,
         "notes": seeds_told(results),
-        **({"seeds": dict(results.seeds_met)} if results.seeds_met else {}),
         "figures": {name: vars(figure) for name, figure in figures.items()},
     }
 
@@ -151,7 +150,10 @@ def seeds_table(results: Results) -> str:
 
 def seeds_line(results: Results) -> str:
     """Say which seeds ran and how intervals are made."""
-    return f"{seeds_told(results)} Intervals: 95 %, bootstrap, {RESAMPLES} draws over clusters of seeds.\n"
+    return (
+        f"{seeds_told(results)} Intervals: 95 % over clusters of seeds, none with fewer than five: Student's t of means "
+        f"over five to nineteen, else bootstrap of {RESAMPLES} draws; Wilson's of shares of single tries.\n"
+    )
 
 
 def seeds_told(results: Results) -> str:

@@ -326,9 +326,9 @@ def regained(results: Results) -> dict[str, float | Interval | None]:
             ]
             shown = [[each.psnr for each in records if each is not None] for records in found]
             parts = [(row[2] - row[1], row[0] - row[1]) for row in shown if len(row) == 1 + len(POSES)]
-            if parts:
-                alone = parts[0][0] / parts[0][1] if len(parts) == 1 and parts[0][1] else None
-                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts) if len(parts) > 1 else alone
+            given, lost = (sum(part) for part in zip(*parts, strict=True)) if parts else (0.0, 0.0)
+            if lost:
+                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts) or given / lost
     return figures
 
 
