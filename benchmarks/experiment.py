@@ -335,21 +335,26 @@ def shown(experiment: Experiment, records: Mapping[Trial, Any]) -> dict[Trial, A
     return {trial: record for trial, record in parts.items() if record is not None}
 
 
-def ratio(pairs: Sequence[tuple[float, float]], of: Callable[..., Any] = np.mean) -> Interval | None:
+def ratio(pairs: Sequence[tuple[float, float]], of: Callable[..., Any] = np.mean) -> Figure | None:
     """Return the mean (or what else `of` is, as np.median) of the firsts over that of the seconds, with its 95 %
-    interval over pairs, as `pooled` says of means and by percentile bootstrap of others; None for fewer than five."""
-    if len(pairs) < LEAST_CLUSTERS:
+    interval over pairs: as `pooled` says of means, by percentile bootstrap of others, none of fewer than five. None
+    without any pair."""
+    if not pairs:
         return None
+    values = np.array(pairs, dtype=float)
+
+    def over(drawn: np.ndarray, axis: int) -> np.ndarray:
+        parts = of(drawn, axis=axis)
+        return np.asarray(parts[..., 0] / parts[..., 1])
+
+    found = None
     if of is np.mean:
-        return pooled(Pooled(tuple), np.array(pairs, dtype=float))
-
-    def over(values: np.ndarray, axis: int) -> np.ndarray:
-        means = of(values, axis=axis)
-        return np.asarray(means[..., 0] / means[..., 1])
-
-    return bootstrap_interval(
-        np.array(pairs), np.random.default_rng(SEED_OF_INTERVALS), statistic=over, resamples=RESAMPLES
-    )
+        found = pooled(Pooled(tuple), values)
+    elif len(pairs) >= LEAST_CLUSTERS:
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        found = bootstrap_interval(values, random, statistic=over, resamples=RESAMPLES)
+    low, high = (found.low, found.high) if found else (None, None)
+    return Figure(float(over(values, 0)), low, high, len(pairs), "")
 
 
 def mean(name: str, unit: str = "", *, interval: bool = True) -> Measure:

@@ -35,10 +35,11 @@ from scenewright.stages.splat.building import placed_poses
 from scenewright.stages.splat.render_stage import figures_of
 
 from benchmarks.drifting import drifting_poses
-from benchmarks.experiment import Bench, Experiment, Interval, Results, Trial, mean, ratio
+from benchmarks.experiment import Bench, Experiment, Results, Trial, mean, ratio
 from benchmarks.generated_rooms import STEPS, error_seed, make_room
 from benchmarks.splats.lerf import Lerf
 from benchmarks.steps import made, opened
+from benchmarks.tabulation import Figure
 
 REAL = {
     "office": "hololens_office",
@@ -314,9 +315,9 @@ def looks(trainer: Trainer, views: Sequence[PosedView]) -> tuple[float, float, f
     return means[0], means[1], float(np.mean(errors)) if errors else None
 
 
-def regained(results: Results) -> dict[str, float | Interval | None]:
+def regained(results: Results) -> dict[str, Figure | None]:
     """How much of the PSNR that drift costs adjustment gives back, the scenes of a case together."""
-    figures: dict[str, float | Interval | None] = {}
+    figures: dict[str, Figure | None] = {}
     exact = POSES_BUDGET[results.bench.quick]
     for scene in (*REAL, GENERATED):
         for arm in results.arms():
@@ -326,9 +327,8 @@ def regained(results: Results) -> dict[str, float | Interval | None]:
             ]
             shown = [[each.psnr for each in records if each is not None] for records in found]
             parts = [(row[2] - row[1], row[0] - row[1]) for row in shown if len(row) == 1 + len(POSES)]
-            given, lost = (sum(part) for part in zip(*parts, strict=True)) if parts else (0.0, 0.0)
-            if lost:
-                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts) or given / lost
+            if sum(lost for _, lost in parts):
+                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts)
     return figures
 
 

@@ -154,7 +154,10 @@ def test_of_fewer_than_five_clusters_there_is_no_interval() -> None:
     assert found.interval("thesis", "one", "value") is None, "eight trials of four rooms"
     assert found.difference("thesis", "ours", "one", "value") is None
     assert results_with(values, cluster=str).interval("thesis", "one", "value") is not None
-    assert ratio([(1.0, 2.0)] * 4) is None and ratio([(1.0, 2.0)] * 4, np.median) is None
+    for of in (np.mean, np.median):
+        alone = ratio([(1.0, 2.0), (3.0, 2.0), (2.0, 2.0), (2.0, 4.0)], of)
+        assert alone is not None and alone.low is None and alone.cases == 4
+        assert ratio([], of) is None
 
 
 def test_of_five_to_nineteen_clusters_the_interval_of_a_mean_is_that_of_students_t() -> None:
@@ -168,8 +171,8 @@ def test_of_five_to_nineteen_clusters_the_interval_of_a_mean_is_that_of_students
         low, high = stats.ttest_1samp(of, 0.0).confidence_interval(0.95)
         assert told is not None and (told.value, told.low, told.high) == pytest.approx((of.mean(), low, high))
     ratios = np.array([random.normal(2.0, 0.1, 400), np.ones(400)]).T
-    covered = [found for k in range(50) if (found := ratio([tuple(r) for r in ratios[8 * k : 8 * k + 8]])) is not None]
-    assert 42 <= sum(found.low <= 2.0 <= found.high for found in covered) <= 50
+    told = [ratio([(r[0], r[1]) for r in ratios[8 * k : 8 * k + 8]]) for k in range(50)]
+    assert 42 <= sum(each.low <= 2.0 <= each.high for each in told if each and each.low and each.high) <= 50
     unequal = results_with({f"{k}{d}": (float(k),) for k in range(5) for d in "abcd"[: 1 + k % 2]})
     told = unequal.interval("thesis", "one", "value")
     assert told is not None and told.value == unequal.value("thesis", "one", "value") and told.low < told.value
