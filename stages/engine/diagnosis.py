@@ -14,7 +14,13 @@ from scenewright.stages.engine.discovery import all_stages
 from scenewright.stages.engine.model_cache import cache_folder, cached_models
 from scenewright.stages.kit.library_versions import library_version
 
-SYSTEM_LIBRARIES = {"libusb-1.0-0": "usb-1.0", "libgomp1": "gomp", "libgl1": "GL", "libegl1": "EGL", "libidn2-0": "idn2"}
+SYSTEM_LIBRARIES = {
+    "libusb-1.0-0": "usb-1.0",
+    "libgomp1": "gomp",
+    "libgl1": "GL",
+    "libegl1": "EGL",
+    "libidn2-0": "idn2",
+}
 """Debian's package -> library; open3d loads all of them."""
 CORE = {
     "typer": ("typer", "every command"),
