@@ -195,16 +195,6 @@ gap: setup ## Boxes of a real scan and outlines in a real bin beside those of ge
 bench-edits: setup ## Edits by hand, applied again to maps fused with other parameters (QUICK=1: four rooms)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) edits --out $(OUTPUTS)/experiments/bench-edits$(if $(QUICK),-quick) $(ASKED)
 
-.PHONY: bench-mapping
-# Twenty generated rooms (three of fewer frames with QUICK=1), every arm on the same frames and masks.
-bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables 2.1 to 2.4 (QUICK=1: three rooms)
-	$(EXPERIMENT) mapping --out $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick) $(ASKED)
-
-.PHONY: bench-scene
-# The rooms of bench-mapping and its maps (made where they are missing), then the logs of `make real` where it has run.
-bench-scene: setup ## Contact graphs, CAD replacement and physics beside the thesis (QUICK=1: three rooms)
-	$(EXPERIMENT) scene --maps $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick) --real $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/bench-scene$(if $(QUICK),-quick) $(ASKED)
-
 .PHONY: mosd train-pairs pair-rules
 mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: every fifth frame; REAL_DATA=folder)
 	$(EXPERIMENT) mosd --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd$(if $(QUICK),-quick) $(ASKED)

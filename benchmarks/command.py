@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
+import subprocess
 import sys
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,10 +17,12 @@ from benchmarks.experiment import Bench, Experiment, Results, Trial, shown
 from benchmarks.gather import gather
 from benchmarks.keeping import measure_missing, read_record, wanted_trials
 from benchmarks.options import add_option
-from benchmarks.reporting_seeds import FILE, UNRECORDED, newest, note_use
 from benchmarks.results import write_results
 
-PUBLISHED = Path(__file__).resolve().parents[1] / "docs" / "results"
+CHECKOUT = Path(__file__).resolve().parents[1]
+PUBLISHED = CHECKOUT / "docs" / "results"
+CODE = ("stages", "schemas", "cli", "benchmarks")
+"""Folders that have to be as they are in a commit when figures are published."""
 UNMET = 4
 """Exit code when an expectation does not hold."""
 
@@ -55,7 +56,9 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
     trials = wanted_trials(
         experiment, bench, arms=options.arms, cases=options.cases, seeds=options.seeds, most=options.count
     )
-    code, met = 0, seeds_met(experiment, bench, trials, kept=options.kept)
+    if options.publish:
+        check_that_may_be_published(bench, kept=options.kept)
+    code = 0
     if not options.kept:
         jobs = options.jobs or experiment.jobs
         code = measure_missing(experiment, bench, trials, jobs=jobs, fresh=options.fresh or not experiment.keeps)
@@ -64,11 +67,11 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
     if not records:
         print(f"{experiment.name}: nothing is measured", file=sys.stderr)
         return code
-    results = Results(experiment, bench, shown(experiment, records), met)
+    results = Results(experiment, bench, shown(experiment, records))
     missing = [trial for trial in trials if trial not in records]
     print(write_results(results, _as_recorded(words, options), missing))
     if options.publish:
-        print(f"{publish(results, missing, options.kept)}: `make figures` shows it", file=sys.stderr)
+        print(f"{publish(results, missing, kept=options.kept)}: `make figures` shows it", file=sys.stderr)
     problems = experiment.problems(results) if experiment.problems else ()
     for problem in problems:
         print(f"expectation not met: {problem}", file=sys.stderr)
@@ -77,46 +80,41 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
 
 def _as_recorded(words: Sequence[str], options: argparse.Namespace) -> tuple[str, ...]:
     """Return the command line that stands beside figures: where they were written says nothing."""
-    kept = ["FOLDER" if word == str(options.out) else word for word in words if word not in ("--publish", "--kept")]
+    kept = ["FOLDER" if word == str(options.out) else word for word in words if word != "--publish"]
     return ("python", "-m", "benchmarks", *kept)
 
 
-def publish(results: Results, missing: Sequence[Trial], kept: bool, folder: Path = PUBLISHED) -> Path:
-    """Copy figures.json to where pages take it from, and return that file. Of what is `kept` parts may be missing,
-    which the file, and the head of its page, then name. Raises UsageError for figures of tuning seeds or of a quick
-    run, and for another unfinished one."""
-    if results.bench.quick or results.bench.tuning or (missing and not kept):
-        what = f"{len(missing)} trials are missing" if missing else "this is no run over reporting seeds"
-        raise UsageError(f"nothing is published: {what}", hint="run it without --quick and --tuning to its end")
-    file = folder / f"{results.experiment.name}.json"
-    made = json.loads((results.bench.out / "figures.json").read_text())
-    if missing:
-        counts = Counter(f"{trial.arm}/{trial.case}" for trial in missing)
-        made["not_measured"] = {name: counts[name] for name in sorted(counts)}
-    file.write_text(json.dumps(made, indent=1, sort_keys=True) + "\n")
+def changed_code(checkout: Path = CHECKOUT) -> list[str]:
+    """Return what of the code in a checkout is in no commit. Raises UsageError where there is no git."""
+    words = ["git", "-C", str(checkout), "status", "--porcelain", "--", *CODE]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise UsageError(f"nothing is published: {checkout} is no git checkout", hint="figures name their commit")
+    return done.stdout.splitlines()
+
+
+def check_that_may_be_published(bench: Bench, *, kept: bool, missing: Sequence[Trial] = ()) -> None:
+    """Raises UsageError for figures of tuning seeds, of a quick or unfinished run, of records of any code (`kept`), and
+    where the code is in no commit."""
+    whys = {
+        "this is no run over reporting seeds": bench.quick or bench.tuning,
+        "--kept takes records of any code": kept,
+        f"{len(missing)} trials are missing": bool(missing),
+    }
+    for why, holds in whys.items():
+        if holds:
+            raise UsageError(f"nothing is published: {why}", hint="run it without --quick, --tuning, --kept to its end")
+    if changed := changed_code():
+        raise UsageError(f"nothing is published: in no commit: {', '.join(changed[:3])}", hint="commit, and run again")
+
+
+def publish(results: Results, missing: Sequence[Trial], *, kept: bool, folder: Path | None = None) -> Path:
+    """Copy figures.json whole to where pages take it from, so that nothing written there by hand stays, and return that
+    file. Raises UsageError as `check_that_may_be_published`."""
+    check_that_may_be_published(results.bench, kept=kept, missing=missing)
+    file = (folder or PUBLISHED) / f"{results.experiment.name}.json"
+    file.write_bytes((results.bench.out / "figures.json").read_bytes())
     return file
-
-
-def seeds_met(
-    experiment: Experiment, bench: Bench, trials: Sequence[Trial], *, kept: bool, file: Path = FILE
-) -> dict[str, str]:
-    """Return which set of reporting seeds is measured and by which digest of the method, and record that it is, before
-    anything can be seen; nothing where the experiment's seeds are in no set, or others are measured. What is `kept` was
-    recorded when it was measured: the set's newest digest is told."""
-    if not experiment.seed_group or experiment.method is None or bench.quick or bench.tuning:
-        return {}
-    found = newest(experiment.seed_group, file)
-    if not any(experiment.cluster(trial.seed) in found.seeds for trial in trials):
-        return {}
-    if kept:
-        digests = [met.method for met in found.met if met.experiment == experiment.name]
-        digest = digests[-1] if digests else UNRECORDED
-    else:
-        digest = experiment.method.digest()
-        found = note_use(found.name, experiment.name, digest, file)
-    if found.kind == "tuning":
-        print(f"{experiment.name}: {found.name} has met another method: tuning seeds from now on", file=sys.stderr)
-    return {"set": found.name, "kind": found.kind, "method": digest, "first_used": str(found.first_used)}
 
 
 def bench_of(experiment: Experiment, options: Mapping[str, Any]) -> Bench:

@@ -12,7 +12,7 @@ the picture. Registration: the shift of the picture that puts its edges best ont
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +29,24 @@ from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.settings import geometric_settings
 
 from benchmarks.options import Recipe, asked
+from benchmarks.results import write_figures
 from benchmarks.steps import opened
+from benchmarks.tabulation import Figure
 
 STRIDE = 4
 FAR_APART, SAME_SURFACE = 0.5, 0.1
 """Two frames see a surface from distances that differ by the first [m]; more than the second is another surface [m]."""
 LARGEST_SHIFT = 8
 """[pixels]"""
+
+
+ABOUT = {
+    "title": "Bias, bending and registration of real depth",
+    "simulated": "Nothing, but the living room's depth and images are rendered, with a noise model.",
+    "knows": "The logs' poses, which were made of the same depth.",
+    "does_not_show": "What a calibrated reference would show: poses were made of the same depth, so that a bias which "
+    "both have is not seen. A few frames a log.",
+}
 
 
 class DepthErrorOptions(Recipe):
@@ -46,7 +57,7 @@ class DepthErrorOptions(Recipe):
 
 
 def main() -> None:
-    """Measure and write depth_errors.json."""
+    """Measure; write depth_errors.json, in the form of docs/results."""
     options = asked(DepthErrorOptions)
     made: dict[str, Any] = {}
     for folder in sorted(options.runs.glob("*/sequence")):
@@ -65,8 +76,20 @@ def main() -> None:
             "registration_pixels": [float(v) for v in np.median(np.array(shifts), axis=0)] if shifts else None,
         }
     print(json.dumps(made, indent=1))
-    options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "depth_errors.json").write_text(json.dumps(made, indent=1) + "\n")
+    write_figures(options.out, "depth_errors", ABOUT, figures_of(made))
+
+
+def figures_of(measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Figure]:
+    """Return what was measured of each log as figures; what could not be is left out."""
+    figures = {}
+    for log, own in measured.items():
+        u, v = own["registration_pixels"] or (None, None)
+        bias = None if own["bias_per_metre"] is None else 100 * own["bias_per_metre"]
+        told = {"bias": (bias, "%"), "bending": (own["bending_per_square_metre"], "1/m")}
+        for name, (value, unit) in {**told, "beside_u": (u, "pixels"), "beside_v": (v, "pixels")}.items():
+            if value is not None:
+                figures[f"depth/{log}/{name}"] = Figure(round(value, 5), None, None, own["frames"], unit)
+    return figures
 
 
 def bias(frames: Sequence[Frame], camera: Camera) -> float | None:

@@ -24,13 +24,15 @@ from scenewright.stages.kit.measurement.bootstrap import (
 from scenewright.stages.kit.measurement.proportions import wilson_interval
 from scenewright.stages.kit.stage import Parameters
 
-from benchmarks.reporting_seeds import Method
+from benchmarks.board.statistics import LEAST_ROOMS, over_rooms
 from benchmarks.tabulation import Figure
 
 RESAMPLES = 2000
 SEED_OF_INTERVALS = 0
-LEAST_CLUSTERS = 2
-"""With fewer there is nothing to resample."""
+LEAST_CLUSTERS = LEAST_ROOMS
+"""With fewer there is no interval: of three clusters a bootstrap's 95 % are 73 %."""
+MANY_CLUSTERS = 20
+"""From so many on the percentile bootstrap is used for means and shares too; of fewer it is too narrow."""
 
 
 @dataclass(frozen=True, order=True)
@@ -97,18 +99,38 @@ class Share(Pooled):
     whole: float = 1.0
 
 
-def pooled(of: Pooled, parts: np.ndarray) -> Interval | None:
-    """Return a pooled figure of clusters (N, 2) with its 95 % interval; None with nothing below the line.
+def pooled(of: Pooled, parts: np.ndarray, other: np.ndarray | None = None) -> Interval | None:
+    """Return a pooled figure of clusters (N, 2), or that less the same of `other`, with its 95 % interval; None with
+    fewer than five clusters that have anything below the line, and for an interval without width.
 
-    Percentile bootstrap over clusters, but Wilson's (1927) for a share of which each cluster is one try: tries that all
-    came out alike would have an interval without width.
+    Wilson's (1927) for a share of which each cluster is one try; Student's t over the clusters (of a ratio over their
+    deviations from it, by the delta method) with fewer than twenty; from twenty on percentile bootstrap over clusters.
     """
-    tries = int(parts[:, 1].sum())
-    if not isinstance(of, Share) or not tries or (parts[:, 1] > 1).any():
-        return pooled_interval(parts, None, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES)
-    successes = round(parts[:, 0].sum() / of.whole)
-    low, high = wilson_interval(successes, tries)
-    return Interval(of.whole * successes / tries, of.whole * low, of.whole * high)
+    own = [parts] if other is None else [parts, other]
+    defined = np.all([rows[:, 1] != 0 for rows in own], axis=0)
+    count = int(defined.sum())
+    if count < LEAST_CLUSTERS:
+        return None
+    share = isinstance(of, Share) and other is None
+    whole = of.whole if isinstance(of, Share) and share else 1.0
+    if share and not (parts[:, 1] > 1).any():
+        successes = round(parts[:, 0].sum() / whole)
+        low, high = wilson_interval(successes, count)
+        return Interval(whole * successes / count, whole * low, whole * high)
+    if count >= MANY_CLUSTERS:
+        return pooled_interval(parts, other, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES)
+    values = [_around_their_ratio(rows[defined]) for rows in own]
+    told = values[0] - values[1] if len(values) > 1 else values[0]
+    spread = over_rooms([float(value) for value in told / whole], share=share)
+    if spread is None or spread.low is None or spread.high is None:
+        return None
+    return Interval(whole * spread.mean, whole * spread.low, whole * spread.high)
+
+
+def _around_their_ratio(parts: np.ndarray) -> np.ndarray:
+    """Return a value for each cluster, whose mean is the sum over the sum and whose spread is the ratio's."""
+    ratio_of_sums = parts[:, 0].sum() / parts[:, 1].sum()
+    return ratio_of_sums + (parts[:, 0] - ratio_of_sums * parts[:, 1]) / parts[:, 1].mean()
 
 
 Measuring = Callable[[Bench, Sequence[Trial]], Iterable[tuple[Trial, Any]]]
@@ -145,11 +167,7 @@ class Experiment:
     tuning: Sequence[str] = ()
     """Seeds that were looked at while methods and constants were chosen; `--tuning` runs these."""
     reporting: Sequence[str] = ()
-    """Seeds for figures alone."""
-    seed_group: str = ""
-    """Group of reporting_seeds.toml that the reporting seeds are the newest set of; "" where they stand here alone."""
-    method: Method | None = None
-    """What is compared: seeds of a group that two digests of it have met are tuning seeds."""
+    """Seeds that figures are of, measured once or more: only the sealed rooms of benchmarks/board are fresh."""
     seeds_of: Callable[[Bench, str], Sequence[str]] | None = None
     """(bench, case) -> seeds, where they depend on the case or on data that may not be there; none leaves it out."""
     default_cases: Callable[[Bench], Sequence[str]] | None = None
@@ -204,8 +222,6 @@ class Results:
     experiment: Experiment
     bench: Bench
     records: Mapping[Trial, Any]
-    seeds_met: Mapping[str, str] = field(default_factory=dict)
-    """Set of reporting seeds, whether it is one still, digest of the method, date of first use (reporting_seeds.py)."""
     _clusters: dict[tuple[str, str], dict[str, list[Any]]] = field(default_factory=dict)
     _values: dict[tuple[str, ...], dict[tuple[int, ...], float | None]] = field(default_factory=dict)
 
@@ -242,8 +258,8 @@ class Results:
         return self.experiment.measures[measure].of(records) if records else None
 
     def interval(self, arm: str, case: str, measure: str) -> Interval | None:
-        """A measure with its 95 % interval over clusters of seeds, by percentile bootstrap, or as `pooled` says; None
-        where it is undefined, or where there are fewer than two clusters."""
+        """A measure with its 95 % interval over clusters of seeds, as `pooled` says of means, shares and
+        sums over sums, by percentile bootstrap of others; None where it is undefined or of fewer than five clusters."""
         names = list(self._grouped(arm, case))
         if len(names) < LEAST_CLUSTERS:
             return None
@@ -255,14 +271,17 @@ class Results:
         return figure_interval(self._figure(arm, case, measure, names), range(len(names)), random, resamples=RESAMPLES)
 
     def difference(self, first: str, second: str, case: str, measure: str) -> Interval | None:
-        """`first` minus `second` over the clusters that both ran on, drawn together, with its 95 % interval."""
+        """`first` minus `second` over the clusters that both ran on, drawn together, with its 95 % interval,
+        as of `interval`."""
         other = self._grouped(second, case)
         names = [name for name in self._grouped(first, case) if name in other]
         if len(names) < LEAST_CLUSTERS:
             return None
         parts, others = (self._parts(arm, case, measure, names) for arm in (first, second))
         if parts is not None and others is not None:
-            return pooled_interval(parts, others, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES)
+            of = self.experiment.measures[measure].of
+            assert isinstance(of, Pooled)
+            return pooled(of, parts, others)
         figures = [self._figure(arm, case, measure, names) for arm in (first, second)]
         numbers = [(which, k) for which in (0, 1) for k in range(len(names))]
 
@@ -316,17 +335,26 @@ def shown(experiment: Experiment, records: Mapping[Trial, Any]) -> dict[Trial, A
     return {trial: record for trial, record in parts.items() if record is not None}
 
 
-def ratio(pairs: Sequence[tuple[float, float]], of: Callable[..., Any] = np.mean) -> Interval | None:
+def ratio(pairs: Sequence[tuple[float, float]], of: Callable[..., Any] = np.mean) -> Figure | None:
     """Return the mean (or what else `of` is, as np.median) of the firsts over that of the seconds, with its 95 %
-    interval over pairs; None for none."""
+    interval over pairs: as `pooled` says of means, by percentile bootstrap of others, none of fewer than five. None
+    without any pair."""
+    if not pairs:
+        return None
+    values = np.array(pairs, dtype=float)
 
-    def over(values: np.ndarray, axis: int) -> np.ndarray:
-        means = of(values, axis=axis)
-        return np.asarray(means[..., 0] / means[..., 1])
+    def over(drawn: np.ndarray, axis: int) -> np.ndarray:
+        parts = of(drawn, axis=axis)
+        return np.asarray(parts[..., 0] / parts[..., 1])
 
-    return bootstrap_interval(
-        np.array(pairs), np.random.default_rng(SEED_OF_INTERVALS), statistic=over, resamples=RESAMPLES
-    )
+    found = None
+    if of is np.mean:
+        found = pooled(Pooled(tuple), values)
+    elif len(pairs) >= LEAST_CLUSTERS:
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        found = bootstrap_interval(values, random, statistic=over, resamples=RESAMPLES)
+    low, high = (found.low, found.high) if found else (None, None)
+    return Figure(float(over(values, 0)), low, high, len(pairs), "")
 
 
 def mean(name: str, unit: str = "", *, interval: bool = True) -> Measure:

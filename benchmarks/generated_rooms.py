@@ -1,4 +1,4 @@
-"""The generated rooms of the experiments: seeds for tuning and for reporting, made once and kept as artifacts.
+"""The generated rooms of the experiments, made once and kept as artifacts.
 
 A room's name, `<recipe>-<seed>`, is the seed of its trials.
 """
@@ -6,29 +6,12 @@ A room's name, `<recipe>-<seed>`, is the seed of its trials.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reporting_seeds import newest, read_sets
 from benchmarks.steps import made
 
-TUNING = (
-    *(f"kitchen-{seed}" for seed in (40, 41, 42)),
-    *(f"office-{seed}" for seed in (40, 41, 42)),
-    *(f"bedroom-{seed}" for seed in (40, 41)),
-    *(f"room-{seed}" for seed in (40, 41)),
-)
-"""Looked at while methods and constants were chosen (seeds of the recipes' tuning range)."""
 RECIPES = ("kitchen", "office", "bedroom", "room")
-TUNING_UNTRAINED = tuple(f"{recipe}-{seed}" for seed in (2000, 2001) for recipe in RECIPES)
-"""Looked at as well, where the masks of our own network matter: it was trained on rooms of the seeds of TUNING."""
-INDEPENDENT_RECIPES = ("household", "lodging")
-"""Outside of the recipes that maps and CAD were tuned on; `plan` was tuned on households, and one lodging was looked at
-when models came to be stretched."""
-TUNING_INDEPENDENT = ("household-2000", "lodging-2000")
-ROOMS = "rooms"
-"""Group of the reporting seeds (reporting_seeds.toml)."""
 
 
 def recipe_of(name: str) -> str:
@@ -36,14 +19,6 @@ def recipe_of(name: str) -> str:
     return name.rsplit("-", 1)[0]
 
 
-REPORTING = tuple(name for name in newest(ROOMS).seeds if recipe_of(name) in RECIPES)
-"""For figures alone (seeds of the recipes' reporting range): the newest set."""
-INDEPENDENT = tuple(name for name in newest(ROOMS).seeds if recipe_of(name) in INDEPENDENT_RECIPES)
-"""Its rooms by other recipes than those of tuning."""
-FIRST_REPORTING = read_sets()[0].seeds
-"""The rooms of the first figures, which have been seen: the network's are of them."""
-DRAWS = 2
-"""Draws of the errors of masks and poses in every room."""
 CLUTTER = "high"
 LIBRARY_SEED = 1
 STEPS = ("library build", "synthesize", "ingest")
@@ -66,16 +41,6 @@ class RoomFolder:
     def sequence(self) -> Path:
         """Artifact of kind sequence."""
         return self.folder / "sequence"
-
-
-def with_draws(rooms: Sequence[str], draws: int = DRAWS) -> tuple[str, ...]:
-    """Return the seeds of trials that draw errors: `<room>+<draw>`, all rooms of the first draw before the second."""
-    return tuple(f"{room}+{draw}" for draw in range(draws) for room in rooms)
-
-
-def room_of(seed: str) -> str:
-    """Return the room of a trial's seed."""
-    return seed.split("+")[0]
 
 
 def error_seed(seed: str) -> int:

@@ -8,6 +8,7 @@ import os
 import platform
 import shlex
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,11 @@ from benchmarks.experiment import RESAMPLES, Results, Trial
 from benchmarks.tabulation import Figure, grid
 
 MOST_COLUMNS, MOST_SEEDS = 8, 200
+INTERVALS = (
+    "95 %, over clusters of seeds, none of fewer than five: Student's t of means and shares over five to nineteen, "
+    f"else bootstrap of {RESAMPLES} draws; Wilson's of shares of single tries"
+)
+"""How intervals are made (benchmarks/experiment.py)."""
 RUNNING = "trials"
 """`all/<case>/trials`: how many seeds a case ran on."""
 
@@ -83,9 +89,18 @@ def described(results: Results, figures: Mapping[str, Figure], command: Sequence
         "knows": experiment.knows,
         "does_not_show": experiment.does_not_show,
         "notes": seeds_told(results),
-        **({"seeds": dict(results.seeds_met)} if results.seeds_met else {}),
+        "interval": INTERVALS,
         "figures": {name: vars(figure) for name, figure in figures.items()},
     }
+
+
+def write_figures(out: Path, name: str, about: Mapping[str, str], figures: Mapping[str, Figure]) -> None:
+    """Write `<name>.json` of a measurement that is no experiment into the output folder, in the form of docs/results.
+    `about`: title, simulated, knows, does_not_show."""
+    out.mkdir(parents=True, exist_ok=True)
+    command = ["python", "-m", f"benchmarks.{name}", *("FOLDER" if word == str(out) else word for word in sys.argv[1:])]
+    told = {"experiment": name, **about, **circumstances(command)}
+    _write(out / f"{name}.json", {**told, "figures": {key: vars(figure) for key, figure in figures.items()}})
 
 
 def circumstances(command: Sequence[str]) -> dict[str, str]:
@@ -151,7 +166,7 @@ def seeds_table(results: Results) -> str:
 
 def seeds_line(results: Results) -> str:
     """Say which seeds ran and how intervals are made."""
-    return f"{seeds_told(results)} Intervals: 95 %, bootstrap, {RESAMPLES} draws over clusters of seeds.\n"
+    return f"{seeds_told(results)} Intervals: {INTERVALS}.\n"
 
 
 def seeds_told(results: Results) -> str:

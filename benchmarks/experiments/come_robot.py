@@ -136,10 +136,10 @@ def of_groups(
             for name in ("success", "step_success", "recovery", "false_success") if records else ():
                 of = MEASURES[name].of
                 assert isinstance(of, Pooled)
-                found = pooled(of, np.array([of.parts(record) for record in records]))
-                if found is not None:
-                    figure = Figure(found.value, found.low, found.high, len(records), "%")
-                    flat[f"{arm}/{group}/{name}"] = figure
+                found, value = pooled(of, np.array([of.parts(record) for record in records])), of(records)
+                if value is not None:
+                    low, high = (found.low, found.high) if found else (None, None)
+                    flat[f"{arm}/{group}/{name}"] = Figure(value, low, high, len(records), "%")
             flat[f"{arm}/{group}/trials"] = float(len(records)) if records else None
             for cause in CAUSES if records and group == "possible" else ():
                 flat[f"{arm}/{group}/failures_{cause}_direct"] = failed(cause, 0)(records) or 0.0

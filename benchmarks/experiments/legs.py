@@ -34,11 +34,12 @@ from scenewright.stages.splat.build_stage import method_of, rasterizer_of
 from scenewright.stages.splat.building import placed_poses
 from scenewright.stages.splat.render_stage import figures_of
 
-from benchmarks.experiment import Bench, Experiment, Interval, Results, Trial, mean, ratio
-from benchmarks.experiments.mapping.drift import drifting_poses
+from benchmarks.drifting import drifting_poses
+from benchmarks.experiment import Bench, Experiment, Results, Trial, mean, ratio
 from benchmarks.generated_rooms import STEPS, error_seed, make_room
 from benchmarks.splats.lerf import Lerf
 from benchmarks.steps import made, opened
+from benchmarks.tabulation import Figure
 
 REAL = {
     "office": "hololens_office",
@@ -314,9 +315,9 @@ def looks(trainer: Trainer, views: Sequence[PosedView]) -> tuple[float, float, f
     return means[0], means[1], float(np.mean(errors)) if errors else None
 
 
-def regained(results: Results) -> dict[str, float | Interval | None]:
+def regained(results: Results) -> dict[str, Figure | None]:
     """How much of the PSNR that drift costs adjustment gives back, the scenes of a case together."""
-    figures: dict[str, float | Interval | None] = {}
+    figures: dict[str, Figure | None] = {}
     exact = POSES_BUDGET[results.bench.quick]
     for scene in (*REAL, GENERATED):
         for arm in results.arms():
@@ -326,9 +327,8 @@ def regained(results: Results) -> dict[str, float | Interval | None]:
             ]
             shown = [[each.psnr for each in records if each is not None] for records in found]
             parts = [(row[2] - row[1], row[0] - row[1]) for row in shown if len(row) == 1 + len(POSES)]
-            if parts:
-                alone = parts[0][0] / parts[0][1] if len(parts) == 1 and parts[0][1] else None
-                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts) if len(parts) > 1 else alone
+            if sum(lost for _, lost in parts):
+                figures[f"{arm}/{scene}/{POSES[-1]}/regained"] = ratio(parts)
     return figures
 
 

@@ -35,8 +35,8 @@ from scenewright.stages.kit.registration.pyramid import build_pyramid
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.poses import laid_onto
 
+from benchmarks.drifting import drifting_poses
 from benchmarks.experiment import Bench, Experiment, Results, Trial, only
-from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS
 from benchmarks.steps import made, opened, unrecorded
 

@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.kit.measurement.proportions import wilson_interval
 from scenewright.stages.tableware import (
     EXACT,
@@ -146,10 +145,10 @@ def wilson(count: int, tables: int) -> Figure:
     return Figure(count / tables, *wilson_interval(count, tables), tables, "")
 
 
-def more_figures(results: Results) -> dict[str, float | Interval | Figure | None]:
+def more_figures(results: Results) -> dict[str, float | Figure | None]:
     """Ratios against Random, by how much faster than Pull and Stack, shares of tables no slower than the better of
     them; failed trials of all tiers."""
-    flat: dict[str, float | Interval | Figure | None] = {}
+    flat: dict[str, float | Figure | None] = {}
     for case in results.cases:
         for arm in results.arms(case):
             runs = results.of(arm, case)

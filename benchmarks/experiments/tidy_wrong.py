@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.tableware import (
     Chances,
     JointPolicy,
@@ -28,6 +27,7 @@ from scenewright.stages.tableware.planning.time_model import fitted
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, ratio
 from benchmarks.experiments.tidy_fast.arms import OURS, WORLDS
+from benchmarks.tabulation import Figure
 from benchmarks.tidy.rivals import faster, no_slower
 
 DEAR, CHEAP = 1.3, 0.7
@@ -88,10 +88,10 @@ def measure(bench: Bench, asked: Sequence[Trial]) -> Iterator[tuple[Trial, Run]]
         yield trial, trial_of(trial.arm, tier, int(delay), int(trial.seed), 20)
 
 
-def more_figures(results: Results) -> dict[str, float | Interval | None]:
+def more_figures(results: Results) -> dict[str, float | Figure | None]:
     """Beside each of ours: how much slower than with the right beliefs, how much faster than the better rival on
     average, and the share of tables on which it is no slower than either rival."""
-    flat: dict[str, float | Interval | None] = {}
+    flat: dict[str, float | Figure | None] = {}
     for case in results.cases:
         for arm in (arm for arm in results.arms(case) if arm in BELIEFS):
             at = f"{arm}/{case}"
@@ -103,8 +103,10 @@ def more_figures(results: Results) -> dict[str, float | Interval | None]:
     return flat
 
 
-def _less_one(value: Interval | None) -> Interval | None:
-    return value and Interval(value.value - 1, value.low - 1, value.high - 1)
+def _less_one(share: Figure | None) -> Figure | None:
+    if share is None or share.low is None or share.high is None:
+        return share and replace(share, value=share.value - 1)
+    return replace(share, value=share.value - 1, low=share.low - 1, high=share.high - 1)
 
 
 EXPERIMENT = Experiment(

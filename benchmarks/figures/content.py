@@ -58,11 +58,13 @@ def load_experiments(folder: Path) -> dict[str, Experiment]:
 
 
 def load_experiment(file: Path, words: Mapping[str, Any]) -> Experiment:
-    """Return one experiment; `words` are its section of words.toml: `a_case`, `interval`, `names`."""
+    """Return one experiment; `words` are its section of words.toml: `a_case`, `names`, and
+    `interval`, how its intervals were made, where the file does not say it."""
     content = json.loads(file.read_text())
     missing = [name for name in (*REQUIRED, "figures") if not content.get(name)]
     if missing or content["experiment"] != file.stem:
         raise FiguresError(f"{file.name}: {'lacks ' + ', '.join(missing) if missing else 'is of another experiment'}")
+    said = {name: content[name] for name in ("interval",) if name in content}
     figures = {}
     for key, entry in content["figures"].items():
         if len(key.split("/")) < 3 or set(entry) != {"value", "low", "high", "cases", "unit"}:
@@ -70,4 +72,4 @@ def load_experiment(file: Path, words: Mapping[str, Any]) -> Experiment:
         if (entry["low"] is None) != (entry["high"] is None):
             raise FiguresError(f"{file.name}: {key!r} has half an interval")
         figures[key] = Figure(**entry)
-    return Experiment(file.stem, {**content, **words}, figures, content.get("rows", {}))
+    return Experiment(file.stem, {**content, **words, **said}, figures, content.get("rows", {}))

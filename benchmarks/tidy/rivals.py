@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from scenewright.stages.kit.measurement.bootstrap import Interval
 
 from benchmarks.experiment import Results, ratio
+from benchmarks.tabulation import Figure
 
 SAME = 1e-6
 
 
-def against(
-    results: Results, arm: str, case: str, rival: str = "random", ending: str = ""
-) -> dict[str, Interval | None]:
+def against(results: Results, arm: str, case: str, rival: str = "random", ending: str = "") -> dict[str, Figure | None]:
     """Return the ratios against a rival: its time over the arm's, the arm's objects a trip over its."""
     pairs = results.pairs(arm, rival, case)
     return {
@@ -34,10 +34,17 @@ def no_slower(results: Results, arm: str, case: str, name: str = "time") -> floa
     return float(np.mean(shares)) if shares else None
 
 
-def faster(results: Results, arm: str, case: str) -> dict[str, Interval | None]:
+def faster(results: Results, arm: str, case: str) -> dict[str, Figure | None]:
     """Return by what share of its time an arm takes less than Pull and than Stack, over the same tables."""
-    flat: dict[str, Interval | None] = {}
+    flat: dict[str, Figure | None] = {}
     for rival in ("pull", "stack"):
         over = ratio([(a.time, b.time) for a, b in results.pairs(arm, rival, case)])
-        flat[f"{arm}/{case}/faster_than_{rival}"] = over and Interval(1 - over.value, 1 - over.high, 1 - over.low)
+        flat[f"{arm}/{case}/faster_than_{rival}"] = one_less(over)
     return flat
+
+
+def one_less(share: Figure | None) -> Figure | None:
+    """Return one less a share."""
+    if share is None or share.low is None or share.high is None:
+        return share and replace(share, value=1 - share.value)
+    return replace(share, value=1 - share.value, low=1 - share.high, high=1 - share.low)

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
+import json
 import re
+import shlex
+from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from scenewright.cli.application import build_application
+from scenewright.schemas.errors import UsageError
 from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline
+
+from benchmarks.command import bench_of, parser_of
+from benchmarks.discovery import experiment_files, load_experiment
+from benchmarks.keeping import wanted_trials
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -27,7 +35,8 @@ def in_code(text: str) -> str:
     """Return the code blocks and spans of a page, a line each."""
     blocks = re.findall(r"^```[^\n]*\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     rest = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
-    return "\n".join([*blocks, *re.findall(r"`([^`]+)`", rest)]).replace("\\\n", " ")
+    spans = [span.replace("\n", " ") for span in re.findall(r"`([^`]+)`", rest)]
+    return "\n".join([*blocks, *spans]).replace("\\\n", " ")
 
 
 def targets() -> set[str]:
@@ -109,6 +118,62 @@ def test_commands_that_are_named_exist_and_have_these_options(page: Path) -> Non
         elif flags - options()[name] - {"--help"}:
             wrong.append(f"{name}: no {', '.join(sorted(flags - options()[name]))}")
     assert wrong == []
+
+
+def benchmark_commands(text: str) -> list[list[str]]:
+    """Return the words after `python -m benchmarks` of every such command in a text of code; what a synopsis puts in
+    brackets is taken as given, and N is a number."""
+    code = re.sub(r"(?:^|\s)#.*", "", text, flags=re.MULTILINE)
+    found = re.findall(r"python -m benchmarks (?!NAME)(\w(?:'[^'\n]*'|[^'\n|;&])*)", code)
+    plain = (re.sub(r"(?<!\S)\.\.\.(?!\S)", "", re.sub(r"(?<!\S)\[|\](?!\S)", "", line)) for line in found)
+    return [shlex.split(re.sub(r"\bN\b", "1", line)) for line in plain]
+
+
+def refused(words: Sequence[str]) -> str | None:
+    """Return why `python -m benchmarks` refuses these words; None where it does not. Data need not be there."""
+    if words[0] == "gather":
+        return None if len(words) == len(("gather", "FOLDER")) else "gather takes a folder"
+    try:
+        experiment = load_experiment(words[0])
+        asked = parser_of(experiment).parse_args(words[1:])
+        bench = bench_of(experiment, vars(asked))
+        for given, known in ((asked.arms, experiment.arms), (asked.cases, experiment.cases)):
+            if unknown := [name for name in given if name not in known and not name.isupper()]:
+                return f"not in {experiment.name}: {', '.join(unknown)}"
+        if asked.seeds:
+            wanted_trials(experiment, bench, arms=asked.arms, cases=asked.cases, seeds=asked.seeds)
+    except UsageError as error:
+        return str(error)
+    except SystemExit:
+        return "the parser refuses it"
+    return None
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_experiments_that_are_printed_are_not_refused(page: Path) -> None:
+    commands = benchmark_commands(in_code(page.read_text()))
+    assert {shlex.join(words): why for words in commands if (why := refused(words))} == {}
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "docs" / "results").glob("*.json")), ids=lambda file: file.stem)
+def test_the_command_beside_figures_is_one_of_ours_and_not_refused(file: Path) -> None:
+    told = json.loads(file.read_text())["command"]
+    assert file.stem in (*experiment_files(), "board") or told.startswith(f"python -m benchmarks.{file.stem} "), (
+        "by hand"
+    )
+    for command in told.split(";"):
+        words = shlex.split(command)
+        if words[0] == "make":
+            assert words[1] in targets(), command
+        elif words[:3] == ["python", "-m", "benchmarks"]:
+            assert [refused(each) for each in benchmark_commands(command)] == [None], command
+        else:
+            assert words[:2] == ["python", "-m"] and importlib.util.find_spec(words[2]), command
+
+
+@pytest.mark.parametrize("words", ["nobody --out FOLDER", "poses", "poses --out FOLDER --arms nobody", "gather"])
+def test_what_the_program_refuses_is_noticed(words: str) -> None:
+    assert refused(words.split())
 
 
 TYPED_IN_ORDER = [

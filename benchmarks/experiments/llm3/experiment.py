@@ -6,12 +6,11 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.pack import MotionPlanner, PackingWorld, run_loop
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, only, ratio
 from benchmarks.experiments.llm3.arms import ARMS, EVERYWHERE, make_instance
-from benchmarks.tabulation import markdown
+from benchmarks.tabulation import Figure, markdown
 
 TUNING, REPORTING = range(100), range(1000, 1100)
 RIVALS = ("random", "random_restarts", "backtracking", "backtracking_corners", "ours_no_reasons")
@@ -69,9 +68,9 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]
     planner.close()
 
 
-def more_figures(results: Results) -> dict[str, float | Interval | None]:
+def more_figures(results: Results) -> dict[str, float | Figure | None]:
     """Motion-planner calls of a rival over ours where both solve, and how often both or one of them do."""
-    flat: dict[str, float | Interval | None] = {}
+    flat: dict[str, float | Figure | None] = {}
     for case in results.cases:
         for rival in RIVALS:
             pairs, at = results.pairs(rival, "ours", case), f"{rival}/{case}"

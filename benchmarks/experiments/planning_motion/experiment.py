@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field
-from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.kit.motion.rrt_connect import densify
 from scenewright.stages.kit.stage import Parameters
 
@@ -29,6 +28,7 @@ from benchmarks.experiments.planning_motion.queries import (
     room_set,
     shelf_set,
 )
+from benchmarks.tabulation import Figure
 
 QUERIES = 200
 TUNING, REPORTING = range(0, QUERIES), range(5000, 5000 + QUERIES)
@@ -134,9 +134,9 @@ MEASURES = {
 }
 
 
-def more_figures(results: Results) -> dict[str, Interval | None]:
+def more_figures(results: Results) -> dict[str, Figure | None]:
     """Rivals over ours, by the queries that both solved: ratios of medians and means of time, and of mean lengths."""
-    flat: dict[str, Interval | None] = {}
+    flat: dict[str, Figure | None] = {}
     for case in results.cases:
         for rival in RIVALS:
             both = [

@@ -22,9 +22,9 @@ from scenewright.stages.evaluate import EvaluateParameters, PredictedMap, load_m
 from scenewright.stages.kit.stage import Parameters
 
 from benchmarks.experiment import Bench, Experiment, Results, Trial
-from benchmarks.experiments.mapping.arms import Arm, all_arms
-from benchmarks.experiments.mapping.figures_of_merit import class_figures
-from benchmarks.experiments.mapping.measuring import Outcome, outcome_of_map
+from benchmarks.experiments.scenenn.arms import Arm, all_arms
+from benchmarks.experiments.scenenn.figures_of_merit import class_figures
+from benchmarks.experiments.scenenn.outcomes import Outcome, outcome_of_map
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
 from benchmarks.experiments.scenenn.tables import ALL, MEASURES, all_figures, of_ten, printed, read_published
 from benchmarks.steps import opened, step

@@ -1,4 +1,4 @@
-"""The measures of `mapping` over the thesis's ten classes, and what the thesis prints beside them."""
+"""The measures over the thesis's ten classes, and what the thesis prints beside them."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from scenewright.stages.kit.measurement.average_precision import average_precision_thesis_code
 
 from benchmarks.experiment import Measure
-from benchmarks.experiments.mapping.figures_of_merit import MEASURES as OF_MAPS
-from benchmarks.experiments.mapping.figures_of_merit import class_figures, precision_measure
-from benchmarks.experiments.mapping.measuring import Outcome
-from benchmarks.experiments.mapping.printed import PRINTED
+from benchmarks.experiments.scenenn.figures_of_merit import MEASURES as OF_MAPS
+from benchmarks.experiments.scenenn.figures_of_merit import class_figures, precision_measure
+from benchmarks.experiments.scenenn.outcomes import Outcome
 from benchmarks.tabulation import MISSING, markdown
 
 ALL = "all"
-MEASURES = {name: measure for name, measure in OF_MAPS.items() if name != "frames_per_second"} | {
+PRINTED = Path(__file__).resolve().parents[2] / "expectations" / "thesis_mapping.toml"
+MEASURES = OF_MAPS | {
     f"{name}_thesis_code": Measure(precision_measure(field, average_precision_thesis_code), interval=False)
     for name, field in (("box_ap", "boxes"), ("box_ap_refined", "boxes_refined"))
 }

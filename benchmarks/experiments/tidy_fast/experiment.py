@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from scenewright.stages.kit.measurement.bootstrap import Interval
 from scenewright.stages.tableware import PRINTED, TIERS
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, statistic
@@ -65,11 +64,11 @@ def p95(values: Sequence[float]) -> float | None:
     return float(np.percentile(values, 95)) if any(values) else None
 
 
-def more_figures(results: Results) -> dict[str, float | Interval | Figure | None]:
+def more_figures(results: Results) -> dict[str, float | Figure | None]:
     """What the thesis prints, and figures over other arms on the same tables: ratios against Random (`_piles`: against
     Random as its tier-2 figure implies), shares of tables on which ours is no slower than the better of Pull and Stack,
     gaps to the optimum."""
-    flat: dict[str, float | Interval | Figure | None] = {**printed(results)}
+    flat: dict[str, float | Figure | None] = {**printed(results)}
     for case in results.cases:
         for arm in results.arms(case):
             at = f"{arm}/{case}"

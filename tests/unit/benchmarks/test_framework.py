@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pydantic import Field
 from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.measurement.bootstrap import bootstrap_interval
 from scenewright.stages.kit.stage import Parameters
+from scipy import stats
 
 from benchmarks import command, discovery, keeping
-from benchmarks.command import run
+from benchmarks.command import changed_code, run
 from benchmarks.discovery import experiment_files, load_experiment
-from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean, share
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean, median, ratio, share
 from benchmarks.tabulation import Figure
 
 
@@ -92,7 +96,7 @@ def test_what_is_measured_is_kept_and_the_figures_are_written(tmp_path: Path, ca
     assert about["experiment"] == "small" and about["command"].endswith("--scale 2")
     assert set(figures_in(tmp_path)["ours/one/value"]) == {"value", "low", "high", "cases", "unit"}
     assert figures_in(tmp_path)["ours/one/count"]["low"] is None
-    assert "| one: ours – thesis | 2 [2, 2] |" in capsys.readouterr().out, "paired: rooms cancel"
+    assert "one: ours – thesis" not in capsys.readouterr().out, "three rooms have no interval"
     before = (tmp_path / "metrics.json").read_bytes()
     assert run(SMALL, words) == 0 and len(MEASURED) == 16, "nothing is measured twice"
     assert (tmp_path / "metrics.json").read_bytes() == before
@@ -138,30 +142,66 @@ def test_quick_tuning_and_counts_choose_the_trials(tmp_path: Path) -> None:
     assert left.value.code == 2
 
 
-def test_differences_resample_whole_rooms() -> None:
-    values = {"1a": (1.0, 0.0), "1b": (1.0, 0.0), "2a": (0.0, 0.0)}
-    records = {Trial(arm, "one", s): Row(v[k]) for s, v in values.items() for k, arm in enumerate(("ours", "thesis"))}
-    results = Results(SMALL, Bench(Path("nowhere"), Options.model_validate({})), records)
-    found = results.difference("ours", "thesis", "one", "value")
-    assert found is not None and found.value == pytest.approx(2 / 3) and (found.low, found.high) == (0.0, 1.0)
-    alone = Results(replace(SMALL, cluster=str), results.bench, {t: r for t, r in records.items() if t.seed == "1a"})
-    assert alone.difference("ours", "thesis", "one", "value") is None
+def results_with(values: dict[str, tuple[float, ...]], **changes: object) -> Results:
+    """Return the results of the small experiment's arms in the case `one`."""
+    records = {Trial(arm, "one", s): Row(x) for s, v in values.items() for arm, x in zip(SMALL.arms, v, strict=False)}
+    return Results(replace(SMALL, **changes), Bench(Path("nowhere"), Options.model_validate({})), records)
 
 
-def test_tries_that_all_came_out_alike_have_an_interval_with_a_width() -> None:
-    records = {Trial("ours", "one", str(seed)): Row(1.0) for seed in range(20)}
-    tries = replace(SMALL, cluster=str, measures={"value": share("value")})
-    bench = Bench(Path("nowhere"), Options.model_validate({}))
-    found = Results(tries, bench, records).interval("ours", "one", "value")
+def test_of_fewer_than_five_clusters_there_is_no_interval() -> None:
+    values = {f"{room}{draw}": (float(room), 0.0) for room in range(4) for draw in "ab"}
+    found = results_with(values)
+    assert found.interval("thesis", "one", "value") is None, "eight trials of four rooms"
+    assert found.difference("thesis", "ours", "one", "value") is None
+    assert results_with(values, cluster=str).interval("thesis", "one", "value") is not None
+    for of in (np.mean, np.median):
+        alone = ratio([(1.0, 2.0), (3.0, 2.0), (2.0, 2.0), (2.0, 4.0)], of)
+        assert alone is not None and alone.low is None and alone.cases == 4
+        assert ratio([], of) is None
+
+
+def test_of_five_to_nineteen_clusters_the_interval_of_a_mean_is_that_of_students_t() -> None:
+    random = np.random.default_rng(1)
+    values = {str(seed): tuple(random.normal(1.0, 0.5, 2)) for seed in range(8)}
+    found = results_with(values, cluster=str)
+    for told, of in (
+        (found.interval("thesis", "one", "value"), np.array([v[0] for v in values.values()])),
+        (found.difference("thesis", "ours", "one", "value"), np.array([v[0] - v[1] for v in values.values()])),
+    ):
+        low, high = stats.ttest_1samp(of, 0.0).confidence_interval(0.95)
+        assert told is not None and (told.value, told.low, told.high) == pytest.approx((of.mean(), low, high))
+    ratios = np.array([random.normal(2.0, 0.1, 400), np.ones(400)]).T
+    told = [ratio([(r[0], r[1]) for r in ratios[8 * k : 8 * k + 8]]) for k in range(50)]
+    assert 42 <= sum(each.low <= 2.0 <= each.high for each in told if each and each.low and each.high) <= 50
+    unequal = results_with({f"{k}{d}": (float(k),) for k in range(5) for d in "abcd"[: 1 + k % 2]})
+    told = unequal.interval("thesis", "one", "value")
+    assert told is not None and told.value == unequal.value("thesis", "one", "value") and told.low < told.value
+
+
+def test_of_many_clusters_the_interval_is_a_bootstrap_and_no_mean_has_another() -> None:
+    values = {str(seed): (float(seed % 7), 0.0) for seed in range(24)}
+    found = results_with(values, cluster=str).interval("thesis", "one", "value")
+    assert found is not None
+    assert found == bootstrap_interval(np.array([v[0] for v in values.values()]), np.random.default_rng(0))
+    few = {str(seed): (float(seed), 0.0) for seed in range(7)}
+    middle = results_with(few, cluster=str, measures={"value": median("value")}).interval("thesis", "one", "value")
+    assert middle is not None and (middle.low, middle.high) == (1.0, 5.0)
+
+
+def test_tries_that_all_came_out_alike_have_an_interval_with_a_width_or_none() -> None:
+    values = {str(seed): (1.0,) for seed in range(20)}
+    found = results_with(values, cluster=str, measures={"value": share("value")}).interval("thesis", "one", "value")
     assert found is not None
     assert (found.value, found.low, found.high) == pytest.approx((1.0, 20 / (20 + 1.959964**2), 1.0))
-    rooms = Results(replace(tries, cluster=lambda seed: seed[0]), bench, records).interval("ours", "one", "value")
-    assert rooms is not None and (rooms.low, rooms.high) == (1.0, 1.0), "several tries a room: rooms are drawn anew"
+    rooms = {f"{room}{draw}": (1.0,) for room in range(6) for draw in "ab"}
+    found = results_with(rooms, measures={"value": share("value")}).interval("thesis", "one", "value")
+    assert found is not None and (found.low, found.high) == pytest.approx((6 / (6 + 1.959964**2), 1.0)), "of six rooms"
+    assert results_with(rooms).interval("thesis", "one", "value") is None, "a mean"
 
 
 def test_every_experiment_is_found_by_its_place_and_says_what_it_shows() -> None:
     names = list(experiment_files())
-    assert {"mapping", "scene", "graph_supports", "poses", "planning_motion", "disparity"} <= set(names)
+    assert {"graph_supports", "poses", "planning_motion", "disparity"} <= set(names)
     for name in names:
         experiment = load_experiment(name)
         for text in (experiment.title, experiment.simulated, experiment.knows, experiment.does_not_show):
@@ -179,21 +219,55 @@ def test_listing_imports_no_experiment(capsys) -> None:
     assert not {name for name in set(sys.modules) - before if name.startswith("benchmarks.experiments.")}
 
 
-def test_what_is_published_is_whole_and_of_reporting_seeds(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out, folder = tmp_path / "out", tmp_path / "published"
+@pytest.fixture
+def published(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Publishing goes to this folder, and the code is in a commit."""
+    folder = tmp_path / "published"
     folder.mkdir()
-    monkeypatch.setattr(command.publish, "__defaults__", (folder,))
+    monkeypatch.setattr(command, "PUBLISHED", folder)
+    monkeypatch.setattr(command, "changed_code", list)
+    return folder
+
+
+def test_what_is_published_is_whole_and_of_reporting_seeds(tmp_path: Path, published: Path) -> None:
+    out = tmp_path / "out"
     for words in (["--quick"], ["--tuning"]):
         with pytest.raises(UsageError, match="nothing is published"):
             run(SMALL, ["small", "--out", str(tmp_path / words[0]), "--publish", *words])
+    (published / "small.json").write_text('{"written": "by hand"}')
     assert run(SMALL, ["small", "--out", str(out), "--publish"]) == 0
-    made = json.loads((folder / "small.json").read_text())
-    assert made == json.loads((out / "figures.json").read_text())
+    made = json.loads((published / "small.json").read_text())
+    assert made == json.loads((out / "figures.json").read_text()) and "written" not in made
     assert "reporting" in made["notes"] and "FOLDER" in made["command"] and "--publish" not in made["command"]
-    (lost,) = [path for path in out.rglob("record.json")][:1]
-    lost.unlink()
-    assert run(SMALL, ["small", "--out", str(out), "--publish", "--kept"]) == 0
-    (name,) = json.loads((folder / "small.json").read_text())["not_measured"]
-    assert name == "/".join(lost.relative_to(out / "trials").parts[:-2])
+    FAILS.add(Trial("ours", "one", "2a"))
+    with pytest.raises(UsageError, match="1 trials are missing"):
+        run(SMALL, ["small", "--out", str(tmp_path / "other"), "--publish", "--arms", "ours", "--cases", "one"])
+
+
+def test_records_of_other_code_are_not_published(tmp_path: Path, published: Path) -> None:
+    words = ["small", "--out", str(tmp_path / "out")]
+    assert run(SMALL, words) == 0
+    with pytest.raises(UsageError, match="any code"):
+        run(SMALL, [*words, "--publish", "--kept"])
+    assert not list(published.iterdir())
+
+
+def test_figures_of_code_in_no_commit_are_not_published(
+    tmp_path: Path, published: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "changed_code", lambda: [" M stages/fuse/stage.py"])
+    with pytest.raises(UsageError, match="stages/fuse"):
+        run(SMALL, ["small", "--out", str(tmp_path / "out"), "--publish"])
+    assert not MEASURED, "said before anything is measured"
+
+
+def test_code_counts_as_changed_where_git_says_so(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no git checkout"):
+        changed_code(tmp_path)
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "figures.json").write_text("{}")
+    assert changed_code(tmp_path) == []
+    (tmp_path / "stages").mkdir()
+    (tmp_path / "stages" / "new.py").write_text("")
+    assert changed_code(tmp_path) == ["?? stages/"]

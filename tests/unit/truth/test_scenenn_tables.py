@@ -12,7 +12,7 @@ from scenewright.stages.kit.measurement.average_precision import Candidates
 from scenewright.stages.kit.measurement.panoptic_quality import ClassQuality
 
 from benchmarks.command import main
-from benchmarks.experiments.mapping.measuring import Outcome, ranked
+from benchmarks.experiments.scenenn.outcomes import Outcome, ranked
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
 from benchmarks.experiments.scenenn.tables import all_figures, of_ten, printed, read_published
 from tests.unit.truth.scenenn_folder import SCENE, write_folder

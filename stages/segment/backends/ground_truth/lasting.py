@@ -5,7 +5,7 @@ error is drawn once for a thing, once for a thing and a region of views (`view_r
 which of the three a thing has is drawn too, in shares that give two sights of a thing the correlation that was
 measured: of two sights from one region, and from two. False masks lie on places of floor and walls, and stay there.
 
-Rates: data/errors/segmenters.toml, docs/results/mapping.md.
+Rates: data/errors/segmenters.toml, docs/results/gap.md.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The arms: which options of `segment`, `fuse` and `graph` stand for whom, and the cases they are measured in.
+"""The arms: which options of `segment`, `fuse` and `graph` stand for whom.
 
 What the arms share is not theirs to win by: frames, masks, voxel size, integrator, and the geometric segments. The
 published constants of the geometric segmentation (no smoothing, dense normals of 13 pixels, one-sided convexity) fail
-on this sensor's noise, so that every arm gets ours, which helps the rivals (docs/results/mapping.md).
+on a structured-light sensor's noise, so that every arm gets ours, which helps the rivals.
 """
 
 from __future__ import annotations
@@ -13,25 +13,6 @@ from dataclasses import dataclass
 from scenewright.stages.fuse import FuseParameters
 from scenewright.stages.graph import GraphParameters
 from scenewright.stages.segment import SegmentParameters
-
-LEVELS = {"clean": 0.0, "low": 0.15, "middle": 0.3, "high": 0.5}
-"""Corruption of the true masks by case (stages/segment/backends/ground_truth/corruption.py)."""
-LASTING = "lasting"
-LASTING_CASES = {LASTING: "detector", "lasting/network": "network"}
-"""Errors that last (stages/segment/backends/ground_truth/lasting.py): whose rates, by case; first the headline."""
-BENT = "lasting/bent"
-"""The errors of the first, and depth with bias, bending and colour beside it (depth_faults.py)."""
-NETWORK = "network"
-DRIFTING = "lasting/drifting"
-"""The errors of the headline, poses that drift (drift.py)."""
-ESTIMATED = "lasting/estimated"
-"""The errors of the headline, poses that `poses` estimates (estimated.py)."""
-CASES = (*LASTING_CASES, BENT, DRIFTING, ESTIMATED, *LEVELS, NETWORK)
-
-SHOWN = LASTING
-"""The case that the tables by room and class show; all arms run in it."""
-EVERYWHERE = frozenset({"voxblox++", "thesis_separate", "thesis", "thesis_chosen", "ours"})
-"""The arms that run in every case."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +89,3 @@ def all_arms(voxel_size: float) -> tuple[Arm, ...]:
         ),
         arm("ours", "ours", {}, {}, "ours"),
     )
-
-
-def settings(arm: Arm) -> dict[str, object]:
-    """Return what an arm sets, as plain values."""
-    return {name: getattr(arm, name).model_dump(mode="json") for name in ("segment", "fuse", "graph")}

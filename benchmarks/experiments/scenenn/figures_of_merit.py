@@ -18,12 +18,9 @@ from scenewright.stages.kit.measurement.panoptic_quality import (
     average_quality,
     average_quality_thesis_code,
 )
-from scenewright.stages.synthesize import load_recipe
 
-from benchmarks.experiment import Measure, Results
-from benchmarks.experiments.mapping.arms import SHOWN
-from benchmarks.experiments.mapping.measuring import Outcome, Ranked
-from benchmarks.generated_rooms import RECIPES
+from benchmarks.experiment import Measure
+from benchmarks.experiments.scenenn.outcomes import Outcome, Ranked
 
 Figure = Callable[[Sequence[Outcome]], float | None]
 ANY = "any"
@@ -76,44 +73,6 @@ def quality_measure(which: str, kind: str = "all") -> Figure:
     return measure
 
 
-def fixed_classes() -> frozenset[str]:
-    """Return the classes that the rooms' recipes place, and what rooms are made of: known before anything is drawn."""
-    placed = {place.class_name for recipe in RECIPES for place in load_recipe(recipe).place}
-    return frozenset(placed | {"floor", "wall", "ceiling"})
-
-
-def quality_by_room(which: str = "pq") -> Figure:
-    """Return the headline: the mean over rooms of the mean over the classes that the room has. What is found of a class
-    that a room does not have is in no class of it (`ghosts` counts that)."""
-
-    def measure(outcomes: Sequence[Outcome]) -> float | None:
-        rooms = []
-        for outcome in outcomes:
-            own = [q for q in outcome.qualities.values() if q.true_positives + q.false_negatives]
-            rooms.append(np.mean([getattr(quality, which) for quality in own]))
-        return float(np.mean(rooms)) if rooms else None
-
-    return measure
-
-
-def quality_fixed(outcomes: Sequence[Outcome]) -> float | None:
-    """PQ pooled over rooms, over the fixed classes alone; false finds of a class that a room lacks count there."""
-    fixed = fixed_classes()
-    return average_quality(q for name, q in summed_qualities(outcomes).items() if name in fixed).pq
-
-
-def ghosts(outcomes: Sequence[Outcome]) -> float:
-    """Predicted segments of classes that the room does not have, a room."""
-    return float(
-        np.mean(
-            [
-                sum(q.false_positives for q in outcome.qualities.values() if not q.true_positives + q.false_negatives)
-                for outcome in outcomes
-            ]
-        )
-    )
-
-
 def quality_thesis_code(outcomes: Sequence[Outcome]) -> float | None:
     """PQ as the thesis's code forms it: on the map's own vertices, classes never predicted left out."""
     return average_quality_thesis_code(summed_qualities(outcomes, "qualities_thesis_code").values()).pq
@@ -128,18 +87,7 @@ def precision_measure(field: str, form: Callable[[PrecisionRecall], float | None
     return measure
 
 
-def frames_per_second(outcomes: Sequence[Outcome]) -> float | None:
-    """Frames over the wall clock of geometric segmentation, fusion with the masks, and integration."""
-    seconds = sum(outcome.seconds for outcome in outcomes)
-    return sum(outcome.frames for outcome in outcomes) / seconds if seconds else None
-
-
 MEASURES = {
-    "pq_rooms": Measure(quality_by_room()),
-    "sq_rooms": Measure(quality_by_room("sq"), interval=False),
-    "rq_rooms": Measure(quality_by_room("rq"), interval=False),
-    "ghosts": Measure(ghosts),
-    "pq_fixed": Measure(quality_fixed),
     "pq": Measure(quality_measure("pq")),
     "sq": Measure(quality_measure("sq"), interval=False),
     "rq": Measure(quality_measure("rq"), interval=False),
@@ -150,7 +98,6 @@ MEASURES = {
     "instance_ap_thesis_code": Measure(precision_measure("instances", average_precision_thesis_code), interval=False),
     "box_ap": Measure(precision_measure("boxes")),
     "box_ap_refined": Measure(precision_measure("boxes_refined")),
-    "frames_per_second": Measure(frames_per_second, "frames/s", interval=False),
 }
 
 
@@ -165,12 +112,3 @@ def class_figures(outcomes: Sequence[Outcome]) -> dict[str, float | None]:
             values[f"{measure}_{name}"] = average_precision(curve)
             values[f"{measure}_thesis_code_{name}"] = average_precision_thesis_code(curve)
     return {name: value for name, value in values.items() if value is not None}
-
-
-def more_figures(results: Results) -> dict[str, float | None]:
-    """Figures by class in the case in which all arms run."""
-    return {
-        f"{arm}/{SHOWN}/{name}": value
-        for arm in results.arms(SHOWN)
-        for name, value in class_figures(results.of(arm, SHOWN)).items()
-    }
