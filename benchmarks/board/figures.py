@@ -63,6 +63,8 @@ NUMBERS = {
     "failed": "",
 }
 """Other figures, a room, and their units."""
+OF_ROOMS = ("public", "sealed", "tasks")
+"""Parts of which a line is a room."""
 DIFFERENCES = (("ours", "reference"), ("ours", "thesis"))
 DEVIATION, LEAST = "deviation between rooms", "least difference seen"
 PER_MINUTE = 60.0
@@ -89,7 +91,8 @@ def value_of(line: Line, name: str) -> float | None:
 
 def rooms_figures(lines: Iterable[Line]) -> dict[str, Figure]:
     """Return `<arm>/<part>/<case>/<measure>` of lines of generated rooms, with deviations and differences of arms."""
-    groups = {group: {line.trial.seed: line for line in found} for group, found in by_case(lines).items()}
+    own = (line for line in lines if line.trial.part in OF_ROOMS)
+    groups = {group: {line.trial.seed: line for line in found} for group, found in by_case(own).items()}
     figures: dict[str, Figure] = {}
     for (part, case, arm), by_room in groups.items():
         for name in (*SHARES, *NUMBERS):
@@ -142,6 +145,29 @@ def versions_figures(versions: Sequence[Version]) -> dict[str, Figure]:
                 figures |= differences(f"{version.commit} less {before}/versions/{part}/{case}", own, first[group])
             first.setdefault(group, own)
     return figures
+
+
+def others_figures(lines: Iterable[Line]) -> dict[str, Figure]:
+    """Return `<arm>/others/<system>/<measure>`, with the intervals that the systems' own experiments made."""
+    figures = {}
+    for line in lines:
+        if line.trial.part == "others":
+            own = line.figures
+            for name in (name for name in own if f"{name} cases" in own):
+                low, high = own.get(f"{name} low"), own.get(f"{name} high")
+                place = f"{line.trial.arm}/others/{line.trial.case}"
+                figures[f"{place}/{name}"] = Figure(own[name], low, high, round(own[f"{name} cases"]), "")
+    return figures
+
+
+def logs_figures(lines: Iterable[Line]) -> dict[str, Figure]:
+    """Return `ours/real <case>/<log>/<measure>` of recorded logs, each by itself: they are too few for an interval."""
+    return {
+        f"{line.trial.arm}/real {line.trial.case}/{line.trial.seed}/{name}": Figure(value, None, None, 1, "")
+        for line in lines
+        if line.trial.part == "real"
+        for name, value in line.figures.items()
+    }
 
 
 def line_for_a_lab(lines: Sequence[Line]) -> str:

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from benchmarks.board.method import MethodFailed
 from benchmarks.board.records import Line, Trial
@@ -15,6 +15,10 @@ from benchmarks.board.rooms import Setting
 
 PART = "others"
 QUICK_RUN = "--quick"
+BESIDE = ("low", "high", "cases")
+"""What stands in a file of figures beside a value."""
+PRINTED = "printed "
+"""How arms begin that are what a thesis prints."""
 
 
 @dataclass(frozen=True)
@@ -22,44 +26,54 @@ class System:
     """One system: which experiment, which of its arms and cases, which figures."""
 
     experiment: str
+    case: str
+    """The one that is shown."""
     figures: Sequence[str]
     """Last parts of the figures' names."""
-    options: Sequence[str] = field(default=())
+    options: Sequence[str]
 
 
 SYSTEMS = {
     "told robot": System(
         "come_robot",
+        "mixed/fast",
         ("success", "step_success", "recovery"),
         ("--cases", "mixed/fast", "--arms", "open_loop", "thesis", "ours", "--count", "40"),
     ),
     "needles": System(
         "stitch_needle",
+        "needle_all_geometry",
         ("within_tolerance", "abstained"),
         ("--cases", "geometry", "--arms", "thesis", "ours", "--count", "40"),
     ),
     "sutures": System(
         "stitch_trials",
+        "trials",
         ("sutures_to_failure",),
         ("--cases", "trials", "--arms", "thesis", "ours_thesis_eyes", "ours", "--count", "40"),
     ),
     "packing": System(
         "llm3",
+        "hard/unreachable",
         ("success", "motion_planner_calls", "seconds"),
         ("--cases", "hard/unreachable", "--arms", "backtracking_corners", "ours", "--count", "20"),
     ),
     "tables": System(
         "tidy_fast",
+        "tier2/fast",
         ("time", "objects_per_trip", "failure_rate"),
         ("--cases", "tier2/fast", "--arms", "stack", "pull", "ours", "--count", "20"),
     ),
     "words learned": System(
-        "interpret", ("success", "sentences"), ("--cases", "set_table/combined", "--arms", "thesis", "ours")
+        "interpret",
+        "set_table/combined",
+        ("success", "sentences"),
+        ("--cases", "set_table/combined", "--arms", "thesis", "ours"),
     ),
     "cutting": System(
-        "cutting", ("iou", "count_exact"), ("--cases", "n2m2", "--arms", "bc", "thesis", "ours", "--count", "6")
+        "cutting", "n2m2", ("iou", "count_exact"), ("--cases", "n2m2", "--arms", "bc", "thesis", "ours", "--count", "6")
     ),
-    "splats": System("legs", ("psnr",), ("--cases", "rooms/10s", "--arms", "thesis", "ours")),
+    "splats": System("legs", "rooms/10s", ("psnr",), ("--cases", "rooms/10s", "--arms", "thesis", "ours")),
 }
 
 
@@ -78,11 +92,15 @@ def measure_system(setting: Setting, name: str) -> Iterator[Line]:
         said = (done.stderr.strip() or "nothing was said").splitlines()[-1]
         raise MethodFailed(f"benchmarks {system.experiment}", done.returncode, said)
     seconds = spent.children_user + spent.children_system - start.children_user - start.children_system
-    by_arm: dict[tuple[str, str], dict[str, float]] = {}
+    by_arm: dict[str, dict[str, float]] = {}
     for key, figure in json.loads((out / "figures.json").read_bytes())["figures"].items():
         arm, *case, measure = key.split("/")
-        if measure in system.figures and figure["value"] is not None:
-            by_arm.setdefault((arm, "/".join(case)), {})[measure] = figure["value"]
-    for (arm, case), figures in by_arm.items():
-        trial = Trial(part=PART, case=f"{name}/{case}", seed="quick", arm=arm)
+        if measure in system.figures and "/".join(case) == system.case and not arm.startswith(PRINTED):
+            told = {
+                measure: figure["value"],
+                **{f"{measure} {what}": figure[what] for what in ("low", "high", "cases")},
+            }
+            by_arm.setdefault(arm, {}).update({name: value for name, value in told.items() if value is not None})
+    for arm, figures in by_arm.items():
+        trial = Trial(part=PART, case=name, seed=system.case.replace("/", ", "), arm=arm)
         yield setting.line(trial, "ours", setting.method, figures=figures, seconds={"all": round(seconds, 1)})

@@ -15,7 +15,14 @@ from typing import Any
 
 from scenewright.schemas.errors import BadInput, ScenewrightError
 
-from benchmarks.board.figures import Version, line_for_a_lab, rooms_figures, versions_figures
+from benchmarks.board.figures import (
+    Version,
+    line_for_a_lab,
+    logs_figures,
+    others_figures,
+    rooms_figures,
+    versions_figures,
+)
 from benchmarks.board.inputs import BOARD, GENERATOR
 from benchmarks.board.looks import LOOKS, Look, read_looks
 from benchmarks.board.records import RECORDS, Line, by_case, read_lines
@@ -56,7 +63,8 @@ def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, A
     if not versions:
         raise BadInput("nothing is measured yet", hint="make board")
     newest = versions[-1]
-    figures = rooms_figures(newest.lines) | versions_figures(versions)
+    figures = rooms_figures(newest.lines) | others_figures(newest.lines) | logs_figures(newest.lines)
+    figures |= versions_figures(versions)
     judges = sorted({line.judge for version in versions for line in version.lines})
     return {
         "experiment": "board",

@@ -31,7 +31,7 @@ def quick_table(lines: Sequence[Line]) -> str:
     rows.append((f"sealed rooms, {HEADLINE}", f"{NOT_RUN}: a quick look would be a look"))
     units = [unit for shard in all_shards().values() for unit in shard if unit.part in ("tasks", "real", "others")]
     for part, name in dict.fromkeys((unit.part, unit.name if unit.part != "tasks" else "") for unit in units):
-        own = [line for line in lines if line.trial.part == part and line.trial.case.startswith(f"{name}/")]
+        own = [line for line in lines if line.trial.part == part and line.trial.case == name]
         said = "; ".join(f"{line.trial.arm} {_numbers(line)}" for line in own) or NOT_RUN
         rows.append((f"{part} {name}".strip(), said))
     return markdown("One room, so no interval: nothing here is published", ("what", "came of it"), rows)

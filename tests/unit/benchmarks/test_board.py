@@ -12,18 +12,22 @@ from scenewright.schemas.errors import BadInput
 from scipy import stats
 
 from benchmarks.board import checking, publishing
-from benchmarks.board.figures import Version, rooms_figures, value_of, versions_figures
+from benchmarks.board.figures import Version, others_figures, rooms_figures, value_of, versions_figures
 from benchmarks.board.generator.lacking import without_styles
 from benchmarks.board.generator.spoil import DepthFaults, drawn_faults
 from benchmarks.board.inputs import LADDER, PUBLIC, RUNGS, Rung, error_seed
 from benchmarks.board.looks import note_look, read_looks
 from benchmarks.board.method import Method
+from benchmarks.board.others import SYSTEMS
 from benchmarks.board.quick import NOT_RUN, quick_table, quick_units
 from benchmarks.board.reconstruct import ARMS
 from benchmarks.board.records import Line, Trial, key_of, line_text, read_lines, write_lines
 from benchmarks.board.rooms import SEALED_RECIPES, sealed_seed
 from benchmarks.board.shards import all_shards
 from benchmarks.board.statistics import over_rooms, paired
+from benchmarks.command import parser_of
+from benchmarks.discovery import load_experiment
+from benchmarks.tabulation import Figure
 
 
 def line(room: str = "office-1", arm: str = "ours", part: str = "sealed", **told: object) -> Line:
@@ -188,6 +192,22 @@ def test_figures_are_means_over_rooms_and_differences_are_paired() -> None:
     assert figures["ours/sealed/everything/found"].value == pytest.approx(0.525)
     less = figures["ours less thesis/sealed/everything/found"]
     assert less.value == pytest.approx(0.2) and less.cases == 6
+
+
+def test_other_systems_keep_the_intervals_of_their_experiments() -> None:
+    told = {"success": 0.5, "success low": 0.4, "success high": 0.6, "success cases": 40.0, "calls": 3.0}
+    robot = line().model_copy(
+        update={"trial": Trial(part="others", case="told robot", seed="mixed", arm="ours"), "figures": told}
+    )
+    assert others_figures([robot, line()]) == {"ours/others/told robot/success": Figure(0.5, 0.4, 0.6, 40, "")}
+    assert not rooms_figures([robot])
+
+
+def test_every_system_names_an_arm_case_and_figure_that_its_experiment_has() -> None:
+    for name, system in SYSTEMS.items():
+        experiment = load_experiment(system.experiment)
+        asked = parser_of(experiment).parse_args(["--out", "x", "--quick", *system.options])
+        assert set(asked.arms) <= set(experiment.arms) and set(asked.cases) <= set(experiment.cases), name
 
 
 def test_versions_are_paired_with_the_first() -> None:
