@@ -96,11 +96,8 @@ def measure_system(setting: Setting, name: str) -> Iterator[Line]:
     for key, figure in json.loads((out / "figures.json").read_bytes())["figures"].items():
         arm, *case, measure = key.split("/")
         if measure in system.figures and "/".join(case) == system.case and not arm.startswith(PRINTED):
-            told = {
-                measure: figure["value"],
-                **{f"{measure} {what}": figure[what] for what in ("low", "high", "cases")},
-            }
-            by_arm.setdefault(arm, {}).update({name: value for name, value in told.items() if value is not None})
+            values = [(measure, figure["value"]), *((f"{measure} {what}", figure[what]) for what in BESIDE)]
+            by_arm.setdefault(arm, {}).update({name: float(value) for name, value in values if value is not None})
     for arm, figures in by_arm.items():
         trial = Trial(part=PART, case=name, seed=system.case.replace("/", ", "), arm=arm)
         yield setting.line(trial, "ours", setting.method, figures=figures, seconds={"all": round(seconds, 1)})
