@@ -118,7 +118,7 @@ ASKED = $(if $(QUICK),--quick) $(if $(FRESH),--fresh) $(OPTIONS)
 REAL_DATA ?= ../shared/data
 
 .PHONY: board board-check
-# Nine shards of at most twenty minutes on two cores: SHARDS="public-1 real" runs some, METHOD=commit measures another
+# Twelve shards of at most twenty minutes on two cores: SHARDS="public-1 real" runs some, METHOD=commit measures another
 # commit, COMMIT=1 commits the records of each. QUICK=1: one small room and whatever else five minutes allow.
 board: setup ## The benchmark whose rooms stay the same: METHOD=commit SHARDS="..." TRUTH=folder COMMIT=1 (QUICK=1: 5 minutes)
 	$(PYTHON) -m benchmarks.board --out $(OUTPUTS)/board $(if $(QUICK),--quick) $(if $(METHOD),--method $(METHOD)) $(if $(SHARDS),--shards $(SHARDS)) $(if $(TRUTH),--truth $(TRUTH)) $(if $(COMMIT),--commit) --data $(REAL_DATA)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from itertools import accumulate
 from multiprocessing import get_context
 
 from scenewright.schemas.errors import ScenewrightError
@@ -48,20 +49,19 @@ def _room_and_rungs(name: str) -> tuple[str, tuple[str, ...]]:
 
 def all_shards() -> dict[str, list[Unit]]:
     """Return the shards by name, in the order in which they are measured."""
-    public = [Unit("public", room) for room in public_rooms()]
-    sealed = [Unit("sealed", str(number)) for number in range(len(SEALED_RECIPES))]
-    tasked = [Unit("tasks", str(number)) for number in range(tasks.ROOMS)]
-    return {
-        "public-1": public[:3],
-        "public-2": public[3:6],
-        "public-3": public[6:],
-        "sealed-1": sealed[:6],
-        "sealed-2": sealed[6:],
-        "tasks-1": tasked[: tasks.ROOMS // 2],
-        "tasks-2": tasked[tasks.ROOMS // 2 :],
-        "real": [Unit("real", name) for name in real_logs.names()],
-        "others": [Unit("others", name) for name in others.SYSTEMS],
+    parts = {
+        "public": ([Unit("public", room) for room in public_rooms()], (2, 2, 2, 10)),
+        "real": ([Unit("real", name) for name in real_logs.names()], (len(real_logs.names()),)),
+        "sealed": ([Unit("sealed", str(number)) for number in range(len(SEALED_RECIPES))], (4, 4, 4)),
+        "others": ([Unit("others", name) for name in others.SYSTEMS], (len(others.SYSTEMS),)),
+        "tasks": ([Unit("tasks", str(number)) for number in range(tasks.ROOMS)], (4, 4, 4)),
     }
+    shards = {}
+    for part, (units, sizes) in parts.items():
+        for number, last in enumerate(accumulate(sizes), start=1):
+            name = part if len(sizes) == 1 else f"{part}-{number}"
+            shards[name] = units[last - sizes[number - 1] : last]
+    return shards
 
 
 def measure_shard(
