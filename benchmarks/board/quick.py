@@ -19,7 +19,7 @@ NOT_RUN = "not run"
 
 def quick_units() -> list[Unit]:
     """Return the units of a quick run."""
-    return [*(Unit("public", f"{ROOM} {rung}") for rung in RUNS), Unit("others", SYSTEM)]
+    return [Unit("public", " ".join((ROOM, *RUNS))), Unit("others", SYSTEM)]
 
 
 def quick_table(lines: Sequence[Line]) -> str:
