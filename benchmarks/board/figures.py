@@ -100,7 +100,7 @@ def rooms_figures(lines: Iterable[Line]) -> dict[str, Figure]:
             if (spread := over_rooms(values, share=name in SHARES)) is None:
                 continue
             place = f"{arm}/{part}/{case}"
-            figures[f"{place}/{name}"] = shown(spread, NUMBERS.get(name, ""))
+            figures[f"{place}/{name}"] = shown(spread, NUMBERS.get(name, ""), least=0.0)
             if name in SHARES and spread.deviation is not None:
                 figures[f"{place}, {DEVIATION}/{name}"] = Figure(spread.deviation, None, None, spread.rooms, "")
             if name in SHARES and spread.least_seen is not None:
@@ -163,7 +163,7 @@ def others_figures(lines: Iterable[Line]) -> dict[str, Figure]:
 def logs_figures(lines: Iterable[Line]) -> dict[str, Figure]:
     """Return `ours/real <case>/<log>/<measure>` of recorded logs, each by itself: they are too few for an interval."""
     return {
-        f"{line.trial.arm}/real {line.trial.case}/{line.trial.seed}/{name}": Figure(value, None, None, 1, "")
+        f"{line.trial.arm}/real {line.trial.case}/{line.trial.seed}/{name}": Figure(value, None, None, None, "")
         for line in lines
         if line.trial.part == "real"
         for name, value in line.figures.items()
@@ -188,9 +188,10 @@ def line_for_a_lab(lines: Sequence[Line]) -> str:
     )
 
 
-def shown(spread: Spread, unit: str) -> Figure:
-    """Return a mean as it stands in a file of figures, to six digits."""
+def shown(spread: Spread, unit: str, least: float | None = None) -> Figure:
+    """Return a mean as it stands in a file of figures, to six digits; nothing is below `least`."""
     low, high = (None if value is None else _digits(value) for value in (spread.low, spread.high))
+    low = low if low is None or least is None else max(low, least)
     return Figure(_digits(spread.mean), low, high, spread.rooms, unit)
 
 

@@ -65,7 +65,7 @@ def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, A
     newest = versions[-1]
     figures = rooms_figures(newest.lines) | others_figures(newest.lines) | logs_figures(newest.lines)
     figures |= versions_figures(versions)
-    judges = sorted({line.judge for version in versions for line in version.lines})
+    judges = sorted({(line.trial.part, line.judge) for version in versions for line in version.lines})
     return {
         "experiment": "board",
         "title": "The board: figures that versions can be compared by",
@@ -75,8 +75,8 @@ def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, A
         "command": "make board",
         **ABOUT,
         "notes": f"Board {BOARD}: rooms by the generator of {GENERATOR}. Looks at sealed rooms: {len(looks)}, of "
-        f"{len({look.digest for look in looks})} methods. Judged by {len(judges)} version(s) of the measures: "
-        f"{', '.join(judges)}.",
+        f"{len({look.digest for look in looks})} methods. Judges, whose figures compare where they are the same: "
+        f"{', '.join(f'{part} {judge}' for part, judge in judges)}.",
         "figures": {name: asdict(figure) for name, figure in sorted(figures.items())},
         "rows": {"looks": looks_rows(looks), "lines": lab_rows(newest.lines)},
     }
