@@ -41,7 +41,13 @@ ABOUT = {
     "have the rates of real ones, not their shapes. Long walks and large pictures: forty frames of 320 x 240 a room. "
     "Public rooms have been seen; sealed ones are of the same six recipes.",
 }
-SHOWN_OVER_VERSIONS = ("pq", "support_f1", "functional", "at_rest_of_true", "found_large")
+SHOWN_OVER_VERSIONS = {
+    "pq": "panoptic quality",
+    "support_f1": "F1 of supports",
+    "functional": "functionally equivalent",
+    "at_rest_of_true": "at rest, of the true",
+    "found_large": "large things found",
+}
 
 
 def read_versions(folder: Path = RECORDS / "records") -> list[Version]:
@@ -116,7 +122,7 @@ def draw(figures: Mapping[str, Figure], versions: Sequence[Version], file: Path)
 
     figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
     names = [version.commit for version in versions]
-    for measure in SHOWN_OVER_VERSIONS:
+    for measure, words in SHOWN_OVER_VERSIONS.items():
         found = [figures.get(f"{name}/versions/public/everything/{measure}") for name in names]
         known = [(place, one) for place, one in enumerate(found) if one is not None]
         if known:
@@ -125,7 +131,7 @@ def draw(figures: Mapping[str, Figure], versions: Sequence[Version], file: Path)
                 [one.value - (one.low or one.value) for _, one in known],
                 [(one.high or one.value) - one.value for _, one in known],
             ]
-            axes.errorbar(places, values, reach, marker="o", capsize=3, label=measure.replace("_", " "))
+            axes.errorbar(places, values, reach, marker="o", capsize=3, label=words)
     axes.set_xticks(range(len(names)), names)
     axes.set_ylim(0, 1)
     axes.set_ylabel("mean over public rooms")
