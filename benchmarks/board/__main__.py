@@ -58,10 +58,12 @@ def parser() -> argparse.ArgumentParser:
 
 def run(asked: argparse.Namespace) -> int:
     """Measure shard after shard. Raises ScenewrightError."""
-    setting = setting_of(asked.out.resolve(), asked.method, keep=asked.keep, data=asked.data.resolve())
-    if asked.truth is not None:
-        print(line(measure_truth(setting.method, asked.truth.resolve(), setting.work / "truth")))
+    out = asked.out.resolve()
+    if asked.truth is not None:  # needs neither generator nor reference, so no history of git
+        method = Method(checkout_of(asked.method, out / "checkouts")) if asked.method else Method()
+        print(line(measure_truth(method, asked.truth.resolve(), out / "work" / "truth")))
         return 0
+    setting = setting_of(out, asked.method, keep=asked.keep, data=asked.data.resolve())
     if asked.quick:
         return quick(setting, asked.jobs)
     shards = all_shards()
