@@ -149,9 +149,9 @@ def test_free_means_free_while_carrying_and_with_a_door_elsewhere(checker: Colli
 
 
 def test_what_may_be_touched_is_not_in_the_way(checker: CollisionChecker) -> None:
-    names = checker.compiled.groups
     checker.allow(touch=("bottle_7",))
-    _, scene = checker.arrays()
+    _, scene = checker.arrays()  # compiles anew what was put down or opened since
+    names = checker.compiled.groups
     hand = checker.compiled.parts.index(PANDA.hand_link)
     arm = checker.compiled.parts.index("panda_link4")
     bottle = names.index("bottle_7")
