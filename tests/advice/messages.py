@@ -1,0 +1,69 @@
+"""Find the messages of the program that name an option or a command."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PLACES = ("cli", "stages", "schemas")
+ADVISES = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]+|\bscenewright [a-z]+|\bpip install\b|\bexport [A-Z{]")
+DECLARATIONS = {
+    *("Argument", "Option", "option", "Field", "Stage", "External", "Extra", "BackendDeclaration"),
+    *("TrainingDeclaration", "add_argument", "add_parser", "ArgumentParser", "compile", "add_typer", "command"),
+}
+"""Calls whose strings are help texts or names, which `tests/contract/test_docs.py` reads."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A string of the source, `{}` where a value stands."""
+
+    path: str
+    line: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: {self.text}"
+
+
+def messages() -> list[Message]:
+    """Return the messages of `cli`, `stages` and `schemas`, in order of place."""
+    files = [path for place in PLACES for path in sorted((ROOT / place).rglob("*.py"))]
+    return [message for path in files for message in messages_of(path.read_text(), str(path.relative_to(ROOT)))]
+
+
+def messages_of(source: str, path: str) -> Iterator[Message]:
+    """Yield the messages of one file: no docstrings, help texts, or bare names of options."""
+    tree = ast.parse(source)
+    passed_over = {id(inner) for node in ast.walk(tree) for inner in _not_messages(node)}
+    for node in ast.walk(tree):
+        text = None if id(node) in passed_over else _text(node)
+        if text is not None and ADVISES.search(text) and not re.fullmatch(r"--[a-z0-9-]+", text.strip()):
+            yield Message(path, node.lineno, text)  # type: ignore[attr-defined]
+
+
+def _not_messages(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield what below a node is no message of its own."""
+    if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+        strings = [entry for entry in node.body if isinstance(entry, ast.Expr)]
+        yield from (entry.value for entry in strings if isinstance(entry.value, ast.Constant))
+    elif isinstance(node, ast.Call) and ast.unparse(node.func).rsplit(".", 1)[-1] in DECLARATIONS:
+        yield from ast.walk(node)
+    elif isinstance(node, ast.JoinedStr | ast.BinOp) and _text(node) is not None:
+        yield from (inner for inner in ast.walk(node) if inner is not node)
+
+
+def _text(node: ast.AST) -> str | None:
+    """Return the text of a string, a formatted string or a sum of them; None for anything else."""
+    if isinstance(node, ast.Constant):
+        return node.value if isinstance(node.value, str) else None
+    if isinstance(node, ast.JoinedStr):
+        return "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        parts = _text(node.left), _text(node.right)
+        return None if parts == (None, None) else "".join("{}" if part is None else part for part in parts)
+    return None
