@@ -15,6 +15,7 @@ from scenewright.stages.segment.backends.masks import MasksParameters
 from scenewright.stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
 from scenewright.stages.segment.backends.masks.listing import HINT, Listing
 from scenewright.stages.segment.backends.masks.matching import WAYS, match_pictures
+from scenewright.stages.segment.backends.masks.unread import kinds_of_files, way_of
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
 from scenewright.stages.segment.naming import NamedSegment, name_segments
@@ -34,6 +35,8 @@ class Tally:
     frames: int = 0
     """In which masks overlapped."""
     faint: int = 0
+    empty: int = 0
+    ignored_frames: int = 0
 
 
 class MasksBackend:
@@ -117,6 +120,8 @@ class MasksBackend:
         self._tally.overlapping += frame_masks.overlapping
         self._tally.frames += frame_masks.overlapping > 0
         self._tally.faint += frame_masks.faint
+        self._tally.empty += frame_masks.empty
+        self._tally.ignored_frames += frame_masks.ignored > 0
 
     def _report(self) -> None:
         if self._tally.overlapping:
@@ -135,6 +140,19 @@ class MasksBackend:
                 self._settings[0],
             )
 
+        if self._tally.empty:
+            logger.warning(
+                "%s: %d annotations have no mask (a box, a line, `segmentation: []`) or no pixel, and were left out",
+                self._root,
+                self._tally.empty,
+            )
+        if self._tally.ignored_frames:
+            logger.info(
+                "%s: 255 (of 16 bits also 65535) is in no list of classes and was taken for no mask in %d frames",
+                self._root,
+                self._tally.ignored_frames,
+            )
+
 
 def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
     """Return the format of a folder and its masks. Raises BadInput when it is of none, or broken."""
@@ -146,7 +164,10 @@ def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
         if source is not None:
             return form, source
     format_list = "; ".join(f"{form.name} ({form.summary})" for form in formats)
-    raise BadInput(f"{listing.root}: holds no masks that are read here", hint=f"formats: {format_list}")
+    raise BadInput(
+        f"{listing.root}: holds no masks that are read here ({kinds_of_files(listing)})",
+        hint=way_of(listing) or f"formats: {format_list}",
+    )
 
 
 def _labels(source: MaskSource, label_set: LabelSet | None, where: str) -> dict[int, Label]:

@@ -13,8 +13,8 @@ LARGEST_JSON = 512 * 2**20
 """Most bytes of a JSON file."""
 MOST_FILES = 200_000
 """Most files of a folder of masks; a guard, by eye."""
-CLASS_FILES = ("classes.json", "classes.txt")
-"""Files that say which number is which class; no masks."""
+CLASS_FILES = ("classes.json", "classes.txt", "class_names.txt", "_classes.csv")
+"""Files that say which number is which class; no masks. The last two are labelme2voc's and Roboflow's."""
 HINT = "docs/MASKS.md lists what is read"
 
 
@@ -40,7 +40,11 @@ class Listing:
 
     def class_file(self) -> Path | None:
         """Return the class file of the folder, if there is one."""
-        return next((file for name in CLASS_FILES for file in self.files if file.name == name), None)
+        return self.named(*CLASS_FILES)
+
+    def named(self, *names: str) -> Path | None:
+        """Return the first file of one of these names, if there is one."""
+        return next((file for name in names for file in self.files if file.name == name), None)
 
     def json(self, path: Path) -> Any:
         """Return what a JSON file holds; it is kept."""
