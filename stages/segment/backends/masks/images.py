@@ -39,7 +39,7 @@ def read_instances(path: Path, shape: tuple[int, int]) -> tuple[np.ndarray, bool
     if data[COLOR_TYPE_AT] == PALETTE:
         return _palette_indices(path, data), True
     image = _decoded(path, data)
-    if image.ndim == 3 and (image[..., :1] == image[..., :3]).all() and (image[..., 3:] == image[..., 3:].max()).all():
+    if image.ndim == 3 and (image[..., :1] == image[..., :3]).all() and len(np.unique(image[..., 3:])) < 2:
         image = image[..., 0]  # grey, stored as colour
     if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
         raise BadInput(

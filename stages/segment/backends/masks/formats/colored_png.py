@@ -75,7 +75,7 @@ def read_label_map(path: Path) -> tuple[dict[int, int], dict[int, Category]]:
         name, _, rest = line.partition(":")
         parts = rest.split(":")[0].split(",")
         if not name.strip() or len(parts) != 3 or not all(p.strip().isdecimal() and int(p) < 256 for p in parts):
-            raise BadInput(f"{path}: {line:.60!r} says no colour of a label", hint=HINT)
+            raise BadInput(f"{path}: {line!r:.60} says no colour of a label", hint=HINT)
         red, green, blue = (int(part) for part in parts)
         color = red + 256 * green + 65536 * blue
         if color in colors:
@@ -83,11 +83,11 @@ def read_label_map(path: Path) -> tuple[dict[int, int], dict[int, Category]]:
             raise BadInput(
                 f"{path}: {name!r} and {other!r} have one colour", hint="give each label a colour of its own"
             )
-        colors[color] = len(categories)
-        categories[len(categories)] = Category(name.strip())
+        colors[color] = len(categories) + 1
+        categories[colors[color]] = Category(name.strip())
     if not categories:
         raise BadInput(f"{path}: lists no labels", hint=HINT)
-    return colors, categories
+    return {0: 0, **colors}, categories
 
 
 def voc_colors(count: int) -> list[int]:

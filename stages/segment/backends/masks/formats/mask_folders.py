@@ -60,7 +60,10 @@ def open_source(listing: Listing) -> MaskSource | None:
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
         masks, told = [], []
         for file in members[names[place]]:
-            masks.append(_mask(file, shape))
+            mask = _mask(file, shape)
+            if not mask.any():
+                continue  # a thing that this picture does not show
+            masks.append(mask)
             score = scores.get(file.parent, {}).get(file.stem, 1.0)
             told.append(GivenMask(None if of_pictures else numbers.get(file.parent.name), score))
         return flatten_encoded(masks, told, settings, shape, str(listing.root / names[place]))
@@ -96,7 +99,7 @@ def _scores(table: Path) -> dict[str, float]:
         try:
             scores[row[columns[0]]] = min(1.0, *(float(row[column]) for column in columns[1:]))
         except (ValueError, IndexError):
-            raise BadInput(f"{table}: {','.join(row):.60!r} is no row of numbers", hint="write it again") from None
+            raise BadInput(f"{table}: {','.join(row)!r:.60} is no row of numbers", hint="write it again") from None
     return {name: score if score >= 0 else 0.0 for name, score in scores.items()}
 
 

@@ -75,13 +75,13 @@ def _is_label(path: Path) -> bool:
 def _row(line: str, path: Path) -> tuple[int, np.ndarray | None, float]:
     """Return class, polygon (K, 2) in shares of the picture (None: a box), and score."""
     if not _is_row(line):
-        raise BadInput(f"{path}: {line:.60!r} is no row of numbers", hint=HINT)
+        raise BadInput(f"{path}: {line!r:.60} is no row of numbers", hint=HINT)
     words = line.split()
     values = np.array([float(word) for word in words[1:]])
     score = float(values[-1]) if len(values) % 2 else 1.0
     points = values[: len(values) // 2 * 2]
     if not ((points >= -SLACK) & (points <= 1 + SLACK)).all() or not 0 <= score <= 1:
-        raise BadInput(f"{path}: {line:.60!r} has a number that is not in 0..1", hint=HINT)
+        raise BadInput(f"{path}: {line!r:.60} has a number that is not in 0..1", hint=HINT)
     return int(words[0]), points.reshape(-1, 2) if len(points) >= BOX + 1 else None, score
 
 
