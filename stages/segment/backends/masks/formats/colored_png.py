@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.segment.backends.detector.semantic import VOC_NAMES
 from scenewright.stages.segment.backends.masks.classes import lines_of, read_classes
 from scenewright.stages.segment.backends.masks.given import (
     Category,
@@ -30,9 +31,6 @@ LABEL_MAP = "labelmap.txt"
 HINT = f"{LABEL_MAP}: a line `chair:128,0,0` for each class"
 CLASS_FOLDERS = ("SegmentationClass", "SegmentationClassPNG")
 OBJECT_FOLDERS = ("SegmentationObject", "SegmentationObjectPNG")
-VOC_NAMES = """background aeroplane bicycle bird boat bottle bus car cat chair cow diningtable dog horse motorbike
-person pottedplant sheep sofa train tvmonitor"""
-"""PASCAL VOC's classes, in its order (0: the background)."""
 RIM = 255
 """The index of the rim around VOC's objects, and of what is to be ignored."""
 
@@ -51,7 +49,7 @@ def open_source(listing: Listing) -> MaskSource | None:
     else:
         given, divisor = read_classes(listing)
         colors = {color: index for index, color in enumerate(voc_colors(RIM + 1))}
-        categories = given or {number: Category(name) for number, name in enumerate(VOC_NAMES.split())}
+        categories = given or {number: Category(name) for number, name in enumerate(VOC_NAMES)}
     source = label_map.name if label_map else getattr(listing.class_file(), "name", "PASCAL VOC's classes")
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
