@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -117,9 +118,8 @@ def coco_in_parts(root: Path) -> None:
 
 def labelme(root: Path) -> None:
     _, png = cv2.imencode(".png", np.full((12, 10), 255, np.uint8))
-    rectangle = {"label": "table", "points": [TABLE[0], TABLE[2]], "shape_type": "rectangle"}
     halves = [
-        {"label": "table", "points": TABLE, "shape_type": "polygon", "group_id": 1},
+        {"label": "table", "points": [TABLE[0], TABLE[2]], "shape_type": "rectangle", "group_id": 1},
         {"label": "table", "points": [[5, 21], [9, 21], [9, 30]], "shape_type": "polygon", "group_id": 1},
     ]
     crop = {
@@ -129,7 +129,6 @@ def labelme(root: Path) -> None:
         "mask": base64.b64encode(png.tobytes()).decode(),
     }
     point = {"label": "cup", "points": [[1, 1]], "shape_type": "point"}
-    assert rectangle["label"] == "table"
     for k, shapes in ((2, [*halves, crop, point]), (3, [])):
         data = {"shapes": shapes, "imagePath": f"..\\rgb\\{k:06d}.png", "imageData": None}
         (root / f"{k:06d}.json").write_text(json.dumps({**data, "imageWidth": WIDTH, "imageHeight": HEIGHT}))
@@ -180,6 +179,26 @@ def label_studio(root: Path) -> None:
     (root / "project-1-at-2026.json").write_text(json.dumps(tasks))
 
 
+def label_studio_in_short(root: Path) -> None:
+    label_studio(root)
+    (file,) = root.iterdir()
+    tasks = json.loads(file.read_text())
+    rows = [
+        {
+            "image": task["data"]["image"],
+            "id": task["id"],
+            "label": [
+                {**row["value"], **{key: row[key] for key in ("original_width", "original_height")}}
+                for row in task["annotations"][1]["result"]
+                if "original_width" in row
+            ],
+            "annotator": 1,
+        }
+        for task in tasks
+    ]
+    file.write_text(json.dumps(rows))
+
+
 def yolo(root: Path, names: str = "names: [table, cup]\n") -> None:
     (root / "labels").mkdir()
     (root / "data.yaml").write_text(f"path: .\n{names}")
@@ -222,7 +241,7 @@ def palettes_of_roboflow(root: Path) -> None:
         cv2.imwrite(str(root / f"{k:06d}_jpg.rf.0a1b2c3d4e5f60718293a4b5c6d7e8f9_mask.png"), values.astype(np.uint8))
 
 
-def colors(root: Path, palette: bool = False) -> None:
+def colors(root: Path) -> None:
     (root / "labelmap.txt").write_text(
         "# label:color_rgb:parts:actions\nbackground:0,0,0::\ncup:0,128,0::\ntable:250,50,83::\n"
     )
@@ -230,6 +249,14 @@ def colors(root: Path, palette: bool = False) -> None:
     for k, values in ((2, VALUES), (3, VALUES * 0)):
         image = np.array([[0, 0, 0], [250, 50, 83], [0, 128, 0]], np.uint8)[values]
         Image.fromarray(image).save(root / "SegmentationClass" / f"{k:06d}.png")
+
+
+def colors_beside_a_label_map(root: Path) -> None:
+    """Without folders, and black is no label: what the refusal of colours tells to do."""
+    colors(root)
+    (root / "labelmap.txt").write_text("table:250,50,83\ncup:0,128,0\n")
+    for file in (root / "SegmentationClass").iterdir():
+        file.rename(root / file.name)
 
 
 def colors_in_a_palette(root: Path) -> None:
@@ -260,12 +287,14 @@ LAYOUTS: dict[str, tuple[Callable[[Path], None], str]] = {
     "LabelMe": (labelme, "LabelMe"),
     "VIA": (via, "VIA"),
     "Label Studio": (label_studio, "Label Studio"),
+    "Label Studio, in short": (label_studio_in_short, "Label Studio"),
     "YOLO": (yolo, "YOLO outlines"),
     "YOLO, numbered names": (yolo_names_by_number, "YOLO outlines"),
     "YOLO, names in lines": (yolo_names_in_lines, "YOLO outlines"),
     "palettes": (palettes, "instance PNG"),
     "masks of Roboflow": (palettes_of_roboflow, "instance PNG"),
     "colours": (colors, "coloured PNG"),
+    "colours without folders": (colors_beside_a_label_map, "coloured PNG"),
     "colours in a palette": (colors_in_a_palette, "coloured PNG"),
     "a folder a class": (class_folders, "mask PNGs"),
 }
@@ -474,7 +503,7 @@ def test_stacks_that_are_not_understood(tmp_path: Path, arrays: Any, message: st
     np.savez(tmp_path / "000002.npz", **arrays)
     with pytest.raises(BadInput, match=message) as caught:
         opened(tmp_path)[1].read(0, SHAPE, SETTINGS)
-    assert caught.value.hint and __import__("re").search(hint, caught.value.hint)
+    assert caught.value.hint and re.search(hint, caught.value.hint)
 
 
 def test_logits_are_masks_when_the_advice_is_followed(tmp_path: Path) -> None:

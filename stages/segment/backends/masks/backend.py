@@ -142,7 +142,7 @@ class MasksBackend:
 
         if self._tally.empty:
             logger.warning(
-                "%s: %d annotations have no mask (a box, a line, `segmentation: []`) or no pixel, and were left out",
+                "%s: annotations without a mask (a box, a line, `segmentation: []`) or a pixel, left out: %d",
                 self._root,
                 self._tally.empty,
             )

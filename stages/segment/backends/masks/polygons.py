@@ -26,7 +26,7 @@ def fill(polygons: Sequence[np.ndarray], shape: tuple[int, int]) -> np.ndarray:
     """Return the mask (H, W) bool of what polygons (K, 2) x, y [pixels] enclose, together; (0, 0) is the corner of the
     first pixel. What reaches over the picture is cut off. Raises BadInput for numbers that are not finite, and for an
     outline that is longer than any picture's."""
-    mask = np.zeros(shape, dtype=bool)
+    columns = np.zeros(shape[::-1], dtype=bool)
     steps = 0.0
     for points in polygons:
         if not np.isfinite(points).all():
@@ -35,12 +35,13 @@ def fill(polygons: Sequence[np.ndarray], shape: tuple[int, int]) -> np.ndarray:
     if steps > LONGEST_OUTLINE:
         raise BadInput(f"its outline is {steps / STEPS:.0f} pixels long", hint="coordinates of polygons are pixels")
     for points in polygons:
-        mask |= _fill_one(points, shape)
-    return mask
+        _fill_one(points, columns)
+    return np.ascontiguousarray(columns.T)
 
 
-def _fill_one(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    height, width = shape
+def _fill_one(points: np.ndarray, columns: np.ndarray) -> None:
+    """Set the pixels of `columns` (W, H) that a polygon encloses."""
+    width, height = columns.shape
     first = np.trunc(STEPS * points + 0.5).astype(np.int64)
     last = np.roll(first, -1, axis=0)
     span = np.abs(last - first)
@@ -59,8 +60,13 @@ def _fill_one(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     left = np.where(u[1:] < u[:-1], u[1:], u[1:] - 1)
     middle = (u[1:] != u[:-1]) & (left % STEPS == STEPS // 2) & (left >= 0) & (left // STEPS < width)
     row = np.ceil(np.clip((np.minimum(v[1:], v[:-1])[middle] + 0.5) / STEPS - 0.5, 0, height)).astype(np.int64)
-    passed = np.bincount(left[middle] // STEPS * height + row, minlength=height * width + 1)[: height * width]
-    return (np.cumsum(passed) % 2 == 1).reshape(shape, order="F")
+    column = left[middle] // STEPS
+    if len(column):
+        start, end = int(column.min()), int(column.max()) + 1
+        passed = np.bincount((column - start) * height + row, minlength=(end - start) * height)[
+            : (end - start) * height
+        ]
+        columns[start:end] |= (np.cumsum(passed, dtype=np.uint8) & 1).astype(bool).reshape(-1, height)
 
 
 def polygons_of(outline: Any) -> list[np.ndarray]:

@@ -1,6 +1,6 @@
 """Label Studio: one JSON of tasks, each a picture with `annotations[].result`; polygons, rectangles, ellipses, brushes.
 
-Lengths are percents of the picture. A brush is a run-length code of Label Studio's own, over R, G, B, A of each pixel.
+JSON-MIN, in which a task is `{"image": ..., "label": [shapes]}`, is brought to that form. Lengths are percents of the picture. A brush is a run-length code of Label Studio's own, over R, G, B, A of each pixel.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ CHANNELS = 4
 
 def open_source(listing: Listing) -> MaskSource | None:
     """Return the masks of a folder with a JSON of Label Studio. Raises BadInput when it is broken."""
-    found = [(file, listing.json(file)) for file in listing.ending(".json")[:LOOKED_AT]]
-    path, tasks = next(((file, data) for file, data in found if _are_tasks(data)), (None, []))
+    found = [(file, _tasks(listing.json(file))) for file in listing.ending(".json")[:LOOKED_AT]]
+    path, tasks = next(((file, rows) for file, rows in found if rows), (None, []))
     if path is None:
         return None
     pictures: list[Picture] = []
@@ -45,11 +45,22 @@ def open_source(listing: Listing) -> MaskSource | None:
     return source_of_shapes(pictures, shapes, wheres)
 
 
-def _are_tasks(data: Any) -> bool:
+def _tasks(data: Any) -> list[Any]:
+    """Return the tasks that a JSON lists; nothing: it is none of Label Studio's."""
     rows = data if isinstance(data, list) else []
-    return bool(rows) and all(
-        entry(row, "data", dict) is not None and entry(row, "annotations", list) is not None for row in rows
-    )
+    if all(entry(row, "data", dict) is not None and entry(row, "annotations", list) is not None for row in rows):
+        return rows
+    tasks = [_whole_task(row) for row in rows]
+    return tasks if all(tasks) and any(task["annotations"][0]["result"] for task in tasks) else []
+
+
+def _whole_task(row: Any) -> dict[str, Any]:
+    """Return a task of JSON-MIN in the form of the whole export; nothing: it is none."""
+    if not isinstance(row, dict) or not isinstance(row.get("image"), str):
+        return {}
+    shapes = [shape for value in row.values() if isinstance(value, list) for shape in value if _size(shape)]
+    result = [{**shape, "value": shape} for shape in shapes]
+    return {"id": row.get("id"), "data": {"image": row["image"]}, "annotations": [{"result": result}]}
 
 
 def _picture_name(task: Any) -> str:
