@@ -618,6 +618,39 @@ def test_two_of_one_frame_say_what_was_seen(tmp_path: Path) -> None:
     assert match_pictures(source.pictures, TIMES, 0.02, other)[0] == {2: 0}
 
 
+def test_several_masks_of_a_picture_lie_in_a_folder_of_its_name(tmp_path: Path) -> None:
+    """What the message about two of one frame tells to do."""
+    for k, mask in enumerate(STACK):
+        cv2.imwrite(str(tmp_path / f"000002_{k}.png"), mask.astype(np.uint8))
+        cv2.imwrite(str(tmp_path / f"000003_{k}.png"), mask.astype(np.uint8))
+    with pytest.raises(BadInput, match=r"'000002_0.png' and '000003_0.png' are both of frame 0") as caught:
+        match_pictures(opened(tmp_path)[1].pictures, TIMES, 0.02, tmp_path)
+    assert "000012/0.png" in (caught.value.hint or "")
+    for file in tmp_path.glob("*.png"):
+        frame, number = file.stem.split("_")
+        (tmp_path / frame).mkdir(exist_ok=True)
+        file.rename(tmp_path / frame / f"{number}.png")
+    _, source = opened(tmp_path)
+    places, _ = match_pictures(source.pictures, TIMES, 0.02, tmp_path)
+    assert sorted(places) == [2, 3] and len(source.read(places[2], SHAPE, SETTINGS).masks) == 2
+
+
+@pytest.mark.parametrize("kind", ["PNG", "NPZ"])
+def test_numbers_that_labels_of_ones_own_name(tmp_path: Path, kind: str) -> None:
+    """Without a class file the ids of the table given with --labels are meant."""
+    if kind == "PNG":
+        cv2.imwrite(str(tmp_path / "000002.png"), VALUES.astype(np.uint8))
+    else:
+        np.savez(tmp_path / "000002.npz", ids=VALUES)
+    _, source = open_folder(Listing(tmp_path, {0: "wall", 1: "table", 2: "cup"}))
+    found = by_class(source.read(0, SHAPE, SETTINGS), source)
+    assert all(np.array_equal(found[name], true) for name, true in TRUE.items())
+    assert np.array_equal(found["wall"], VALUES == 0)
+    _, source = open_folder(Listing(tmp_path, {1: "table"}))
+    with pytest.raises(BadInput, match="id 2 is beyond --labels, which lists 1..1"):
+        source.read(0, SHAPE, SETTINGS)
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [("a.xml", "export COCO 1.0"), ("a.npy", "np.savez"), ("a.jpg", "as PNG"), ("a.pkl", "never read")],

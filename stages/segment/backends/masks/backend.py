@@ -51,7 +51,9 @@ class MasksBackend:
         assert request.masks is not None  # segment.parameters.check
         options = request.own(MasksParameters)
         self._root = request.masks
-        listing = Listing(request.masks)
+        label_set = read_label_file(request.labels) if request.labels else None
+        numbered = {label.id: label.name for label in label_set.labels if label.id is not None} if label_set else {}
+        listing = Listing(request.masks, numbered)
         form, self._source = open_folder(listing)
         times = reader.times
         self._places, match_counts = match_pictures(self._source.pictures, times, options.masks_tolerance, self._root)
@@ -73,8 +75,9 @@ class MasksBackend:
         if self._source.lacks:
             lost = " and ".join(self._source.lacks)
             logger.info("%s: holds no %s: what the network said of them is lost", self._root, lost)
-        label_set = read_label_file(request.labels) if request.labels else None
         self._labels = _labels(self._source, label_set, str(self._root))
+        if not self._labels:
+            logger.info("%s: says no classes (classes.json would): every mask is an object", self._root)
         self._vocabulary = load_vocabulary()
         self._settings = request.parameters.score_threshold, request.parameters.small_object_pixels
         self._tally, self._last = Tally(), max(self._places)
@@ -171,9 +174,9 @@ def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
 
 
 def _labels(source: MaskSource, label_set: LabelSet | None, where: str) -> dict[int, Label]:
-    """Return number -> label. Where the folder names nothing, the ids of the given labels are its numbers."""
+    """Return number -> label."""
     if not source.categories:
-        return {label.id: label for label in label_set.labels if label.id is not None} if label_set else {}
+        return {}
     matched = match_labels(
         {number: category.name for number, category in source.categories.items()}, label_set, where=where
     )

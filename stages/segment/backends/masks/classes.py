@@ -24,11 +24,11 @@ def read_classes(listing: Listing) -> tuple[dict[int, Category], int]:
     `classes.json` is an object number -> name, a list of COCO categories, or `{"divisor": 1000, "classes": ...}`: then
     number 17003 is the fourth instance of class 17, as networks trained on Cityscapes write it. `classes.txt` has a
     number and a name in each line, Roboflow's `_classes.csv` with a comma between them, labelme2voc's `class_names.txt`
-    the names alone, from 0. Raises BadInput for a broken one; without a file both are empty.
+    the names alone, from 0. Raises BadInput for a broken one; without a file the table of `--labels` counts.
     """
     path = listing.class_file()
     if path is None:
-        return {}, 0
+        return {number: Category(name) for number, name in listing.numbered.items()}, 0
     where = str(path)
     if path.suffix == ".csv":
         lines = [line.replace(",", " ", 1) for line in lines_of(path)[1:]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,10 +20,14 @@ HINT = "docs/MASKS.md lists what is read"
 
 
 class Listing:
-    """The files of a folder (hidden ones left out), or one file. Raises BadInput when there is none."""
+    """The files of a folder (hidden ones left out), or one file. Raises BadInput when there is none.
 
-    def __init__(self, root: Path) -> None:
+    `numbered`, number -> name, says what numbers mean where no class file does: the table of `--labels`.
+    """
+
+    def __init__(self, root: Path, numbered: Mapping[int, str] | None = None) -> None:
         self.root = Path(root)
+        self.numbered = dict(numbered or {})
         self.files: list[Path] = [self.root] if self.root.is_file() else []
         for file in self.root.rglob("*") if self.root.is_dir() else ():
             if file.is_file() and not any(part.startswith(".") for part in file.relative_to(self.root).parts):
@@ -45,6 +50,11 @@ class Listing:
     def named(self, *names: str) -> Path | None:
         """Return the first file of one of these names, if there is one."""
         return next((file for name in names for file in self.files if file.name == name), None)
+
+    def class_source(self) -> str:
+        """Return, for messages, what says which number is which class."""
+        path = self.class_file()
+        return path.name if path else "--labels"
 
     def json(self, path: Path) -> Any:
         """Return what a JSON file holds; it is kept."""

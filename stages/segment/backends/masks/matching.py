@@ -68,8 +68,8 @@ def _two_of_one_frame(pictures: Sequence[Picture], first: int, second: int, fram
         picture.seen or picture.name or f"image {picture.number}" for picture in (pictures[first], pictures[second])
     ]
     hint = (
-        "one picture a frame, named 000012 (the frame), 1305031102.175304 (its time) or with one number that "
-        "differs; else write COCO's JSON, whose `images` have a `file_name` of this kind"
+        "name a picture 000012 (its frame), 1305031102.175304 (its time) or with one number that differs; several "
+        "masks of one picture lie in a folder of its name (000012/0.png, 000012/1.png)"
     )
     if pictures[first].name and pictures[first].name == pictures[second].name:
         hint = (

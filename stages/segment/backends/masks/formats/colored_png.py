@@ -50,7 +50,7 @@ def open_source(listing: Listing) -> MaskSource | None:
         given, divisor = read_classes(listing)
         colors = {color: index for index, color in enumerate(voc_colors(RIM + 1))}
         categories = given or {number: Category(name) for number, name in enumerate(VOC_NAMES)}
-    source = label_map.name if label_map else getattr(listing.class_file(), "name", "PASCAL VOC's classes")
+    source = label_map.name if label_map else listing.class_source() if given else "PASCAL VOC's classes"
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
         path = files[place]

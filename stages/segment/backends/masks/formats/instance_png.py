@@ -39,7 +39,7 @@ def open_source(listing: Listing) -> MaskSource | None:
         for file in files
     ]
     classes, divisor = read_classes(listing)
-    class_file = getattr(listing.class_file(), "name", "")
+    class_file = listing.class_source()
     numbers = words_numbered(
         (word for entries in entries_by_file for word, _ in (entries or {}).values() if word), classes
     )

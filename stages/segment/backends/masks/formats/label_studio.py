@@ -1,6 +1,7 @@
 """Label Studio: one JSON of tasks, each a picture with `annotations[].result`; polygons, rectangles, ellipses, brushes.
 
-JSON-MIN, in which a task is `{"image": ..., "label": [shapes]}`, is brought to that form. Lengths are percents of the picture. A brush is a run-length code of Label Studio's own, over R, G, B, A of each pixel.
+JSON-MIN, in which a task is `{"image": ..., "label": [shapes]}`, is brought to that form. Lengths are percents of the
+picture. A brush is a run-length code of Label Studio's own, over R, G, B, A of each pixel.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def open_source(listing: Listing) -> MaskSource | None:
             words |= {str(name) for name in _texts(classes).ravel()} if classes.dtype.kind in "SU" else set()
     categories, divisor = read_classes(listing)
     numbers = words_numbered(words, categories)
-    listed = (categories, divisor, getattr(listing.class_file(), "name", ""))
+    listed = (categories, divisor, listing.class_source())
     categories = {**categories, **{number: Category(word) for word, number in numbers.items()}}
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
