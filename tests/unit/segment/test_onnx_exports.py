@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -177,6 +178,18 @@ def test_boxes_with_their_score_as_a_fifth_column(tmp_path: Path, named: bool) -
     expected = np.zeros((HEIGHT, WIDTH), dtype=bool)
     expected[4:12, 8:24] = True
     assert np.array_equal(pixels_of(frame, "cup"), expected) and len(frame.masks) == 1
+
+
+def test_classes_that_are_only_guessed_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    weights = known.mask_rcnn_network(tmp_path / "rcnn.onnx", whole=False)
+    with caplog.at_level(logging.INFO, "scenewright"):
+        found_by(weights)
+    assert "its outputs name no classes, taken for those of coco-80" in caplog.text
+    model = onnx.load(str(weights))
+    model.metadata_props.add(key="names", value=str({41: "chair", 0: "cup"}))
+    onnx.save(model, str(weights))
+    _, frame = found_by(weights)
+    assert pixels_of(frame, "chair").any() and not pixels_of(frame, "cup").any()
 
 
 def test_layouts_by_their_shapes() -> None:

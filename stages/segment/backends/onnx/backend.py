@@ -120,7 +120,7 @@ def _label_map(network: Network, label_set: LabelSet | None) -> LabelMap:
     sidecar, name = network.sidecar, network.path.name
     if isinstance(sidecar.labels, tuple):
         return _warn_of_unknown(match_labels(dict(enumerate(sidecar.labels)), label_set, where=name), name)
-    if not sidecar.labels and (names := network.names()):
+    if (network.is_guessed or not sidecar.labels) and (names := network.names()):
         return _warn_of_unknown(match_labels(names, label_set, where=name), name)
     count = class_count(network)
     set_name = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
@@ -133,8 +133,9 @@ def _label_map(network: Network, label_set: LabelSet | None) -> LabelMap:
             f"outputs = {{ {outputs} }}",
         )
     labels = load_label_set(set_name)
-    if not sidecar.labels:
-        logger.info("%s: %d classes, taken for %s in its order", name, count, set_name)
+    if network.is_guessed or not sidecar.labels:
+        known = "its outputs name no classes" if count is None else f"{count} classes"
+        logger.info("%s: %s, taken for those of %s (`labels` in --sidecar says others)", name, known, set_name)
     if sidecar.numbering == "id" or count == COCO_IDS:
         names = {label.id: label.name for label in labels.labels if label.id is not None}
     else:

@@ -97,6 +97,7 @@ class Network:
         if missing:
             raise BadInput(f"{self.path.name}: has no output {missing[0]!r:.60}", hint=f"it has: {', '.join(shapes)}")
         self.sidecar = layout.model_copy(update={"batch": batch})
+        self.is_guessed = sidecar is None
         self.shapes = {role: shapes[name] for role, name in layout.outputs.items()}
         wrong = misfit(layout.layout, self.shapes)
         if wrong:
