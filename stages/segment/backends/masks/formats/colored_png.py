@@ -71,8 +71,8 @@ def read_label_map(path: Path) -> tuple[dict[int, int], dict[int, Category]]:
     categories: dict[int, Category] = {}
     for line in lines_of(path):
         name, _, rest = line.partition(":")
-        parts = rest.split(":")[0].split(",")
-        if not name.strip() or len(parts) != 3 or not all(p.strip().isdecimal() and int(p) < 256 for p in parts):
+        parts = [part.strip() for part in rest.split(":")[0].split(",")]
+        if not name.strip() or len(parts) != 3 or not all(p.isdecimal() and int(p) < 256 for p in parts):
             raise BadInput(f"{path}: {line!r:.60} says no colour of a label", hint=HINT)
         red, green, blue = (int(part) for part in parts)
         color = red + 256 * green + 65536 * blue

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML, YAMLError
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.outside import LARGEST_SETTINGS, file_text
+from scenewright.schemas.outside import file_text
 from scenewright.stages.segment.backends.masks.classes import categories_of, lines_of, read_classes
 from scenewright.stages.segment.backends.masks.encoded import flatten_encoded
 from scenewright.stages.segment.backends.masks.given import (
@@ -26,6 +26,8 @@ from scenewright.stages.segment.backends.masks.given import (
 from scenewright.stages.segment.backends.masks.listing import Listing
 
 HINT = "a line is `class x1 y1 x2 y2 x3 y3 ...`, coordinates in 0..1"
+LARGEST_YAML = 256_000
+"""Most bytes of a YAML: its parser is slow."""
 BOX = 5
 """Numbers of a line that is a box; six with a score."""
 SLACK = 0.01
@@ -100,7 +102,7 @@ def _categories(listing: Listing) -> dict[int, Category]:
 
 
 def _names(path: Path) -> Any:
-    text = file_text(path, LARGEST_SETTINGS, hint="names: [chair, table]")
+    text = file_text(path, LARGEST_YAML, hint="names: [chair, table]")
     try:
         data = YAML(typ="safe", pure=True).load(text)
     except (YAMLError, ValueError, RecursionError, TypeError, AttributeError, KeyError, IndexError):
