@@ -202,6 +202,7 @@ def label_studio_in_short(root: Path) -> None:
 def yolo(root: Path, names: str = "names: [table, cup]\n") -> None:
     (root / "labels").mkdir()
     (root / "data.yaml").write_text(f"path: .\n{names}")
+    (root / "README.dataset.txt").write_text("# a data set\nProvided by somebody\n")
     lines = [
         " ".join([str(k), *(f"{v}" for x, y in c for v in (x / WIDTH, y / HEIGHT))])
         for k, c in enumerate(THINGS.values())
@@ -228,6 +229,7 @@ def palette_png(path: Path, values: np.ndarray) -> None:
 
 
 def palettes(root: Path) -> None:
+    (root / "metadata.csv").write_text("file_name,split\n000002.png,train\n")
     (root / "classes.txt").write_text("1 table\n2 cup\n")
     rim = VALUES.copy()
     rim[0, 0] = 255

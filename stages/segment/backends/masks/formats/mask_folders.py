@@ -39,7 +39,7 @@ HINT = "each PNG is one mask: 0 outside, another value inside"
 
 def open_source(listing: Listing) -> MaskSource | None:
     """Return the masks of folders of PNGs. Raises BadInput when nothing says whether a folder is a picture."""
-    tables = {file.parent: file for file in listing.files if file.name == TABLE}
+    tables = {file.parent: file for file in listing.files if file.name == TABLE and _judges_masks(file)}
     files = [file for file in listing.ending(".png") if file.parent != listing.root or listing.root in tables]
     folders = sorted({file.parent for file in files} | tables.keys())
     stems = [stem_of(file.name) for file in files]
@@ -88,12 +88,16 @@ def _are_pictures(folders: list[str], stems: list[str], root: Path) -> bool | No
     )
 
 
+def _judges_masks(table: Path) -> bool:
+    """Whether a table is that of `amg.py`; other data sets have one of this name too."""
+    head = (lines_of(table) or [""])[0].split(",")
+    return "id" in head and any(name in head for name in JUDGEMENTS)
+
+
 def _scores(table: Path) -> dict[str, float]:
     """Return mask -> score, the lower of the two judgements. Raises BadInput."""
-    head, *rows = [line.split(",") for line in lines_of(table)] or [[]]
+    head, *rows = [line.split(",") for line in lines_of(table)]
     columns = [head.index(name) for name in ("id", *JUDGEMENTS) if name in head]
-    if len(columns) < 2 or "id" not in head:
-        return {}
     scores = {}
     for row in rows:
         try:

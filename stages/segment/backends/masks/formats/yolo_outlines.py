@@ -28,6 +28,8 @@ from scenewright.stages.segment.backends.masks.listing import Listing
 HINT = "a line is `class x1 y1 x2 y2 x3 y3 ...`, coordinates in 0..1"
 LARGEST_YAML = 256_000
 """Most bytes of a YAML: its parser is slow."""
+LOOKED_AT = 100
+"""Texts among which one has to hold a label."""
 BOX = 5
 """Numbers of a line that is a box; six with a score."""
 SLACK = 0.01
@@ -37,8 +39,8 @@ SLACK = 0.01
 def open_source(listing: Listing) -> MaskSource | None:
     """Return the masks of a folder of YOLO labels. Raises BadInput when a line is broken, or when all are boxes."""
     files = listing.ending(".txt")
-    first = next((lines[0] for file in files[:100] if (lines := lines_of(file))), "")
-    if not _is_row(first):
+    # Others lie beside them (Roboflow's README.dataset.txt).
+    if not any(_is_row(lines[0]) for file in files[:LOOKED_AT] if (lines := lines_of(file))):
         return None
     rows_by_file = {file: [_row(line, file) for line in lines_of(file)] for file in files if _is_label(file)}
     rows = [row for rows in rows_by_file.values() for row in rows]
