@@ -61,6 +61,7 @@ def test_yolo_end_to_end_without_names_follows_the_advice(tmp_path: Path) -> Non
     sidecar = tmp_path / "net.toml"
     sidecar.write_text(lines.replace(", outputs", "\noutputs"))
     check_cup_and_chair(found_by(weights, sidecar=sidecar)[1])
+    assert 'labels = ["cup", "chair"]' in sidecar.read_text()
     sidecar.write_text(sidecar.read_text().replace("yolo-end-to-end", "yolo-seg"))
     with pytest.raises(BadInput, match=r"gives predictions \(1, 300, 8\).*these are the shapes of yolo-end-to-end"):
         found_by(weights, sidecar=sidecar)

@@ -119,9 +119,9 @@ def _label_map(network: Network, label_set: LabelSet | None) -> LabelMap:
     """Return what the network's numbers stand for: by its metadata, its sidecar, or the number of its classes."""
     sidecar, name = network.sidecar, network.path.name
     if isinstance(sidecar.labels, tuple):
-        named, known = len(sidecar.labels), class_count(network)
-        if known is not None and named != known:
-            logger.warning("%s: has %d classes, `labels` of the sidecar name %d; others stay void", name, known, named)
+        named, given = len(sidecar.labels), class_count(network)
+        if given is not None and named != given:
+            logger.warning("%s: has %d classes, `labels` of the sidecar name %d; others stay void", name, given, named)
         return _warn_of_unknown(match_labels(dict(enumerate(sidecar.labels)), label_set, where=name), name)
     if (network.is_guessed or not sidecar.labels) and (names := network.names()):
         return _warn_of_unknown(match_labels(names, label_set, where=name), name)
