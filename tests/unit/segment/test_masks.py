@@ -496,7 +496,7 @@ def test_the_text_is_that_of_pycocotools() -> None:
         ({"size": [4, 5], "counts": "5\x00"}, "letters that none has"),
         ({"size": [5, 4], "counts": [20]}, "4 x 5 pixels, the frame of 5 x 4"),
         ({"counts": [20]}, "no RLE"),
-        ([[0, 0, 5, 5, 5, 0]], "polygon"),
+        ([[0, 0, 5, 5, 5, 0]], "no RLE"),
         (None, "no RLE"),
     ],
 )
@@ -591,7 +591,7 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         np.savez(folder / "000000.npz", masks=np.array([{}], dtype=object))
 
     def colours(folder: Path) -> None:
-        cv2.imwrite(str(folder / "000000.png"), np.zeros((*images[0].shape, 3), np.uint8))
+        cv2.imwrite(str(folder / "000000.png"), np.full((*images[0].shape, 3), (1, 2, 3), np.uint8))
 
     def text(folder: Path) -> None:
         (folder / "readme.md").write_text("masks")
@@ -603,7 +603,7 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         beyond: "1 of 3 masks are of frames that are not there: 000009 (name 9)",
         bomb: "unpacks to more than",
         pickled: "holds object",
-        colours: "one channel",
+        colours: "nothing says which class a colour is",
         text: "holds no masks that are read here",
     }
     for write, message in cases.items():

@@ -42,10 +42,7 @@ def match_pictures(
             astray.append(f"{picture.name or 'image'} ({matching} {_stated_text(picture, varying[index])})")
             continue
         if frame in picture_of_frame:
-            first = pictures[picture_of_frame[frame]].name
-            raise BadInput(
-                f"{where}: masks of {first!r} and {picture.name!r} are both of frame {frame}", hint="keep one of them"
-            )
+            raise _two_of_one_frame(pictures, picture_of_frame[frame], index, frame, where)
         picture_of_frame[frame] = index
         match_counts[matching] += 1
     if astray:
@@ -58,6 +55,27 @@ def match_pictures(
             else "the sequence is empty",
         )
     return picture_of_frame, match_counts
+
+
+def says_a_frame(name: str) -> bool:
+    """Return whether a name alone says which frame it is of, as six digits and stamps do."""
+    return any(pattern.fullmatch(name) for pattern in (NAME, SECONDS, TICKS))
+
+
+def _two_of_one_frame(pictures: Sequence[Picture], first: int, second: int, frame: int, where: Path) -> BadInput:
+    """Return the error for two pictures of one frame: which they are, and which names are understood."""
+    names = [
+        picture.seen or picture.name or f"image {picture.number}" for picture in (pictures[first], pictures[second])
+    ]
+    hint = (
+        "name a picture 000012 (its frame), 1305031102.175304 (its time) or with one number that differs; several "
+        "masks of one picture lie in a folder of its name (000012/0.png, 000012/1.png)"
+    )
+    if pictures[first].name and pictures[first].name == pictures[second].name:
+        hint = (
+            f"both are {pictures[first].name!r}: give the folder of one kind of masks alone, without augmented copies"
+        )
+    return BadInput(f"{where}: masks of {names[0]!r} and {names[1]!r} are both of frame {frame}", hint=hint)
 
 
 def numbers_in_names(names: Sequence[str]) -> list[int | None]:
