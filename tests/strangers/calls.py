@@ -14,6 +14,7 @@ from scenewright.cli.main import run
 
 CLEAR_CODES = (2, 3, 4)
 """Exit codes of a refusal: usage, bad input, an outcome that is not ok (docs/ARCHITECTURE.md, "Exit codes")."""
+FOLDER_OF_A_TEST = re.compile(r"\S*/pytest-of-[^/\s]+/pytest-[^/\s]+/[^/\s]+/")
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,9 @@ class Said:
 
     @property
     def text(self) -> str:
-        """Both streams, on one line, so that a wrapped word is found."""
-        return " ".join((self.out + " " + self.err).split())
+        """Both streams, on one line, so that a wrapped word is found; without the folders of the test, which has a name
+        that says what it is about."""
+        return FOLDER_OF_A_TEST.sub("", " ".join((self.out + " " + self.err).split()))
 
     def names(self, *words: str) -> bool:
         """Return whether every word (a regular expression, small and large letters alike) is said."""
