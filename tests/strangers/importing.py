@@ -105,9 +105,7 @@ def compiled(path: Path) -> Compiled:
     points = np.concatenate(corners)
     low, high = points.min(axis=0), points.max(axis=0)
     origin = np.array([*(low + high)[:2] / 2, low[2]])
-    joints = {
-        model.joint(k).name: (data.xanchor[k] - origin, data.xaxis[k].copy()) for k in range(model.njnt)
-    }
+    joints = {model.joint(k).name: (data.xanchor[k] - origin, data.xaxis[k].copy()) for k in range(model.njnt)}
     return Compiled(high - low, joints)
 
 

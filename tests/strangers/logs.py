@@ -96,9 +96,7 @@ def write_images(
     if posed:
         (root / "poses.txt").write_text("\n".join(rows) + "\n")
     if intrinsics:
-        (root / "intrinsics.txt").write_text(
-            f"{camera.fx} 0 {camera.cx}\n0 {camera.fy} {camera.cy}\n0 0 1\n"
-        )
+        (root / "intrinsics.txt").write_text(f"{camera.fx} 0 {camera.cx}\n0 {camera.fy} {camera.cy}\n0 0 1\n")
     return root
 
 
@@ -134,7 +132,9 @@ def write_nerfstudio(
         )
     k = CAMERA
     document = {"fl_x": k.fx, "fl_y": k.fy, "cx": k.cx + 0.5, "cy": k.cy + 0.5, "w": k.width, "h": k.height}
-    (root / "transforms.json").write_text(json.dumps({"camera_model": "PINHOLE", **document, "frames": frames, **fields}))
+    (root / "transforms.json").write_text(
+        json.dumps({"camera_model": "PINHOLE", **document, "frames": frames, **fields})
+    )
     return root
 
 

@@ -1,4 +1,4 @@
-"""A room of boxes by ray casting, the cameras that strangers hold in it, and how far depth lies off its true surfaces."""
+"""A room of boxes by ray casting, cameras that strangers hold in it, and how far depth lies off its surfaces."""
 
 from __future__ import annotations
 

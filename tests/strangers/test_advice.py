@@ -22,14 +22,7 @@ from tests.strangers.importing import Added, add, hinge, is_size, write
 from tests.strangers.logs import STEP, stamps, units, write_bag, write_images, write_nerfstudio, write_tum
 from tests.strangers.pictures import COUNT, NAMES, TRUE, overlaps, segment, write_ids
 from tests.strangers.rooms import CAMERA, depth_error, path, shots
-from tests.strangers.test_logs import (
-    BASELINE,
-    EYES,
-    ingest,
-    read,
-    stereo_depth_is_right,
-    write_stereo_folder,
-)
+from tests.strangers.test_logs import BASELINE, EYES, ingest, read, stereo_depth_is_right, write_stereo_folder
 from tests.strangers.test_masks import plain, runs, write_coco
 from tests.unit.ingest.message_logs import RosRecorder, recorder
 from tests.unit.ingest.tiny_room import jpeg
@@ -65,9 +58,7 @@ def test_a_camera_info_of_another_size(tmp_path: Path) -> None:
     k = CAMERA
     matrix = [4 * k.fx, 0.0, 4 * (k.cx + 0.5) - 0.5, 0.0, 4 * k.fy, 4 * (k.cy + 0.5) - 0.5, 0.0, 0.0, 1.0]
     projection = [*matrix[:3], 0.0, *matrix[3:6], 0.0, *matrix[6:], 0.0]
-    log = write_bag(
-        tmp_path / "log", shots(POSES), K=matrix, P=projection, width=4 * k.width, height=4 * k.height
-    )
+    log = write_bag(tmp_path / "log", shots(POSES), K=matrix, P=projection, width=4 * k.width, height=4 * k.height)
     read(log, tmp_path / "sequence")
     assert depth_error(tmp_path / "sequence", POSES) < 0.005
 
@@ -75,7 +66,7 @@ def test_a_camera_info_of_another_size(tmp_path: Path) -> None:
 def conventions_are_mended(log: Path, tmp_path: Path) -> None:
     if ingest(log, tmp_path / "sequence").code == 0 and depth_error(tmp_path / "sequence", POSES) < 0.003:
         return
-    report, said = inspect(log)
+    report, said = inspect(log, "--frames", "8")
     text = said.err + " ".join(str(finding["fix"]) for finding in report["findings"])
     values = advised(text, "--pose-convention")
     assert report["verdict"] == "wasted" and values, text
@@ -90,8 +81,8 @@ def test_transforms_json_with_axes_of_opencv(tmp_path: Path) -> None:
 
 
 def test_a_trajectory_log_of_extrinsics(tmp_path: Path) -> None:
-    """Redwood's trajectory.log with world to camera, as Open3D's extrinsics are (isl-org/Open3D #1340, #2778): `inverse`
-    is named, and taken it is right."""
+    """Redwood's trajectory.log with world to camera, as Open3D's extrinsics are (isl-org/Open3D #1340, #2778):
+    `inverse` is named, and taken it is right."""
     log = write_images(tmp_path / "log", shots(POSES), posed=False, intrinsics=False)
     (log / "rgb").rename(log / "image")
     matrix = [CAMERA.fx, 0, 0, 0, CAMERA.fy, 0, CAMERA.cx, CAMERA.cy, 1]
@@ -175,8 +166,8 @@ def test_the_other_camera_of_a_log(tmp_path: Path) -> None:
 
 
 def test_exchanged_folders_of_a_pair(tmp_path: Path) -> None:
-    """left/ and right/ are exchanged, the calibration is right: it is said, and what it says is done, by options and by
-    folders, and gives the depth (ZYangChen/MoCha-Stereo #19, ros-perception/image_pipeline #497)."""
+    """left/ and right/ are exchanged, the calibration is right: it is said, and what it says is done, by options
+    and by folders, and gives the depth (ZYangChen/MoCha-Stereo #19, ros-perception/image_pipeline #497)."""
     log = write_stereo_folder(tmp_path / "log", ("right", "left"))
     for name, shift in (("left", 0.0), ("right", -EYES.fx * BASELINE)):
         k = EYES
@@ -214,8 +205,8 @@ def carcass(scale: float) -> trimesh.Trimesh:
 
 
 def unit_is_followed(folder: Path, tmp_path: Path, unit: str) -> None:
-    """The unit is named, and following it: 0.40 x 0.32 x 0.60 m, the hinge where the description has it; or it is right
-    at once."""
+    """The unit is named, and following it: 0.40 x 0.32 x 0.60 m, the hinge where the description has it; or it is
+    right at once."""
     added = add(folder, tmp_path / "out")
     try:
         is_the_cabinet(added.only)
@@ -253,9 +244,7 @@ def test_meshes_in_millimetres_in_sdf(tmp_path: Path) -> None:
         '<joint name="hinge" type="revolute"><parent>carcass</parent><child>door</child><axis><xyz>0 0 1</xyz>'
         "<limit><lower>0</lower><upper>1.57</upper></limit></axis></joint>"
     )
-    write(
-        folder / "cabinet.sdf", f'<sdf version="1.7"><model name="cabinet">{"".join(links)}{joint}</model></sdf>'
-    )
+    write(folder / "cabinet.sdf", f'<sdf version="1.7"><model name="cabinet">{"".join(links)}{joint}</model></sdf>')
     unit_is_followed(folder, tmp_path, "mm")
 
 
@@ -330,8 +319,8 @@ def test_a_class_that_nothing_tells(tmp_path: Path, option: str) -> None:
 
 
 def test_a_buffer_of_gltf_that_is_not_there(tmp_path: Path) -> None:
-    """scene.gltf came without scene.bin (Siccity/GLTFUtility #209 is of such sets): the missing file is named, and with it
-    the model is right."""
+    """scene.gltf came without scene.bin (Siccity/GLTFUtility #209 is of such sets): the missing file is named, and
+    with it the model is right."""
     folder = tmp_path / "in" / "table"
     folder.mkdir(parents=True)
     mesh = trimesh.creation.box(bounds=((-0.4, 0.0, -0.3), (0.4, 0.75, 0.3)))

@@ -141,7 +141,8 @@ COUPLED = (
     ("rest", "word"),
     [
         (
-            '<tendon><fixed name="rod"><joint joint="left_hinge" coef="1"/><joint joint="right_hinge" coef="1"/></fixed>'
+            '<tendon><fixed name="rod"><joint joint="left_hinge" coef="1"/><joint joint="right_hinge" coef="1"/>'
+            "</fixed>"
             '</tendon><equality><tendon tendon1="rod"/></equality>',
             "tendon|equality|coupl",
         ),
@@ -150,10 +151,7 @@ COUPLED = (
             '<equality><joint joint1="left_hinge" joint2="right_hinge" polycoef="0 -1 0 0 0"/></equality>',
             "equality|coupl|weld",
         ),
-        (
-            '<equality><connect body1="left" body2="right" anchor="0.2 0 0"/></equality>',
-            "equality|connect",
-        ),
+        ('<equality><connect body1="left" body2="right" anchor="0.2 0 0"/></equality>', "equality|connect"),
     ],
     ids=["tendon", "two sections", "connect"],
 )
@@ -224,15 +222,16 @@ def test_sdf_pose_in_degrees(tmp_path: Path) -> None:
 def test_sdf_pose_as_a_quaternion(tmp_path: Path) -> None:
     """<pose rotation_format="quat_xyzw"> with seven numbers (gazebosim/sdformat #690): turned by 90 deg about z."""
     half = np.sqrt(0.5)
-    shape = box("0.02 0.4 0.56", f"0.2 -0.01 0 0 0 {half} {half}").replace("<pose>", '<pose rotation_format="quat_xyzw">')
+    shape = box("0.02 0.4 0.56", f"0.2 -0.01 0 0 0 {half} {half}").replace(
+        "<pose>", '<pose rotation_format="quat_xyzw">'
+    )
     door = f'<link name="door"><pose>-0.2 -0.15 0.3 0 0 0</pose>{shape}</link>'
     sdf(tmp_path / "in" / "cabinet.sdf", CARCASS + door + hinged(), "1.9")
     right_or_named(add(tmp_path / "in", tmp_path / "out"), is_the_cabinet, "rotation_format|quat")
 
 
 @pytest.mark.parametrize(
-    ("kind", "more"),
-    [("universal", "<axis2><xyz>1 0 0</xyz></axis2>"), ("screw", "<thread_pitch>-100</thread_pitch>")],
+    ("kind", "more"), [("universal", "<axis2><xyz>1 0 0</xyz></axis2>"), ("screw", "<thread_pitch>-100</thread_pitch>")]
 )
 def test_sdf_joints_of_other_kinds(tmp_path: Path, kind: str, more: str) -> None:
     """A universal joint (gazebosim/gz-usd #45) and a screw (RobotLocomotion/drake #12404): the joint or its kind is
@@ -261,23 +260,30 @@ def test_sdf_shapes_since_version_1_8(tmp_path: Path, shape: str) -> None:
         tmp_path / "in" / "table.sdf",
         f'<sdf version="1.8"><model name="table"><link name="table">{top}{leg}</link></model></sdf>',
     )
-    right_or_named(add(tmp_path / "in", tmp_path / "out"), lambda model: is_size(model, 0.8, 0.6, 0.65), f"{shape}|leg_visual")
+    right_or_named(
+        add(tmp_path / "in", tmp_path / "out"), lambda model: is_size(model, 0.8, 0.6, 0.65), f"{shape}|leg_visual"
+    )
 
 
 def test_sdf_polyline(tmp_path: Path) -> None:
-    """An outline that is extruded (bulletphysics/bullet3 #1645): 0.40 x 0.30 x 0.60, or the shape or its kind is named."""
+    """An outline that is extruded (bulletphysics/bullet3 #1645): 0.40 x 0.30 x 0.60, or the shape or its kind is
+    named."""
     corners = ("-0.2 -0.15", "0.2 -0.15", "0.2 0.15", "-0.2 0.15")
     outline = "".join(f"<point>{point}</point>" for point in corners)
     geometry = f"<geometry><polyline>{outline}<height>0.6</height></polyline></geometry>"
     shapes = "".join(f'<{kind} name="{kind}">{geometry}</{kind}>' for kind in ("collision", "visual"))
     foot = box("0.1 0.1 0.02", "0 0 0.01 0 0 0").replace('name="', 'name="foot_')
     sdf(tmp_path / "in" / "cabinet.sdf", f'<link name="carcass">{shapes}{foot}</link>', "1.6")
-    right_or_named(add(tmp_path / "in", tmp_path / "out"), lambda model: is_size(model, 0.4, 0.3, 0.6), "polyline|shape of link 'visual'")
+    right_or_named(
+        add(tmp_path / "in", tmp_path / "out"),
+        lambda model: is_size(model, 0.4, 0.3, 0.6),
+        "polyline|shape of link 'visual'",
+    )
 
 
 def test_sdf_submesh(tmp_path: Path) -> None:
-    """One mesh file holds carcass and door, each link takes its <submesh> (gazebo-web/gzweb #2): the door's link is the
-    door alone, so opening it swings 0.40 m forward and nothing backward, or `submesh` is named."""
+    """One mesh file holds carcass and door, each link takes its <submesh> (gazebo-web/gzweb #2): the door's link is
+    the door alone, so opening it swings 0.40 m forward and nothing backward, or `submesh` is named."""
     carcass, leaf = trimesh.creation.box((0.4, 0.3, 0.6)), trimesh.creation.box((0.4, 0.02, 0.56))
     carcass.apply_translation([0, 0, 0.3])
     leaf.apply_translation([0, -0.16, 0.3])
@@ -293,7 +299,9 @@ def test_sdf_submesh(tmp_path: Path) -> None:
             f"<geometry><mesh><uri>meshes/cabinet.obj</uri><submesh><name>{name}</name><center>false</center>"
             "</submesh></mesh></geometry>"
         )
-        shapes = "".join(f'<{kind} name="{kind}"><pose>{pose}</pose>{geometry}</{kind}>' for kind in ("collision", "visual"))
+        shapes = "".join(
+            f'<{kind} name="{kind}"><pose>{pose}</pose>{geometry}</{kind}>' for kind in ("collision", "visual")
+        )
         return shapes
 
     links = (
@@ -315,7 +323,7 @@ def test_sdf_use_parent_model_frame_in_a_later_version(tmp_path: Path) -> None:
     child: the model's z), or the element is named."""
     door = (
         f'<link name="door"><pose>-0.2 -0.15 0.3 1.5707963267948966 0 0</pose>'
-        f'{box("0.4 0.56 0.02", "0.2 0 0.01 0 0 0")}</link>'
+        f"{box('0.4 0.56 0.02', '0.2 0 0.01 0 0 0')}</link>"
     )
     axis = "<xyz>0 1 0</xyz><use_parent_model_frame>1</use_parent_model_frame>"
     sdf(tmp_path / "in" / "cabinet.sdf", CARCASS + door + hinged(axis=axis), "1.7")
@@ -461,8 +469,8 @@ def test_gltf_instances(tmp_path: Path, required: bool) -> None:
 
 @pytest.mark.parametrize("extension", ["KHR_texture_transform", "EXT_texture_webp"])
 def test_gltf_extensions_that_change_colours_alone(tmp_path: Path, extension: str) -> None:
-    """A required extension of textures (RobotLocomotion/drake #23183, gltf-rs/gltf #431, f3d-app/f3d #2473): the size is
-    right and the extension is named, or it is refused by its name."""
+    """A required extension of textures (RobotLocomotion/drake #23183, gltf-rs/gltf #431, f3d-app/f3d #2473): the
+    size is right and the extension is named, or it is refused by its name."""
     points, faces = block((-0.3, 0.0, -0.2), (0.3, 0.72, 0.2))
     uv = (np.random.default_rng(0).random((len(points), 2))).astype("<f4")
     picture = np.frombuffer(png(np.full((8, 8, 3), (200, 40, 40), np.uint8)), np.uint8)
@@ -512,9 +520,7 @@ def test_gltf_strips(tmp_path: Path) -> None:
     )  # fmt: skip
     document["meshes"][0]["primitives"].append({"attributes": {"POSITION": 2}, "mode": 5})
     glb(tmp_path / "in" / "table.glb", document, data)
-    right_or_named(
-        add(tmp_path / "in", tmp_path / "out"), lambda model: is_size(model, 0.6, 0.4, 1.0), "strip|mode"
-    )
+    right_or_named(add(tmp_path / "in", tmp_path / "out"), lambda model: is_size(model, 0.6, 0.4, 1.0), "strip|mode")
 
 
 # ---- OBJ -------------------------------------------------------------------------------------------------------------
