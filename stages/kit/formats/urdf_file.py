@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.known_elements import Table
 from scenewright.stages.kit.formats.xml_files import parse_xml
 from scenewright.stages.kit.geometry.solids import MassProperties
 from scenewright.stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
@@ -19,6 +20,22 @@ from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
 
 JOINT_TYPES = ("fixed", "floating", "revolute", "continuous", "prismatic")
+KNOWN_URDF: Table = {
+    "robot": frozenset(
+        {*("link", "joint", "material"), *("transmission", "gazebo", "ros2_control", "mujoco", "sensor")}
+    ),
+    "link": frozenset(
+        {*("inertial", "visual", "collision"), *("contact", "self_collision_checking", "gravity", "sensor")}
+    ),
+    "visual": frozenset({"origin", "geometry", "material"}),
+    "collision": frozenset({"origin", "geometry", "material", "contact_coefficients", "surface"}),
+    "joint": frozenset(
+        {*("origin", "parent", "child", "axis", "limit", "mimic"), *("dynamics", "calibration", "safety_controller")}
+        | {"joint_properties"}
+    ),
+}
+"""What is read, and what holds nothing of shape and motion (after urdfdom, ROS, Bullet)."""
+COUNTED = ("link", "joint", "visual", "collision")
 MAXIMUM_BYTES = 64 * 2**20
 """Largest URDF [bytes]; a bound, by eye."""
 

@@ -18,6 +18,8 @@ from scenewright.stages.library.importing.loose_models import (
 )
 from scenewright.stages.library.importing.mesh_reading import MESH_SUFFIXES
 from scenewright.stages.library.importing.mjcf_models import is_mjcf, read_mjcf_models
+from scenewright.stages.library.importing.other_formats import other_formats
+from scenewright.stages.library.importing.parts_of_others import parts_of_others
 from scenewright.stages.library.importing.sdf_models import read_sdf_models
 from scenewright.stages.library.importing.source_folder import SourceFolder
 from scenewright.stages.library.importing.source_model import SourceModel
@@ -48,7 +50,10 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
     files = folder.files()
     count = 0
     claimed = _Claimed()
+    parts = parts_of_others(folder, [path for path in files if _is_text(path)])
     for path in files:
+        if parts and path.resolve() in parts:
+            continue
         if not _is_text(path):
             if path.suffix.lower() in (*MESH_SUFFIXES, *DESCRIPTIONS):
                 yield Unread(folder.relative(path), "its name is no UTF-8 (rename it)")
@@ -71,6 +76,8 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
         if count > MOST_MODELS:
             raise BadInput(f"{folder.root}: more than {MOST_MODELS} models", hint="import its parts one by one")
         yield _try_to_read(folder, path, partial(read_loose_model, folder, path))
+    for source, reason in other_formats(folder, files):
+        yield Unread(source, reason)
 
 
 @dataclass(frozen=True)

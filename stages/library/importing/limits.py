@@ -27,6 +27,10 @@ MOST_SHAPES = 20_000
 """Boxes, meshes and groups of meshes of a model."""
 MOST_TRIANGLES_OF_A_FILE = 5 * MOST_TRIANGLES
 """Most triangles of all models that one description holds."""
+MOST_LINKS = 2_000
+"""Most links (bodies) of a model; 500 of them may move."""
+MOST_LINKS_OF_A_FILE = 5 * MOST_LINKS
+"""Most links of all models that one description holds."""
 MOST_FINDINGS = 40
 """Most findings that are kept of one model."""
 LONGEST_TEXT = 300
@@ -77,6 +81,12 @@ class Allowance:
             if self._remaining[k] < 0:
                 counted = ("triangles", "vertices", "shapes")[k]
                 raise BadInput(f"{self._where}: more than {self._bounds[k]} {counted} in all", hint=SIMPLIFY)
+
+
+def refuse_many(where: str, things: str, count: int, most: int) -> None:
+    """Raise BadInput for more things than a description may hold, before any of them is read."""
+    if count > most:
+        raise BadInput(f"{where}: {count} {things}, more than {most}", hint="split it, or weld what does not move")
 
 
 def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:

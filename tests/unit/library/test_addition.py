@@ -141,15 +141,28 @@ def _cylinder() -> float:
     return 12 * 0.2**2 * np.sin(angle) * 0.3
 
 
-def test_scaling_moves_slides_and_origins_but_no_angles(tmp_path) -> None:
+def test_a_unit_is_that_of_the_mesh_files_of_a_description(tmp_path) -> None:
     urdf_cabinet(tmp_path / "in")
     metres, _ = only(add(tmp_path / "in", tmp_path / "a"))
     tenth, record = only(add(tmp_path / "in", tmp_path / "b", unit="dm"))
-    assert record.unit_from == "option" and any("unusual" in finding for finding in record.findings)
-    for before, after in zip(metres.joints, tenth.joints, strict=True):
-        np.testing.assert_allclose(np.asarray(after.origin), 0.1 * np.asarray(before.origin), atol=1e-6)
-        length = 0.1 if before.type == "prismatic" else 1.0
-        assert after.upper == pytest.approx(length * before.upper)
+    assert (record.unit, record.unit_from) == (0.1, "option")
+    hinges = [joint.origin[2] for joint in (*metres.joints, *tenth.joints) if joint.type == "revolute"]
+    assert [joint.upper for joint in tenth.joints] == [joint.upper for joint in metres.joints]
+    # the carcass is 0.08 high about 0.4 now, and the hinge still 0.2 above the carcass frame
+    bottom = 0.2 - 0.15  # of the door, which is a box of 0.3 in metres
+    assert hinges == [pytest.approx(0.2), pytest.approx(0.2 - bottom)]
+
+
+def test_a_description_without_meshes_is_in_the_unit_that_is_said(tmp_path) -> None:
+    folder = tmp_path / "in"
+    body = '<link name="a"><visual><geometry><box size="400 300 600"/></geometry></visual></link>'
+    door = '<link name="b"><visual><origin xyz="200 0 0"/><geometry><box size="400 20 600"/></geometry></visual></link>'
+    hinge = '<joint name="j" type="{}"><origin xyz="-200 -160 0"/><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    text = f'<robot>{body}{door}{hinge}<limit lower="0" upper="100"/></joint></robot>'
+    write(folder / "cabinet.urdf", text.format("prismatic"))
+    model, record = only(add(folder, tmp_path / "out", unit="mm"))
+    np.testing.assert_allclose(size_of(model), [0.4, 0.32, 0.6], atol=1e-6)
+    assert model.joints[0].upper == pytest.approx(0.1) and (record.unit, record.unit_from) == (0.001, "option")
 
 
 MJCF = """<mujoco model="hutch"><compiler angle="{angle}" eulerseq="xyz"/><include file="../renamed/sub/assets.xml"/>

@@ -1,0 +1,50 @@
+"""Descriptions that another description of the folder includes: parts of it, no models by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.library.importing.mjcf_models import named_by_mjcf
+from scenewright.stages.library.importing.sdf_tree import named_by_sdf
+from scenewright.stages.library.importing.source_folder import SourceFolder
+
+MARKS = (b"<include", b"<model")
+"""What a file holds that includes others."""
+
+
+def parts_of_others(folder: SourceFolder, files: Sequence[Path]) -> set[Path]:
+    """Return the files (resolved) that others include, directly or not; of a circle of them none.
+
+    By itself a part lacks what stands around it: angles in radians, default classes, a pose.
+    """
+    includes = {path.resolve(): named for path in files if (named := _included(folder, path))}
+    named_by_another = {part for path, parts in includes.items() for part in parts if part != path}
+    parts: set[Path] = set()
+    whole = [path for path in includes if path not in named_by_another]
+    waiting = list(whole)
+    while waiting:
+        for part in includes.get(waiting.pop(), ()):
+            if part not in parts:
+                parts.add(part)
+                waiting.append(part)
+    return parts.difference(whole)
+
+
+def _included(folder: SourceFolder, path: Path) -> list[Path]:
+    """Return the files that one includes; a broken one is told when it is read."""
+    suffix = path.suffix.lower()
+    if suffix not in (".xml", ".mjcf", ".sdf", ".world"):
+        return []
+    try:
+        if not any(mark in folder.read(path) for mark in MARKS):
+            return []
+        root = folder.read_xml(path)
+        if suffix in (".sdf", ".world"):
+            return list(named_by_sdf(folder, path, root))
+        if root.tag not in ("mujoco", "mujocoinclude"):
+            return []
+        return [file for name in named_by_mjcf(root) if (file := folder.find(name, path.parent)) is not None]
+    except BadInput:
+        return []
