@@ -157,7 +157,9 @@ def test_a_description_without_meshes_is_in_the_unit_that_is_said(tmp_path) -> N
     folder = tmp_path / "in"
     body = '<link name="a"><visual><geometry><box size="400 300 600"/></geometry></visual></link>'
     door = '<link name="b"><visual><origin xyz="200 0 0"/><geometry><box size="400 20 600"/></geometry></visual></link>'
-    hinge = '<joint name="j" type="{}"><origin xyz="-200 -160 0"/><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    hinge = (
+        '<joint name="j" type="{}"><origin xyz="-200 -160 0"/><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    )
     text = f'<robot>{body}{door}{hinge}<limit lower="0" upper="100"/></joint></robot>'
     write(folder / "cabinet.urdf", text.format("prismatic"))
     model, record = only(add(folder, tmp_path / "out", unit="mm"))
