@@ -9,10 +9,12 @@ from scenewright.schemas.errors import BadInput
 
 CONVERTER = "npx @gltf-transform/cli"
 WAYS_OUT = {
-    **dict.fromkeys(("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"), "copy"),
-    "KHR_mesh_quantization": "dequantize",
-    "KHR_texture_basisu": "ktxdecompress",
-    "EXT_texture_avif": "png",
+    **dict.fromkeys(
+        ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"), "copy {name} OUT.glb"
+    ),
+    "KHR_mesh_quantization": "dequantize {name} OUT.glb",
+    "KHR_texture_basisu": "ktxdecompress {name} OUT.glb, with KTX-Software installed",
+    "EXT_texture_avif": "png {name} OUT.glb --formats avif",
 }
 """Extension -> command of glTF Transform that writes the file without it."""
 APPEARANCE = ("KHR_materials_", "KHR_lights_", "EXT_lights_", "KHR_texture_transform", "EXT_texture_webp", "KHR_xmp")
@@ -21,8 +23,8 @@ APPEARANCE = ("KHR_materials_", "KHR_lights_", "EXT_lights_", "KHR_texture_trans
 
 def way_out(extension: str, name: str) -> str:
     """Return what to do with a file of this name that needs an extension."""
-    command = WAYS_OUT.get(extension)
-    return f"{CONVERTER} {command} {name} OUT.glb" if command else f"export it without {extension}"
+    command = WAYS_OUT.get(extension, "").format(name=name)
+    return f"{CONVERTER} {command}" if command else f"export it without {extension}"
 
 
 def refuse_extensions(tree: Mapping[str, Any], name: str, read: Collection[str] = ()) -> None:

@@ -68,14 +68,27 @@ class PlainGltf:
             primitive["indices"], primitive["mode"] = self._append(faces.reshape(-1, 1).astype("<u4"), "SCALAR"), 4
         if "POSITION" in attributes:
             attributes["POSITION"] = self._as_floats(whole_number(attributes["POSITION"]))
-        texture = material.get("pbrMetallicRoughness", {}).get("baseColorTexture")
+        base = material.get("pbrMetallicRoughness", {})
+        texture = base.get("baseColorTexture")
         if texture is None:
+            if "COLOR_0" in attributes:  # trimesh forgets these where there is a material
+                attributes["COLOR_0"] = self._painted(whole_number(attributes["COLOR_0"]), base)
+                primitive.pop("material", None)
             return
         moved = texture.get("extensions", {}).get("KHR_texture_transform", {})
         number = whole_number(moved.get("texCoord", texture.get("texCoord", 0)))
         if f"TEXCOORD_{number}" in attributes:
             points = whole_number(attributes[f"TEXCOORD_{number}"])
             attributes["TEXCOORD_0"] = self._texture_points(points, moved)
+
+    def _painted(self, accessor: int, base: dict[str, Any]) -> int:
+        """Return the number of an accessor of colours times the factor of their material."""
+        factor = np.array(base.get("baseColorFactor", (1, 1, 1, 1)), dtype=float)[:3]
+        if ("color", accessor, *factor) not in self._known:
+            said = {**self.tree["accessors"][accessor], "normalized": True}  # whole numbers are, by the specification
+            values = np.clip(self._array(said)[:, :3] * factor, 0.0, 1.0)
+            self._known["color", accessor, *factor] = self._append(values.astype("<f4"), "VEC3")
+        return self._known["color", accessor, *factor]
 
     def _texture_points(self, accessor: int, moved: dict[str, Any]) -> int:
         offset = np.array(moved.get("offset", (0, 0)), dtype=float)
@@ -85,7 +98,7 @@ class PlainGltf:
             return self._as_floats(accessor)
         key = ("uv", accessor, *offset, *scale, turn)
         if key not in self._known:
-            c, s = math.cos(turn), math.sin(turn)
+            c, s = math.cos(turn), math.sin(turn)  # u' = c u + s v, as readers agree: KhronosGroup/glTF #1563
             points = self._array(accessor) * scale @ np.array([[c, -s], [s, c]]) + offset
             self._known[key] = self._append(points.astype("<f4"), "VEC2")
         return self._known[key]

@@ -11,7 +11,7 @@ from scenewright.stages.library.importing.source_model import Surface, painted_f
 
 
 def surface_of(mesh: trimesh.Trimesh, name: str) -> Surface:
-    """Return a mesh with the colours of its faces: material, times picture, times colours of vertices."""
+    """Return a mesh with the colours of its faces: of its picture, its material or its vertices."""
     faces = np.asarray(mesh.faces)
     colors = painted_faces(len(faces), None)
     visual = mesh.visual
@@ -22,10 +22,6 @@ def surface_of(mesh: trimesh.Trimesh, name: str) -> Surface:
                 colors = face_colors(np.asarray(image.convert("RGB")), np.asarray(visual.uv)[faces])
             else:
                 colors = np.tile(np.asarray(visual.material.main_color, dtype=np.uint8)[:3], (len(faces), 1))
-            of_vertices = visual.vertex_attributes.get("color")
-            if of_vertices is not None:
-                of_faces = trimesh.visual.to_rgba(of_vertices)[faces][..., :3].mean(axis=1)
-                colors = np.round(colors * (of_faces / 255.0)).astype(np.uint8)
     elif visual is not None and visual.kind is not None:
         colors = np.asarray(visual.face_colors, dtype=np.uint8)[:, :3]
     return Surface(np.asarray(mesh.vertices, dtype=float), faces, colors, name)

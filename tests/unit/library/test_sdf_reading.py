@@ -144,7 +144,8 @@ TOLD = {
     "no submesh": (
         PLAIN.replace(
             LEAF,
-            "<visual name='v'><geometry><mesh><uri>meshes/a.dae</uri><submesh><name>nut</name></submesh></mesh></geometry>"
+            "<visual name='v'><geometry><mesh><uri>meshes/a.dae</uri><submesh><name>nut</name></submesh></mesh>"
+            "</geometry>"
             "</visual>",
         ),
         "link 'door': submesh 'nut' is not in its mesh: all of it is taken",
