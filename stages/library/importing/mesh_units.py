@@ -7,13 +7,17 @@ would then lie far from one another is the whole description taken to be in that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.library.importing.frames import unit_name
 from scenewright.stages.library.importing.grouping import Group, grouped
 from scenewright.stages.library.importing.source_model import SourceModel, Surface
+
+
+LEAST_FACTOR = 10.0
+"""The units that models come in differ by this much at least, inches aside."""
 
 
 def names_meshes(source: SourceModel) -> bool:
@@ -26,11 +30,8 @@ def in_unit(source: SourceModel, unit: float) -> tuple[SourceModel, float, str]:
 
     The finding is empty when the mesh files alone are in that unit.
     """
-    meshes_alone = _with_meshes_in(source, unit)
-    if apart(grouped(meshes_alone)[0]) is None:
-        return meshes_alone, 1.0, ""
-    whole = _with_meshes_in(source, 1.0)
-    if apart(grouped(whole)[0]) is not None:
+    meshes_alone, whole = _with_meshes_in(source, unit), _with_meshes_in(source, 1.0)
+    if not _torn_apart(meshes_alone) or _torn_apart(whole):
         return meshes_alone, 1.0, ""
     return whole, unit, f"joints and poses are in {unit_name(unit)} as well: parts would lie far apart otherwise"
 
@@ -43,11 +44,31 @@ def _with_meshes_in(source: SourceModel, unit: float) -> SourceModel:
     return replace(source, links=tuple(links), mesh_unit=None)
 
 
-def apart(groups: Sequence[Group]) -> tuple[str, float] | None:
-    """Return the link that lies farthest from all others and how far [the file's unit], or None.
+def _torn_apart(source: SourceModel) -> bool:
+    """Whether parts lie so far apart as only lengths in two units do."""
+    gap = _widest_gap(grouped(source)[0])
+    return gap is not None and gap.length > LEAST_FACTOR * gap.smaller
 
-    Spoken of is a gap between bounding boxes that is longer than the largest link: something between them is wrong.
-    """
+
+def apart(groups: Sequence[Group]) -> tuple[str, float] | None:
+    """Return the link that lies farther from all others than any link is long, and how far [the file's unit]."""
+    gap = _widest_gap(groups)
+    return (gap.link, gap.length) if gap is not None and gap.length > gap.largest else None
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """Between the bounding boxes of a link and of all others."""
+
+    link: str
+    length: float
+    smaller: float
+    """Diagonal of the smaller of the two boxes."""
+    largest: float
+    """Diagonal of the largest link."""
+
+
+def _widest_gap(groups: Sequence[Group]) -> _Gap | None:
     names, bounds = [], []
     for group in groups:
         for link, pose in group.links:
@@ -61,9 +82,10 @@ def apart(groups: Sequence[Group]) -> tuple[str, float] | None:
     low, high = np.array(bounds)[:, 0], np.array(bounds)[:, 1]
     others_low, others_high = _least_of_others(low), -_least_of_others(-high)
     gaps = np.linalg.norm(np.maximum(0.0, np.maximum(low - others_high, others_low - high)), axis=1)
-    farthest = int(np.argmax(gaps))
-    largest = float(np.linalg.norm(high - low, axis=1).max())
-    return (names[farthest], float(gaps[farthest])) if gaps[farthest] > largest else None
+    sizes, sizes_of_others = np.linalg.norm(high - low, axis=1), np.linalg.norm(others_high - others_low, axis=1)
+    widest = int(np.lexsort((sizes, -gaps))[0])
+    smaller = float(min(sizes[widest], sizes_of_others[widest]))
+    return _Gap(names[widest], float(gaps[widest]), smaller, float(sizes.max()))
 
 
 def _least_of_others(values: np.ndarray) -> np.ndarray:
