@@ -15,7 +15,6 @@ from scenewright.stages.library.importing.frames import unit_name
 from scenewright.stages.library.importing.grouping import Group, grouped
 from scenewright.stages.library.importing.source_model import SourceModel, Surface
 
-
 LEAST_FACTOR = 10.0
 """The units that models come in differ by this much at least, inches aside."""
 
