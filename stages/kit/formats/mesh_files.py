@@ -178,6 +178,8 @@ def _check_ply(data: bytes) -> bool:
         if not count.isdigit() or len(count) > 18 or int(count) > body:
             raise BadInput(f"declares {count[:20]!r} of {name[:20]!r}, but holds {body} bytes")
         vertices += int(count) if name == b"vertex" else 0
+    if b"tristrips" in dict(counts):
+        raise BadInput("its triangles are strips (tristrips), which are not read", hint="export it from MeshLab")
     return vertices == 0
 
 

@@ -20,6 +20,8 @@ WAYS: dict[str, str] = {
         (".3ds", ".max", ".skp", ".c4d", ".ma", ".mb"), "its format is not read: export GLB from its program"
     ),
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".fcstd", ".3dm"), f"CAD solids are not read: {_CAD}"),
+    ".mjb": "a compiled MuJoCo model is not read: save it as XML (mujoco.mj_saveLastXML)",
+    **dict.fromkeys((".zip", ".7z", ".rar", ".tar", ".gz", ".tgz", ".zae", ".mjz"), "an archive: unpack it"),
     **dict.fromkeys((".off", ".3mf", ".msh"), "its format is not read: open it in MeshLab and export PLY"),
 }
 """Ending -> what is said; `{name}` and `{stem}` are those of the file."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
@@ -48,3 +49,12 @@ def _included(folder: SourceFolder, path: Path) -> list[Path]:
         return [file for name in named_by_mjcf(root) if (file := folder.find(name, path.parent)) is not None]
     except BadInput:
         return []
+
+
+def lone_parts(folder: SourceFolder, files: Sequence[Path]) -> Iterator[Path]:
+    """Yield the files that are parts of an MJCF and hold bodies or geoms."""
+    for path in files:
+        with suppress(BadInput):
+            root = folder.read_xml(path) if path.suffix.lower() == ".xml" else None
+            if root is not None and root.tag == "mujocoinclude" and root.find(".//geom") is not None:
+                yield path

@@ -103,7 +103,7 @@ class SdfTree:
         placed = ElementTree.Element("include", dict(include.attrib))
         placed.extend(child for child in include if child.tag == "pose")
         if (frame := include.findtext("placement_frame") or model.get("placement_frame")) is not None:
-            placed.set("placement_frame", frame.strip())
+            placed.set("placement_frame", str(frame).strip())
         if not any(child.tag == "pose" for child in include):
             placed.extend(model.findall("pose"))
         placed.set("name", (include.findtext("name") or model.get("name", "")).strip())

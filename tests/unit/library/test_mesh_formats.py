@@ -312,6 +312,13 @@ def test_a_chair_lies_down_for_no_convention(tmp_path: Path) -> None:
         assert record.up == f"+{name}" and record.front_from == "back rest"
 
 
+def test_strips_of_a_ply_are_named(tmp_path: Path) -> None:
+    header = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    strips = b"element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    with pytest.raises(BadInput, match="its triangles are strips"):
+        read(tmp_path, "a.ply", header + strips)
+
+
 def test_messages_name_what_is_wrong(tmp_path: Path) -> None:
     """No exception of a library, and no advice that is a phrase."""
     for name, data in {

@@ -124,6 +124,8 @@ def test_a_hinge_far_from_its_part_and_a_part_far_from_all_others_are_told(tmp_p
         ("cabinet.usda", "USD is not read: open it in Blender and export GLB"),
         ("cabinet.usdz", "USD is not read"),
         ("cabinet.fbx", "FBX is not read"),
+        ("cabinet.zip", "an archive: unpack it"),
+        ("cabinet.mjb", "mj_saveLastXML"),
         ("cabinet.step", "CAD solids are not read: open it in FreeCAD and export OBJ or GLB"),
     ],
 )
@@ -141,3 +143,19 @@ def test_sources_beside_what_was_made_of_them_are_not_spoken_of(tmp_path: Path) 
     for name in ("cabinet.urdf.xacro", "cabinet.blend", "cabinet.fbx"):
         write(tmp_path / name, "anything")
     assert all(isinstance(found, SourceModel) for found in find_models(SourceFolder(tmp_path)))
+
+
+def test_descriptions_in_files_called_xml(tmp_path: Path) -> None:
+    write(tmp_path / "a.xml", robot(BODY))
+    write(tmp_path / "b.xml", f'<sdf version="1.7"><model name="b"><link name="a">{LEAF}</link></model></sdf>'.replace(
+        '<box size="0.4 0.02 0.6"/>', "<box><size>1 1 1</size></box>"))  # fmt: skip
+    write(tmp_path / "package.xml", "<package/>")
+    found = list(find_models(SourceFolder(tmp_path)))
+    assert [model.format for model in found if isinstance(model, SourceModel)] == ["URDF", "SDF"] and len(found) == 2
+
+
+def test_parts_that_nothing_includes(tmp_path: Path) -> None:
+    write(tmp_path / "leaf.xml", '<mujocoinclude><body><geom type="box" size="1 1 1"/></body></mujocoinclude>')
+    write(tmp_path / "assets.xml", "<mujocoinclude><asset/></mujocoinclude>")
+    (found,) = find_models(SourceFolder(tmp_path))
+    assert isinstance(found, Unread) and found.source == "leaf.xml" and "no file here includes" in found.reason
