@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.formats.gltf_extensions import refuse_extensions, way_out
@@ -30,8 +31,8 @@ def read_gltf(folder: SourceFolder, path: Path) -> MeshContent:
     data = folder.read(path)
     with _told_as_broken(path):
         tree, binary = _packed(folder, path, data) if path.suffix.lower() == ".gltf" else _opened(data, path)
-        findings = _without_unread_pictures(tree, path)
         refuse_extensions(tree, path.name, (*WRITTEN_OUT, *PICTURES_NOT_READ))
+        binary, findings = _with_pictures_inside(folder, path, tree, binary)
         plain = PlainGltf(tree, binary)
         binary = plain.write_out()
         tree["extensionsRequired"] = [e for e in tree["extensionsRequired"] if e not in PICTURES_NOT_READ]
@@ -84,7 +85,7 @@ def _packed(folder: SourceFolder, path: Path, data: bytes) -> tuple[dict[str, An
     chunks, starts, length = [], [], 0
     for buffer in tree.get("buffers", []):
         starts.append(length)
-        part = _buffer(folder, path, str(buffer["uri"]))[: whole_number(buffer["byteLength"])]
+        part = _named(folder, path, str(buffer["uri"]), "buffer")[: whole_number(buffer["byteLength"])]
         chunks += [part, b"\0" * (-len(part) % 4)]
         length += len(part) + -len(part) % 4
         if length > LARGEST_FILE:
@@ -96,16 +97,31 @@ def _packed(folder: SourceFolder, path: Path, data: bytes) -> tuple[dict[str, An
     return tree, b"".join(chunks)
 
 
-def _without_unread_pictures(tree: dict[str, Any], path: Path) -> list[str]:
-    """Take pictures that are not read out of a description; return what is to be said of it."""
+def _with_pictures_inside(
+    folder: SourceFolder, path: Path, tree: dict[str, Any], binary: bytes
+) -> tuple[bytes, list[str]]:
+    """Return the binary with the pictures that lie beside the file appended, and what is to be said of them."""
     used = [e for e in tree.get("extensionsRequired", ()) if e in PICTURES_NOT_READ]
     if used:
         _drop_pictures(tree)
         way = way_out(used[0], path.name)
-        return [f"{path.name}: pictures need {used[0]}, colours are those of the materials ({way} turns them)"]
-    if path.suffix.lower() == ".gltf" and _drop_pictures(tree):
-        return [f"{path.name}: pictures are left out, colours are those of the materials"]
-    return []
+        return binary, [f"{path.name}: pictures need {used[0]}, colours are those of the materials ({way} turns them)"]
+    parts, length = [binary, b"\0" * (-len(binary) % 4)], len(binary) + -len(binary) % 4
+    for image in tree.get("images", []):
+        if "uri" not in image:
+            continue
+        try:
+            data = _named(folder, path, str(image.pop("uri")), "picture")
+        except BadInput as error:
+            _drop_pictures(tree)
+            return binary, [f"{error.message.removeprefix(f'{path.parent}/')}: colours are those of the materials"]
+        tree.setdefault("bufferViews", []).append({"buffer": 0, "byteOffset": length, "byteLength": len(data)})
+        image["bufferView"] = len(tree["bufferViews"]) - 1
+        parts += [data, b"\0" * (-len(data) % 4)]
+        length += len(data) + -len(data) % 4
+        if length > LARGEST_FILE:
+            raise BadInput(f"{path}: buffers and pictures of more than {LARGEST_FILE} bytes", hint=SIMPLIFY)
+    return b"".join(parts), []
 
 
 def _drop_pictures(tree: dict[str, Any]) -> bool:
@@ -127,13 +143,14 @@ def _glb(tree: dict[str, Any], chunks: list[bytes]) -> bytes:
     return b"".join([head, text, struct.pack("<I4s", binary, b"BIN\0"), *chunks])
 
 
-def _buffer(folder: SourceFolder, path: Path, name: str) -> bytes:
+def _named(folder: SourceFolder, path: Path, name: str, what: str) -> bytes:
+    """Return the bytes of a buffer or picture by its URI. Raises BadInput."""
     if name.startswith("data:"):
         try:
             return base64.b64decode(name.partition(",")[2], validate=True)
         except ValueError:  # binascii.Error, or letters that are none of ASCII
-            raise BadInput(f"{path}: a buffer is no base64") from None
-    file = folder.find(name, path.parent)
+            raise BadInput(f"{path}: a {what} is no base64") from None
+    file = folder.find(name, path.parent) or folder.find(unquote(name), path.parent)
     if file is None:
-        raise BadInput(f"{path}: buffer {name!r:.60} is not in the folder")
+        raise BadInput(f"{path}: {what} {name!r:.60} is not in the folder")
     return folder.read(file)

@@ -206,6 +206,27 @@ def test_pictures_that_are_not_read_leave_the_shape(tmp_path: Path) -> None:
     assert "a.glb: pictures need KHR_texture_basisu" in content.findings[0] and "ktxdecompress" in content.findings[0]
 
 
+def test_pictures_and_buffers_beside_a_gltf(tmp_path: Path) -> None:
+    gltf = Gltf()
+    gltf.square(TEXCOORD_0=gltf.array(UV))
+    gltf.picture({})
+    view = gltf.tree["bufferViews"][gltf.tree["images"][0]["bufferView"]]
+    picture = gltf.binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+    (tmp_path / "dark wood.png").write_bytes(picture)
+    (tmp_path / "the data.bin").write_bytes(gltf.binary)
+    gltf.tree["images"] = [{"uri": "dark%20wood.png"}]
+    buffers = {"buffers": [{"uri": "the%20data.bin", "byteLength": len(gltf.binary)}]}
+    for name, data in (("a.gltf", json.dumps(gltf.tree | buffers)), ("a.glb", gltf.bytes())):
+        content = read(tmp_path, name, data)
+        assert colors(content) == [GREEN] and content.findings == ()
+    (tmp_path / "dark wood.png").unlink()
+    content = read(tmp_path, "b.gltf", json.dumps(gltf.tree | buffers))
+    assert content.triangles == 2
+    assert content.findings == (
+        "b.gltf: picture 'dark%20wood.png' is not in the folder: colours are those of the materials",
+    )
+
+
 def test_skins_and_morph_targets_are_told(tmp_path: Path) -> None:
     gltf = Gltf()
     gltf.square()
