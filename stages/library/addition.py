@@ -114,7 +114,7 @@ def run(
         context.logger.info(line)
     if imported == 0:
         why = _why(records[-1]) if records else "it holds no model files"
-        raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md; --class-name, --mapping")
+        raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md")
     affordance_files = tuple(uses[model.id] for model in all_models if model.id in uses)
     LibraryFile(seed=seed, models=tuple(all_models), affordances=affordance_files).write(
         context.output / "library.json"

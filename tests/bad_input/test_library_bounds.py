@@ -125,7 +125,7 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
     ),
     "ellipsoid as flat as a sheet": (
         {"chair.xml": mjcf('<geom type="ellipsoid" size="1 1 1e-16"/>')},
-        "chair.*cannot be used: QhullError",
+        "chair.*a shape has no volume",
     ),
     "includes that multiply": (
         {f"p{k}.xml": "<mujocoinclude>" + f'<include file="p{k + 1}.xml"/>' * 4 + "</mujocoinclude>" for k in range(5)}

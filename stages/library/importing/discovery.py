@@ -19,7 +19,7 @@ from scenewright.stages.library.importing.loose_models import (
 from scenewright.stages.library.importing.mesh_reading import MESH_SUFFIXES
 from scenewright.stages.library.importing.mjcf_models import is_mjcf, read_mjcf_models
 from scenewright.stages.library.importing.other_formats import other_formats
-from scenewright.stages.library.importing.parts_of_others import lone_parts, parts_of_others
+from scenewright.stages.library.importing.parts_of_others import lone_parts, older_versions, parts_of_others
 from scenewright.stages.library.importing.sdf_models import read_sdf_models
 from scenewright.stages.library.importing.source_folder import SourceFolder
 from scenewright.stages.library.importing.source_model import SourceModel
@@ -50,7 +50,8 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
     files = folder.files()
     count = 0
     claimed = _Claimed()
-    parts = parts_of_others(folder, [path for path in files if _is_text(path)])
+    named = [path for path in files if _is_text(path)]
+    parts = parts_of_others(folder, named) | older_versions(folder, named)
     for path in files:
         if parts and path.resolve() in parts:
             continue

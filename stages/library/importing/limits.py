@@ -36,10 +36,7 @@ MOST_FINDINGS = 40
 LONGEST_TEXT = 300
 """Longest name or finding [characters]."""
 SIMPLIFY = f"simplify it to at most {MOST_TRIANGLES} triangles and {MOST_SHAPES} shapes, or split it"
-REFUSALS = (
-    *(ArithmeticError, RecursionError, ValueError, QhullError, ShapelyError),
-    *(cv2.error, csv.Error, struct.error),
-)
+REFUSALS = (*(ArithmeticError, RecursionError, ValueError, ShapelyError), *(cv2.error, csv.Error, struct.error))
 """What geometry libraries and parsers raise for numbers that they cannot take (LinAlgError and UnicodeError are
 ValueErrors). IndexError, KeyError, TypeError are not among them: those are bugs of ours."""
 
@@ -52,12 +49,13 @@ def told_refusals(where: str) -> Iterator[None]:
             yield
     except BadInput:
         raise
+    except QhullError as error:
+        raise BadInput(f"{where}: a shape has no volume: it is flat, or a line", hint="mend it") from error
     except REFUSALS as error:
         reason = (str(error).strip().splitlines() or [""])[0]
         raise BadInput(
-            f"{where}: its geometry cannot be used: {type(error).__name__}: {reason:.120}",
-            hint="mend it, or leave it out (--mapping)",
-        ) from None
+            f"{where}: its geometry cannot be used: {type(error).__name__}: {reason:.120}", hint="mend it"
+        ) from error
 
 
 class Allowance:

@@ -1,4 +1,4 @@
-"""Descriptions that another description of the folder includes: parts of it, no models by themselves."""
+"""Descriptions that are no models by themselves: parts that others include, older versions of a Gazebo model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.library.importing.mjcf_models import named_by_mjcf
-from scenewright.stages.library.importing.sdf_tree import named_by_sdf
+from scenewright.stages.library.importing.sdf_tree import files_of_config, named_by_sdf
 from scenewright.stages.library.importing.source_folder import SourceFolder
 
 MARKS = (b"<include", b"<model")
@@ -31,6 +31,16 @@ def parts_of_others(folder: SourceFolder, files: Sequence[Path]) -> set[Path]:
                 parts.add(part)
                 waiting.append(part)
     return parts.difference(whole)
+
+
+def older_versions(folder: SourceFolder, files: Sequence[Path]) -> set[Path]:
+    """Return the files (resolved) that a `model.config` lists beside the newest: the same model in older SDF."""
+    older: set[Path] = set()
+    for path in files:
+        if path.name == "model.config":
+            with suppress(BadInput):
+                older.update(files_of_config(folder, path)[1:])
+    return older
 
 
 def _included(folder: SourceFolder, path: Path) -> list[Path]:

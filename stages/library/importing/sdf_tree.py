@@ -226,12 +226,15 @@ def included_file(folder: SourceFolder, uri: str, base: Path) -> Path | None:
     if uri.lower().endswith((".sdf", ".world", ".xml")):
         return folder.find(uri, base)
     config = folder.find(f"{uri}/model.config", base)
-    if config is not None:
-        entries = [(sdf_version(e), (e.text or "").strip()) for e in folder.read_xml(config).findall("sdf")]
-        for _, name in sorted(entries, reverse=True):
-            if (file := folder.find(name, config.parent)) is not None and file.is_relative_to(config.parent):
-                return file
-    return folder.find(f"{uri}/model.sdf", base)
+    versions = [] if config is None else files_of_config(folder, config)
+    return versions[0] if versions else folder.find(f"{uri}/model.sdf", base)
+
+
+def files_of_config(folder: SourceFolder, config: Path) -> list[Path]:
+    """Return the SDF files of a `model.config`, the newest version first: they all say the same. Raises BadInput."""
+    entries = [(sdf_version(e), (e.text or "").strip()) for e in folder.read_xml(config).findall("sdf")]
+    files = [folder.find(name, config.parent) for _, name in sorted(entries, reverse=True)]
+    return list(dict.fromkeys(f for f in files if f is not None and f.is_relative_to(config.parent)))
 
 
 def named_by_sdf(folder: SourceFolder, path: Path, root: ElementTree.Element) -> Iterator[Path]:

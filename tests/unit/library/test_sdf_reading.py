@@ -183,6 +183,14 @@ def test_what_lies_in_a_world_beside_its_models(tmp_path: Path) -> None:
     assert "included model 'model://bed' is not in the folder; <actor> in <world> is not read" in beside.reason
 
 
+def test_older_versions_of_a_model_are_no_models(tmp_path: Path) -> None:
+    for name, version in (("model", "1.6"), ("model-1_4", "1.4"), ("model-1_10", "1.10")):
+        write(tmp_path / f"{name}.sdf", sdf(PLAIN, version))
+    entries = "".join(f'<sdf version="{v}">{n}.sdf</sdf>' for n, v in (("model", "1.6"), ("model-1_4", "1.4")))
+    write(tmp_path / "model.config", f"<model>{entries}</model>")
+    assert [found.source for found in read(tmp_path)] == ["model-1_10.sdf", "model.sdf"]  # one is in no list
+
+
 @pytest.mark.parametrize(
     ("inside", "reason"),
     [
