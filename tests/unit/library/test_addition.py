@@ -28,6 +28,7 @@ from scenewright.stages.kit.stage import Context
 from scenewright.stages.library.addition import run
 from scenewright.stages.library.importing.classes import class_of
 from scenewright.stages.library.importing.collada_file import parse_collada
+from scenewright.stages.library.importing.discovery import Unread, find_models
 from scenewright.stages.library.importing.frames import AXES, model_rotation
 from scenewright.stages.library.importing.pieces import convex_pieces
 from scenewright.stages.library.importing.placing import normal_limits
@@ -514,6 +515,14 @@ def test_real_mjcf_furniture_keeps_its_joints(tmp_path) -> None:
     left, right = by_id["hingecabinet"].joints
     np.testing.assert_allclose([left.axis, right.axis], [[0, 0, -1], [0, 0, 1]], atol=1e-9)
     np.testing.assert_allclose(np.subtract(right.origin, left.origin), [0.76, 0, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "models", "coupled"), [("furniture_mjcf", 41, 11), ("aws_furniture", 18, 0)])
+def test_real_furniture_holds_nothing_unknown(name, models, coupled) -> None:
+    found = list(find_models(SourceFolder(real_data(name))))
+    assert len(found) == models and not any(isinstance(model, Unread) for model in found)
+    findings = [finding for model in found for finding in model.findings if "named elsewhere" not in finding]
+    assert len(findings) == coupled and all("of <equality> (joint) left out" in finding for finding in findings)
 
 
 def test_real_dae_furniture_is_in_centimetres(tmp_path) -> None:
