@@ -101,12 +101,11 @@ class SdfTree:
             self.findings.append(f"included model {uri!r:.80} is not in the folder, or is no SDF: left out")
             return
         placed = ElementTree.Element("include", dict(include.attrib))
-        placed.extend(child for child in include if child.tag == "pose")
-        if (frame := include.findtext("placement_frame") or model.get("placement_frame")) is not None:
-            placed.set("placement_frame", str(frame).strip())
-        if not any(child.tag == "pose" for child in include):
-            placed.extend(model.findall("pose"))
-        placed.set("name", (include.findtext("name") or model.get("name", "")).strip())
+        own_pose = include.find("pose") is not None
+        placed.extend((include if own_pose else model).findall("pose"))
+        frame = include.findtext("placement_frame") if own_pose else model.get("placement_frame")
+        placed.set("placement_frame", (frame or "").strip())
+        placed.set("name", (include.findtext("name") or model.get("name") or "").strip())
         self._add_model(placed, model, scope, file, sdf_version(root), depth)
 
     def _add_model(
