@@ -46,6 +46,9 @@ def centres(groups: list[Group]) -> np.ndarray:
     return np.array(sorted(np.round(rows, 6).tolist()))
 
 
+CLASSES = """<default><geom type="box" size="0.1 0.1 0.1"/><default class="out"><geom pos="0 0 0.5"/>
+<default class="side"><geom pos="0.3 0 0" euler="0 0 20"/><joint axis="0 1 0" pos="0 0 0.2" range="0 60"/></default>
+</default></default>"""
 PLACING = {
     "a frame around a door": f'<body name="cabinet" pos="0 0 0.3">{BOX}<frame euler="0 0 180">{DOOR}</frame></body>',
     "frames in frames": f"""<frame pos="0 0 0.3"><frame euler="0 0 30"><body name="cabinet">{BOX}
@@ -60,6 +63,9 @@ PLACING = {
     "replicas of replicas": f"""<body name="cabinet">{BOX}<replicate count="2" offset="1 0 0"><frame euler="0 0 30">
         <replicate count="3" offset="0 0.5 0"><geom type="box" size="0.1 0.2 0.1"/></replicate></frame></replicate>
         </body>""",
+    "classes of frames and bodies": f"""<body name="cabinet" childclass="out">{BOX}<frame childclass="side" pos="0 0 1">
+        <body name="door" pos="1 0 0"><joint name="hinge"/><geom/><geom class="out"/>
+        <frame childclass="out"><geom/></frame></body></frame><body pos="0 2 0"><geom/></body></body>""",
     "an attached body": f"""<body name="cabinet">{BOX}<frame pos="0 0 0.7" euler="90 0 0">
         <attach model="part" body="leaf" prefix="left_"/></frame></body>""",
     "an attached file": f'<body name="cabinet">{BOX}<attach model="part" prefix="left_"/></body>',
@@ -70,7 +76,7 @@ PLACING = {
 def test_shapes_and_joints_are_where_mujoco_has_them(tmp_path: Path, case: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     assets = '<asset><model name="part" file="parts/part.xml"/></asset>' if "attach" in PLACING[case] else ""
-    text = f"<mujoco>{assets}<worldbody>{PLACING[case]}</worldbody></mujoco>"
+    text = f"<mujoco>{CLASSES}{assets}<worldbody>{PLACING[case]}</worldbody></mujoco>"
     write(tmp_path / "cabinet.xml", text)
     if assets:
         write(tmp_path / "parts" / "part.xml", PART)
