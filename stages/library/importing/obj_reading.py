@@ -71,7 +71,7 @@ class _Lines:
         self.triangles = 0
 
     def take(self, line: str) -> None:
-        """Take one line. Raises BadInput for too much; ValueError and IndexError for what is no OBJ."""
+        """Take one line. Raises BadInput for too much; ValueError and IndexError for what is none of an OBJ."""
         word, *rest = line.strip().split(None, 1)
         arguments = rest[0] if rest else ""
         if word == "v":
@@ -124,13 +124,16 @@ def read_obj(folder: SourceFolder, path: Path) -> MeshContent:
     data = folder.read(path, LARGEST_TEXT)
     if b"\0" in data:
         raise BadInput(f"{path}: no OBJ: holds zero bytes")
-    said = _Lines(path)
+    said, number, line = _Lines(path), 0, ""
     try:
         for line in text_lines(data, path):
+            number += 1
             if not line.isspace():
                 said.take(line)
-    except (ValueError, IndexError) as error:
-        raise BadInput(f"{path}: cannot be read as OBJ: {error}"[:200]) from None
+    except IndexError as error:
+        raise BadInput(f"{path}: line {number}: {error}"[:200]) from None
+    except ValueError:
+        raise BadInput(f"{path}: line {number} is none of an OBJ: {line.strip()!r:.60}") from None
     blocks = {key: block for key, block in said.blocks.items() if block.corners}  # two corners make no triangle
     findings = [f"{path.name}: {what} left out ({count})" for what, count in said.left_out.items()]
     if not said.vertices or not blocks:
@@ -184,7 +187,7 @@ def _index(text: str, count: int) -> int:
     number = int(text)
     number = number - 1 if number > 0 else count + number
     if not 0 <= number < count:
-        raise ValueError(f"a face names element {text} of {count}")
+        raise IndexError(f"a face names element {text} of {count}")
     return number
 
 

@@ -333,6 +333,12 @@ def test_a_chair_lies_down_for_no_convention(tmp_path: Path) -> None:
         assert record.up == f"+{name}" and record.front_from == "back rest"
 
 
+@pytest.mark.parametrize("line", ["v 1 2", "v 1 2 x", "f 1 a 3", "f 1// /2 3", "vt x"])
+def test_a_line_that_is_none_of_an_obj_is_named(tmp_path: Path, line: str) -> None:
+    with pytest.raises(BadInput, match=f"line 5 is none of an OBJ: {line!r}"):
+        read(tmp_path, "a.obj", f"{OBJ}{line}\nf 1 2 3\n")
+
+
 def test_strips_of_a_ply_are_named(tmp_path: Path) -> None:
     header = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
     strips = b"element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
