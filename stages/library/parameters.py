@@ -24,7 +24,8 @@ class AdditionParameters(Parameters):
     class_name: str = Field("", description="Class of all models; without it the names of models and folders tell")
     unknown: Literal["skip", "object"] = Field("skip", description="What becomes of models whose class nothing tells")
     unit: Literal["declared", "m", "dm", "cm", "mm", "inch", "foot"] = Field(
-        "declared", description="Unit of the files, whatever they declare"
+        "declared",
+        description="Unit of the files, whatever they declare; of the mesh files that a URDF, SDF or MJCF names",
     )
     up: Literal["declared", "+x", "-x", "+y", "-y", "+z", "-z"] = Field(
         "declared", description="Axis of the files that points up, whatever they declare"
