@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import atexit
+import json
 import shutil
 import tempfile
 from functools import cache
 from pathlib import Path
 
+import cv2
+import numpy as np
 from scenewright.cli.main import run
+from scenewright.stages.tableware.world.overhead import overhead_camera
 
 from tests.unit.segment.test_stage import write_sequence
 
@@ -40,5 +44,23 @@ def room() -> str:
     return str(made)
 
 
-INPUTS = {"golden": golden, "room": room}
+@cache
+def table() -> str:
+    """Return a folder with the image of a table from above: in its middle a cylinder, 0.17 m wide and 0.055 m high.
+    color.png, depth.npy [m] and camera.json; beside it millimetres.npy."""
+    view, top = overhead_camera(width=640, rows=360), 0.83 - 0.055
+    rows, columns = np.mgrid[:360, :640]
+    there = np.hypot(columns - 320, rows - 180) * top / view.camera.fx < 0.085
+    made = folder() / "table"
+    made.mkdir()
+    cv2.imwrite(str(made / "color.png"), np.where(there[..., None], 60, np.full((360, 640, 3), 225)).astype(np.uint8))
+    depth = np.where(there, top, 0.83).astype(np.float32)
+    np.save(made / "depth.npy", depth)
+    np.save(folder() / "millimetres.npy", 1000 * depth)
+    camera = {"camera": view.camera.model_dump(), "world_from_camera": view.world_from_camera.tolist()}
+    (made / "camera.json").write_text(json.dumps(camera))
+    return str(made)
+
+
+INPUTS = {"golden": golden, "room": room, "table": table}
 """What stands for `{name}` in a row's commands."""

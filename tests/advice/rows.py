@@ -27,6 +27,8 @@ class Tried:
     then_code: int = 0
     given: Callable[[Path], None] = nothing
     """Writes the inputs into the folder."""
+    without: tuple[str, ...] = ()
+    """Modules that cannot be imported meanwhile."""
     right: Callable[[Path], None] = nothing
     """Raises AssertionError unless what `then` left in the folder is right."""
 

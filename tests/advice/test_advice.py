@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,8 @@ def test_advice_that_is_followed(
     row: Tried, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    for module in row.without:
+        monkeypatch.setitem(sys.modules, module, None)
     row.given(tmp_path)
     names = {name: make() for name, make in INPUTS.items() if f"{{{name}}}" in row.first + row.then}
 
