@@ -11,7 +11,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import trimesh
 from scenewright.cli.main import run
+from scenewright.stages.cutting.recording.panels import HEIGHT, WIDTH
+from scenewright.stages.cutting.recording.session import Session
 from scenewright.stages.tableware.world.overhead import overhead_camera
 
 from tests.unit.segment.test_stage import write_sequence
@@ -62,5 +65,23 @@ def table() -> str:
     return str(made)
 
 
-INPUTS = {"golden": golden, "room": room, "table": table}
+@cache
+def cut() -> str:
+    """Return a folder with what a person cut twice: cuts.json, and the demonstrations made of it. Beside them
+    `loaf.stl` [m] and `loaf_mm.stl`, 0.12 m long."""
+    made, half = folder() / "cut", 0.5 * WIDTH
+    made.mkdir()
+    session = Session(made / "cuts.json", "carrot", 5)
+    for _ in range(2):
+        session.cut(np.array([[half, 5.0], [half, HEIGHT - 5.0]]))
+        session.finish("slices")
+    loaf = trimesh.creation.box((0.12, 0.04, 0.04))
+    loaf.export(made / "loaf.stl")
+    loaf.apply_scale(1000).export(made / "loaf_mm.stl")
+    written = [f"--record={made}/cuts.json", f"--out={made}/demonstrations", "--image-width=300"]
+    assert run(["cutting", "demonstrate", *written]) == 0
+    return str(made)
+
+
+INPUTS = {"golden": golden, "room": room, "table": table, "cut": cut}
 """What stands for `{name}` in a row's commands."""
