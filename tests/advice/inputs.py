@@ -43,7 +43,7 @@ def room() -> str:
     """Return a folder with the sequence of a small room that was ingested from `log/frames.mcap`: four frames."""
     made = folder() / "room"
     log = write_sequence(made / "log").sequence.path("frames.mcap")
-    assert run(["ingest", str(log), "--out", str(made / "sequence")]) == 0
+    assert run(["ingest", "--log", str(log), "--out", str(made / "sequence")]) == 0
     return str(made)
 
 
@@ -83,5 +83,15 @@ def cut() -> str:
     return str(made)
 
 
-INPUTS = {"golden": golden, "room": room, "table": table, "cut": cut}
+@cache
+def suture() -> str:
+    """Return a folder with a rendered stereo pair of a needle (`scene`, whose `truth` holds masks), and the sequence
+    that was ingested of it."""
+    made = folder() / "suture"
+    assert run(["suture", "scene", "--seed", "0", "--out", f"{made}/scene"]) == 0
+    assert run(["ingest", "--log", f"{made}/scene/frames.mcap", "--out", f"{made}/sequence"]) == 0
+    return str(made)
+
+
+INPUTS = {"golden": golden, "room": room, "table": table, "cut": cut, "suture": suture}
 """What stands for `{name}` in a row's commands."""
