@@ -15,8 +15,11 @@ import trimesh
 from scenewright.cli.main import run
 from scenewright.stages.cutting.recording.panels import HEIGHT, WIDTH
 from scenewright.stages.cutting.recording.session import Session
+from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.tableware.world.overhead import overhead_camera
 
+from tests.unit.poses.textured_room import CAMERA, render, round_walk
+from tests.unit.poses.textured_room import write_sequence as write_textured
 from tests.unit.segment.test_stage import write_sequence
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
@@ -93,5 +96,23 @@ def suture() -> str:
     return str(made)
 
 
-INPUTS = {"golden": golden, "room": room, "table": table, "cut": cut, "suture": suture}
+@cache
+def walks() -> str:
+    """Return a folder with logs of a room, `NAME_log/frames.mcap`, and the sequence NAME that was ingested of each:
+    `unposed` frames, `colourless` ones, and of `two` cameras, of which `front` has one frame and `left` three."""
+    made, path = folder() / "walks", round_walk(60)[:4]
+    write_textured(made / "unposed_log", path)
+    write_textured(made / "colourless_log", path, with_color=False)
+    (made / "two_log").mkdir()
+    cameras = {"front": CAMERA, "left": CAMERA}
+    with FrameWriter(made / "two_log/frames.mcap", CAMERA, cameras=cameras) as writer:
+        for index, pose in enumerate(path):
+            writer.write(0.1 * index, *render(pose), pose, camera_name="left" if index else "front")
+    for name in ("unposed", "colourless", "two"):
+        several = ["--camera", "all"] if name == "two" else []
+        assert run(["ingest", f"--log={made}/{name}_log/frames.mcap", f"--out={made}/{name}", *several]) == 0
+    return str(made)
+
+
+INPUTS = {"golden": golden, "room": room, "table": table, "cut": cut, "suture": suture, "walks": walks}
 """What stands for `{name}` in a row's commands."""
