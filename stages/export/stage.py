@@ -99,9 +99,8 @@ def _notes(
         notes.append(f"not written: {', '.join(lost)}")
     others = [camera.name for camera in info.cameras if camera.name not in cameras]
     if others:
-        notes.append(
-            f"cameras not written: {', '.join(others)}{'' if chosen else ' (--camera NAME writes another one)'}"
-        )
+        written = f"cameras not written: {', '.join(others)}"
+        notes.append(written if chosen else f"{written} (--camera NAME writes another one)")
     if tally.depth_pixels_zeroed:
         notes.append(
             f"{tally.depth_pixels_zeroed} depth pixels beyond {target_format.depth_limit:g} m are 0 = invalid: "

@@ -18,9 +18,18 @@ from scenewright.stages.cutting.recording.session import Session
 from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.tableware.world.overhead import overhead_camera
 
+from tests.panoptic_maps import floor_mesh, write_map
+from tests.unit.cad.models import fridge as model_of_a_fridge
+from tests.unit.cad.models import write_library
+from tests.unit.cad.test_cad_stage import mesh_of
+from tests.unit.disparity.pairs import pair as pictured
+from tests.unit.disparity.pairs import write_folder
+from tests.unit.disparity.test_rectification import turned
+from tests.unit.edit.maps import dense
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 from tests.unit.poses.textured_room import write_sequence as write_textured
 from tests.unit.segment.test_stage import write_sequence
+from tests.unit.viewing.artifacts import seal
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 
@@ -114,5 +123,39 @@ def walks() -> str:
     return str(made)
 
 
-INPUTS = {"golden": golden, "room": room, "table": table, "cut": cut, "suture": suture, "walks": walks}
+@cache
+def pair() -> str:
+    """Return a folder with a stereo log (`log`: left/, right/ and a calibration) and the sequence that was ingested of
+    it; `turned` is the sequence of a log whose right eye is turned from what its calibration says."""
+    made, (left, right, _, _) = folder() / "pair", pictured(noise=0.0)
+    for name, eye in (("sequence", right), ("turned", turned(right, 0.01, 0.01))):
+        log = made / ("log" if name == "sequence" else "turned_log")
+        assert run(["ingest", "--log", str(write_folder(log, [(left, eye)])), "--out", str(made / name)]) == 0
+    return str(made)
+
+
+@cache
+def fridge() -> str:
+    """Return a folder with `library`, `map` and `graph` of a room in which a fridge stands."""
+    made = folder() / "fridge"
+    library = write_library(made / "library", {"fridge": model_of_a_fridge(0.6, 0.65, 1.6, (0.4, 0.8, 1.2))})
+    meshes = floor_mesh((-2.0, -2.0), (2.0, 2.0)), mesh_of(library, "fridge", (0.5, 0.5, 0.0), 0.0)
+    (made / "map").mkdir()
+    write_map(made / "map", {k: dense(mesh, 0.05) for k, mesh in enumerate(meshes, 1)}, {1: "floor", 2: "fridge"})
+    seal(made / "library", "cad_library")
+    seal(made / "map", "panoptic_map")
+    assert run(["graph", "--panoptic-map", f"{made}/map", "--out", f"{made}/graph"]) == 0
+    return str(made)
+
+
+INPUTS = {
+    "golden": golden,
+    "room": room,
+    "table": table,
+    "cut": cut,
+    "suture": suture,
+    "walks": walks,
+    "pair": pair,
+    "fridge": fridge,
+}
 """What stands for `{name}` in a row's commands."""

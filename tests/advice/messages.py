@@ -54,7 +54,8 @@ def _not_messages(node: ast.AST) -> Iterator[ast.AST]:
     elif isinstance(node, ast.Call) and ast.unparse(node.func).rsplit(".", 1)[-1] in DECLARATIONS:
         yield from ast.walk(node)
     elif isinstance(node, ast.JoinedStr | ast.BinOp | ast.Call) and _text(node) is not None:
-        yield from (inner for inner in ast.walk(node) if inner is not node)
+        inner = ast.iter_child_nodes(node)
+        yield from (each.value if isinstance(each, ast.keyword) else each for each in inner)
 
 
 def _text(node: ast.AST) -> str | None:
