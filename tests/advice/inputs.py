@@ -60,6 +60,14 @@ def room() -> str:
 
 
 @cache
+def masks() -> str:
+    """Return a folder with the true masks of that room (`segments`)."""
+    made = folder() / "masks"
+    assert run(["segment", f"--sequence={room()}/sequence", "--backend=ground-truth", f"--out={made}/segments"]) == 0
+    return str(made)
+
+
+@cache
 def table() -> str:
     """Return a folder with the image of a table from above: in its middle a cylinder, 0.17 m wide and 0.055 m high.
     color.png, depth.npy [m] and camera.json; beside it millimetres.npy."""
@@ -148,14 +156,5 @@ def fridge() -> str:
     return str(made)
 
 
-INPUTS = {
-    "golden": golden,
-    "room": room,
-    "table": table,
-    "cut": cut,
-    "suture": suture,
-    "walks": walks,
-    "pair": pair,
-    "fridge": fridge,
-}
+INPUTS = {make.__name__: make for make in (golden, room, masks, table, cut, suture, walks, pair, fridge)}
 """What stands for `{name}` in a row's commands."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
-from scenewright.cli.main import run
 
-from tests.advice.inputs import room
+from tests.advice.inputs import masks
 from tests.advice.rows import NotTried, Tried
 from tests.unit.poses.textured_room import CAMERA
 from tests.unit.viewing.artifacts import seal
@@ -17,7 +16,6 @@ from tests.unit.viewing.artifacts import seal
 OPTIONS, STAGE, MASKS = "stages/export/parameters.py", "stages/export/stage.py", "stages/export/masks.py"
 ASKED = "export --sequence {golden}/sequence --out out --dry-run"
 TWO = "export --sequence {walks}/two --out out"
-SEGMENT = "segment --sequence {room}/sequence --backend ground-truth --out"
 COCO = "export --sequence {room}/sequence --layout coco --out out --segments"
 
 
@@ -44,7 +42,7 @@ def masks_of_a_table(folder: Path) -> None:
 
 def segments_without_ids(folder: Path) -> None:
     """Segments of the room whose list lacks the first id of frame 0."""
-    assert run(shlex.split(f"{SEGMENT} cut".format(room=room()))) == 0
+    shutil.copytree(Path(masks(), "segments"), folder / "cut")
     path = folder / "cut/segments.json"
     document = json.loads(path.read_text())
     del document["frames"][0]["segments"][0]
@@ -60,8 +58,8 @@ ROWS = [
     Tried(
         STAGE,
         "holds no masks",
-        "export --sequence {room}/sequence --layout tum --out out --segments {golden}/segments",
-        f"{SEGMENT} mine && {COCO} mine",
+        "export --sequence {room}/sequence --layout tum --out out --segments {masks}/segments",
+        f"{COCO} {{masks}}/segments",
         right=four_pictures,
     ),
     Tried(
@@ -78,7 +76,7 @@ ROWS = [
         MASKS,
         "is not in segments.json",
         f"{COCO} cut",
-        f"{SEGMENT} again && {COCO} again",
+        f"segment --sequence {{room}}/sequence --backend ground-truth --out again && {COCO} again",
         code=3,
         given=segments_without_ids,
         right=four_pictures,
