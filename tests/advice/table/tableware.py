@@ -34,6 +34,10 @@ def found(folder: Path) -> dict[str, Any]:
     return dict(thing)
 
 
+def an_outline(folder: Path) -> None:
+    assert found(folder)["box"]
+
+
 def the_cylinder(folder: Path) -> None:
     thing = found(folder)
     assert abs(thing["lip"] - 0.055) < 0.002 and max(map(abs, thing["position"][:2])) < 0.005, thing
@@ -115,7 +119,7 @@ ROWS = [
         "tableware detect {table}/color.png --camera {table}/camera.json --photograph --out out",
         code=3,
         then_code=4,
-        right=lambda folder: found(folder) and None,
+        right=an_outline,
     ),
     Tried(OPTIONS, "nothing to plan from", PLANNING, f"{PLANNING} --detections {{golden}}/tableware_detections"),
     Tried(
