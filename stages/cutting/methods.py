@@ -48,7 +48,7 @@ class Learned:
         if method in self.choices:
             return cloning.ChoicePolicy(self.choices[method], goal, seed)
         raise UsageError(
-            f"the model has not learned {method}", hint=f"scenewright cutting learn --methods ours --methods {method}"
+            f"the model has not learned {method}", hint=f"learn it: scenewright cutting learn --methods {method}"
         )
 
     def policy_for(self, items: Sequence[Item], *, together: bool = False, doubt: float = DOUBT) -> Policy:

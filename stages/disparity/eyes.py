@@ -41,7 +41,7 @@ def stereo_cameras(reader: FrameReader, sequence: Sequence) -> dict[str, float]:
     if "right" not in reader.streams:
         raise BadInput(
             f"{sequence.root}: its frames have one eye ({', '.join(reader.streams)})",
-            hint="ingest the log with both eyes (--color-topic, --right-topic; left/ and right/ with a calibration)",
+            hint="ingest the log with --color-topic and --right-topic, or folders left/ and right/ with a calibration",
         )
     if "color" not in reader.streams:
         raise BadInput(f"{sequence.root}: its frames have a right eye and no left one", hint="ingest both eyes")
@@ -150,5 +150,5 @@ def _tell(
             f"fy {camera.fy:.0f} px)"
         )
         if parameters.rectification == "refuse":
-            raise BadInput(message, hint="calibrate the pair again, or --rectification correct")
+            raise BadInput(message, hint="calibrate the pair again, or give --rectification correct")
         logger.warning("%s", message)

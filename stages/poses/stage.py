@@ -17,7 +17,7 @@ from scenewright.stages.poses.drift import drift_of, loop_closures, path_length
 from scenewright.stages.poses.estimation import estimate
 from scenewright.stages.poses.frame_poses import FramePose, frame_poses
 from scenewright.stages.poses.parameters import PosesParameters
-from scenewright.stages.poses.world import choose_world
+from scenewright.stages.poses.world import choose_world, without_poses
 
 MOST_CONTRADICTED, FEWEST_LOOPS = 0.15, 10
 """A path is not to be trusted that denies more than this share of its loops, of so many at least. Of four good paths
@@ -45,8 +45,6 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
     colour where the method needs it, or with fewer than two frames of its main camera.
     """
     require_depth(sequence)
-    if not sequence.path("frames.mcap").is_file():
-        raise BadInput(f"{sequence.root}: frames.mcap is missing", hint="run `scenewright ingest` again")
     with FrameReader(sequence.path("frames.mcap")) as reader:
         camera_name, frames = main_camera(reader, sequence)
         check_streams(reader, sequence, parameters)
@@ -60,27 +58,28 @@ def main_camera(reader: FrameReader, sequence: Sequence) -> tuple[str, list[int]
     if len(reader) == 0:
         raise BadInput(f"{sequence.root}: it has no frames", hint="look at the drops in its sequence.json")
     name = sequence.info.cameras[0].name
-    if name not in reader.cameras:
-        raise BadInput(f"{sequence.root}: its main camera {name!r} has no frames", hint="ingest with --camera NAME")
     frames = [index for index in range(len(reader)) if reader.read(index, ()).camera_name == name]
     if len(frames) < 2:
-        raise BadInput(f"{sequence.root}: one frame has no path", hint="poses need two frames of one camera or more")
+        count = f"{len(frames)} frame{'s' * (len(frames) != 1)}"
+        raise BadInput(
+            f"{sequence.root}: its main camera {name!r} has {count}, a path needs two",
+            hint="ingest the whole log, or another camera of it: --camera NAME",
+        )
     return name, frames
 
 
 def check_streams(reader: FrameReader, sequence: Sequence, parameters: PosesParameters) -> None:
     """Raise BadInput when colour is needed and there is none."""
-    needs = METHODS[parameters.method].needs_color(parameters)
-    if needs and "color" not in reader.streams:
+    if METHODS[parameters.method].needs_color(parameters) and "color" not in reader.streams:
         raise BadInput(
-            f"{sequence.root}: {needs} needs colour and its frames have none", hint="use --method rgbd alone"
+            f"{sequence.root}: its frames have no colour", hint="use --method rgbd without --bundle-adjustment"
         )
 
 
 def check_world(reader: FrameReader, frames: list[int], sequence: Sequence, parameters: PosesParameters) -> None:
     """Raise BadInput, before any work, when the world of a sequence without poses is asked for."""
     if parameters.world == "sequence" and all(reader.read(k, ()).world_from_camera is None for k in frames):
-        raise BadInput(f"{sequence.root}: none of its frames has a pose in the sequence", hint="--world upright")
+        raise without_poses(f"{sequence.root}: none of its frames")
 
 
 def _dense(
@@ -120,13 +119,12 @@ class Method:
 
     estimate: Callable[[FrameReader, list[int], str, PosesParameters, Context], Result]
     """Of the given frames of the camera of this name."""
-    needs_color: Callable[[PosesParameters], str]
-    """The option that needs colour, empty when none does."""
+    needs_color: Callable[[PosesParameters], bool]
 
 
 METHODS = {
-    "rgbd": Method(_dense, lambda parameters: "--bundle-adjustment" if parameters.bundle_adjustment else ""),
-    "sfm": Method(_structure, lambda parameters: "--method sfm"),
+    "rgbd": Method(_dense, lambda parameters: parameters.bundle_adjustment),
+    "sfm": Method(_structure, lambda parameters: True),
 }
 
 

@@ -68,9 +68,10 @@ def run(
     if finder.is_strange:
         context.logger.warning(
             "its pictures are near nothing that the encoder has learned (%.2f, from %.2f on they count as known): "
-            "answers would be guesses; --least-probability 0 shows them, --encoder names other encoders",
+            "answers %s; a map that is made with another --encoder may tell more",
             finder.recognised,
             finder.calibration.least_recognised,
+            "are guesses" if likely else "would be guesses, which --least-probability 0 shows",
         )
         summary["strange"] = True
     if unread:

@@ -50,7 +50,7 @@ def posed_frames(
     if trajectory is None:
         frames, poses = reader.poses()
         posed = list(zip(frames.tolist(), poses, strict=True))
-        hint = "estimate poses: scenewright poses"
+        hint = "estimate them with scenewright poses, and give --trajectory"
     else:
         posed, hint = _of_trajectory(reader, trajectory), "the trajectory belongs to another sequence"
     if len(posed) < 2:

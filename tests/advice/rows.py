@@ -16,7 +16,8 @@ class Tried:
     """Advice that is followed. Commands are run in an empty folder; `{name}` is one of tests/advice/inputs.py.
 
     `path` and a part of its text (`says`) name the message in the source. `first` brings it up and ends with `code`;
-    `then` is `first` as the message advises and ends with `then_code`, without the message.
+    `then` is `first` as the message advises (after what else it advises, joined by ` && `) and ends with `then_code`,
+    without the message.
     """
 
     path: str
@@ -27,6 +28,8 @@ class Tried:
     then_code: int = 0
     given: Callable[[Path], None] = nothing
     """Writes the inputs into the folder."""
+    without: tuple[str, ...] = ()
+    """Modules that cannot be imported meanwhile."""
     right: Callable[[Path], None] = nothing
     """Raises AssertionError unless what `then` left in the folder is right."""
 

@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,8 @@ MODULES = [
     for found in pkgutil.iter_modules(tests.advice.table.__path__)
 ]
 ROWS: list[Tried | NotTried] = [row for module in MODULES for row in module.ROWS]
+VALUE = re.compile(r"\{\}|%[.0-9]*[dfgs]")
+"""What stands for a value in a message."""
 
 
 def meant(row: Tried | NotTried) -> list[Message]:
@@ -42,7 +45,7 @@ def test_every_row_is_about_a_message() -> None:
 
 def came_up(row: Tried, output: str) -> bool:
     """Tell whether one of a row's messages is in the output, any value for each `{}`."""
-    patterns = (".*?".join(map(re.escape, message.text.strip().split("{}"))) for message in meant(row))
+    patterns = (".*?".join(map(re.escape, VALUE.split(message.text.strip()))) for message in meant(row))
     return any(re.search(pattern, output, re.DOTALL) for pattern in patterns)
 
 
@@ -53,6 +56,8 @@ def test_advice_that_is_followed(
     row: Tried, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    for module in row.without:
+        monkeypatch.setitem(sys.modules, module, None)
     row.given(tmp_path)
     names = {name: make() for name, make in INPUTS.items() if f"{{{name}}}" in row.first + row.then}
 
@@ -63,6 +68,10 @@ def test_advice_that_is_followed(
 
     code, output = ends(row.first)
     assert code == row.code and came_up(row, output), output
-    code, output = ends(row.then)
+    *before, last = row.then.split(" && ")
+    for command in before:
+        code, output = ends(command)
+        assert code == 0, output
+    code, output = ends(last)
     assert code == row.then_code and not came_up(row, output), output
     row.right(tmp_path)

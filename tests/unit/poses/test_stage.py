@@ -135,10 +135,10 @@ def test_all_frames_blank(tmp_path: Path) -> None:
     ("count", "settings", "options", "words"),
     [
         (3, {"with_depth": False}, {}, "no depth"),
-        (1, {}, {}, "one frame has no path"),
+        (1, {}, {}, "has 1 frame, a path needs two"),
         (0, {}, {}, "no frames"),
-        (3, {"with_color": False}, {"method": "sfm"}, "needs colour"),
-        (3, {"with_color": False}, {"bundle_adjustment": True}, "needs colour"),
+        (3, {"with_color": False}, {"method": "sfm"}, "have no colour"),
+        (3, {"with_color": False}, {"bundle_adjustment": True}, "have no colour"),
         (3, {}, {"world": "sequence"}, "has a pose in the sequence"),
     ],
 )
