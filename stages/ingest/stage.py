@@ -21,7 +21,7 @@ from scenewright.stages.kit.formats.foxglove import millimetres_to_depth, nanose
 from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.kit.formats.trajectories import write_tum
 from scenewright.stages.kit.geometry.surface_samples import surface_samples
-from scenewright.stages.kit.geometry.upright_world import make_upright
+from scenewright.stages.kit.geometry.upright_world import REASON, make_upright
 from scenewright.stages.kit.stage import Context
 
 GRAVITY_FRAMES = 60
@@ -220,7 +220,7 @@ def _finish(
     parameters: IngestParameters,
     context: Context,
 ) -> Sequence:
-    notes = [*source.notes, *_pose_notes(parameters), *_warnings(source, written)]
+    notes = [*source.notes, *_pose_notes(parameters), *_gravity_notes(gravity), *_warnings(source, written)]
     for note in notes:
         (context.logger.warning if note.startswith("WARNING") else context.logger.info)("%s", note)
     write_tum(
@@ -278,6 +278,14 @@ def _pose_notes(parameters: IngestParameters) -> list[str]:
     if parameters.pose_scale != 1:
         notes.append(f"positions of the log multiplied by {parameters.pose_scale:g}, by option")
     return notes
+
+
+def _gravity_notes(gravity: Gravity) -> list[str]:
+    """Why up may be wrong."""
+    reason = REASON.search(gravity.detail)
+    if reason is None or reason[1] != "doubtful":
+        return []
+    return [f"WARNING: up may be wrong: {reason[2]} (--gravity given --up AXIS)"]
 
 
 def brightness_of(picture: np.ndarray | bytes) -> float:
