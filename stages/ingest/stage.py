@@ -13,6 +13,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
 from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.images import depth_roughness
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
 from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
@@ -30,8 +31,10 @@ PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
 """Median depth [m] outside of which the depth unit is doubted; by eye."""
 LARGE_STEP = 1.0
 """Step of the camera between two frames [m] that is reported; by eye."""
+ROUGH = 0.05
+"""Roughness of what is no depth; five times that of the roughest sensor."""
 LIT_EVERY, DARK = 10, 8.0
-"""Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
+"""Every so many frames' images are looked at; pictures with a lower mean of 255 show nothing."""
 StreamName = Literal["color", "depth", "right", "labels", "pose"]
 
 
@@ -67,6 +70,8 @@ class _Written:
     pose_cameras: list[str] = field(default_factory=list)
     """Camera of each frame that has a pose."""
     median_depths: list[float] = field(default_factory=list)
+    roughness: list[float] = field(default_factory=list)
+    """Of every tenth depth image (`depth_roughness`)."""
     brightness: list[float] = field(default_factory=list)
     """Mean of every tenth picture, 0 to 255."""
     streams: set[StreamName] = field(default_factory=set)
@@ -185,6 +190,8 @@ def _write_frames(
 def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
     if loaded.color is not None and len(written.times) % LIT_EVERY == 0:
         written.brightness.append(brightness_of(loaded.color))
+    if loaded.depth is not None and len(written.times) % LIT_EVERY == 0:
+        written.roughness.append(depth_roughness(loaded.depth))
     written.times.append(time)
     written.cameras.append(camera_name)
     streams: dict[StreamName, object] = {
@@ -304,6 +311,11 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
         notes.append(
             f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? "
             "`scenewright inspect` tells"
+        )
+    if written.roughness and (rough := float(np.median(written.roughness))) > ROUGH:
+        notes.append(
+            f"WARNING: neighbouring pixels of depth differ by {100 * rough:.0f} %, as in no depth image: is it stored "
+            "otherwise (--depth-bits)? `scenewright inspect` tells"
         )
     if written.brightness and (lit := float(np.median(written.brightness))) < DARK:
         notes.append(

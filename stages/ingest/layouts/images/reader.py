@@ -19,8 +19,8 @@ from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     file_bytes,
     raw_depth,
     refuse_exr,
@@ -29,7 +29,7 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
 from scenewright.stages.ingest.folders.stamped_poses import LATEST_STAMP, StampedPoses
-from scenewright.stages.ingest.images import depth_millimetres, usable_color
+from scenewright.stages.ingest.images import DepthForm, depth_millimetres, usable_color
 from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
 from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
 from scenewright.stages.ingest.lenses import Lens, lens_of
@@ -81,7 +81,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     calibration = _calibration(root, images, parameters)
     size = _size(images, video, has_depth)
     eyes = _eyes(calibration, size, any(images.rights), root)
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0)
     if images.depth_is_disparity:
         unit_note = "depth computed from the disparity: Z = fx * baseline / (disparity + doffs)"
     times, time_note = _times(root, names, video, parameters)
@@ -92,7 +92,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         load = (
             _video_loader(video, index, eyes)
             if video is not None
-            else _loader(images, index, eyes, has_depth, units, calibration.disparity_offset)
+            else _loader(images, index, eyes, has_depth, form, calibration.disparity_offset)
         )
         entries.append(Entry(name, times[index] * 1e-9, pose, load, problem))
     notes = (
@@ -204,7 +204,7 @@ def _with_size(record: CalibrationRecord, width: int, height: int) -> Calibratio
 
 
 def _loader(
-    images: FolderImages, index: int, eyes: _Eyes, has_depth: bool, units: float, disparity_offset: float | None
+    images: FolderImages, index: int, eyes: _Eyes, has_depth: bool, form: DepthForm, disparity_offset: float | None
 ) -> Callable[[], LoadedFrame]:
     color, depth, right = images.colors[index], images.depths[index], images.rights[index]
 
@@ -223,9 +223,9 @@ def _loader(
             raise Unusable("missing_depth")
         raw = eyes.left.pixels(raw_depth(depth), "depth")
         if not images.depth_is_disparity:
-            return depth_millimetres(raw, eyes.left.camera, units)
+            return depth_millimetres(raw, eyes.left.camera, form)
         metres = depth_of_disparity(raw, eyes.left.camera, eyes.baseline or 0.0, disparity_offset or 0.0)
-        return depth_millimetres(metres, eyes.left.camera, 1.0)
+        return depth_millimetres(metres, eyes.left.camera, DepthForm(1.0))
 
     return load
 
