@@ -59,6 +59,12 @@ class IngestParameters(Parameters):
         "measured, else the mean camera up; given takes the axis named by up",
     )
     up: Literal["x", "-x", "y", "-y", "z", "-z"] = Field("z", description="Up axis of the log's world, with given")
+    baseline: float | None = Field(
+        None,
+        gt=0,
+        le=10,
+        description="Distance of the right eye along +x [m], whatever a calibration says of its sign and unit",
+    )
     camera: tuple[str, ...] = Field(
         (), description="Camera of the log to use, by name, for logs with several; 'all' takes every one"
     )
