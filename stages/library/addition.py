@@ -13,19 +13,12 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.cad_models import model_folder
 from scenewright.stages.kit.formats.model_writer import write_model_folder
+from scenewright.stages.kit.geometry.file_axes import AXES, UNITS, Direction, axis_name, upright_rotation
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.library.importing.assembly import Assembled, assembled
 from scenewright.stages.library.importing.classes import class_of, usual_size
 from scenewright.stages.library.importing.discovery import Unread, find_models
-from scenewright.stages.library.importing.frames import (
-    AXES,
-    UNITS,
-    Choice,
-    axis_name,
-    choose,
-    model_rotation,
-    upright_rotation,
-)
+from scenewright.stages.library.importing.frames import Choice, choose, model_rotation
 from scenewright.stages.library.importing.fronts import told_front
 from scenewright.stages.library.importing.grouping import grouped, source_points
 from scenewright.stages.library.importing.limits import few_findings, plain_text, told_refusals
@@ -33,7 +26,7 @@ from scenewright.stages.library.importing.mapping import SKIP, Entry, Mapping, r
 from scenewright.stages.library.importing.placing import centered, placed_parts, plain_name, turned
 from scenewright.stages.library.importing.report import table_lines
 from scenewright.stages.library.importing.source_folder import SourceFolder
-from scenewright.stages.library.importing.source_model import Declared, Direction, SourceModel
+from scenewright.stages.library.importing.source_model import Declared, SourceModel
 from scenewright.stages.library.importing.versions import uses_coacd
 from scenewright.stages.library.parameters import AdditionParameters
 
