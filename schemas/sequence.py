@@ -12,11 +12,12 @@ from scenewright.schemas.scene_parts import Camera
 class Gravity(Model):
     """How the world frame was made upright."""
 
-    method: Literal["given", "floor_plane", "mean_camera_up", "imu", "none"]
+    method: Literal["given", "floor_plane", "level_plane", "mean_camera_up", "imu", "none"]
+    """`level_plane`: a table or the like says which way is up, the floor below it was not seen."""
     world_from_log: Transform
     """What ingest applied to the log's world frame."""
     inlier_count: int = 0
-    """Points that support the floor plane, when `floor_plane`."""
+    """Points that support the plane, when `floor_plane` or `level_plane`."""
     detail: str = ""
 
 

@@ -50,12 +50,12 @@ def stereo_cameras(reader: FrameReader, sequence: Sequence) -> dict[str, float]:
         if not math.isfinite(baseline) or abs(baseline) < SMALLEST_BASELINE:
             raise BadInput(
                 f"{sequence.root}: the eyes of {name!r} have no baseline ({baseline:g} m)",
-                hint="correct P[3] of the right calibration (minus fx times the baseline)",
+                hint="ingest the log again with --baseline METRES",
             )
         if baseline < 0:
             raise BadInput(
                 f"{sequence.root}: left and right of {name!r} are swapped: the baseline is {baseline:g} m",
-                hint="ingest with --color-topic and --right-topic exchanged",
+                hint="ingest the log again, which looks at its pictures",
             )
     return baselines
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.eye_order import settled_eyes
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.registry import LogLayout, all_layouts
 from scenewright.stages.ingest.source import LogSource
@@ -28,7 +29,8 @@ def log_format(layout: LogLayout) -> LogFormat:
 
 
 def open_log(path: Path, parameters: IngestParameters) -> LogSource:
-    """Recognise a log and list its frames. Raises BadInput when it is missing, of no known format, or damaged."""
+    """Recognise a log and list its frames. Raises BadInput when it is missing, of no known format, or damaged,
+    and for a stereo pair whose pictures are exchanged."""
     if not path.exists():
         raise BadInput(f"{path}: there is no such log", hint="check the path")
     layouts = [layout for layout in all_layouts() if parameters.format in ("auto", layout.name)]
@@ -36,7 +38,12 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
         reader = log_format(layout)
         rule = reader.matches(path)
         if rule is not None:
-            return reader.open_source(path, parameters, rule)
+            source = reader.open_source(path, parameters, rule)
+            try:
+                return settled_eyes(source, str(path))
+            except BaseException:
+                source.close()
+                raise
     names = ", ".join(layout.name for layout in layouts)
     kind = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
     raise BadInput(

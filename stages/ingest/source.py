@@ -47,9 +47,12 @@ class SourceCamera:
     """`camera` where a log has one; else unique in the log, of letters, digits and underscores."""
     camera: Camera
     baseline: float | None = None
-    """Distance of the right eye along +x [m], when frames have a right image."""
+    """Distance of the right eye along +x [m], when frames have a right image; negative where a calibration says that
+    it is the left one, until `settled_eyes` has looked at the pictures."""
     registered: bool = True
     """Whether depth pixels and colour pixels see the same ray, as far as the log says."""
+    eyes: tuple[str, str] = ("left", "right")
+    """What the two eyes are called in the log: topics, or folders."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
 from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.images import depth_roughness
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
 from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
@@ -21,7 +22,7 @@ from scenewright.stages.kit.formats.foxglove import millimetres_to_depth, nanose
 from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.kit.formats.trajectories import write_tum
 from scenewright.stages.kit.geometry.surface_samples import surface_samples
-from scenewright.stages.kit.geometry.upright_world import make_upright
+from scenewright.stages.kit.geometry.upright_world import REASON, make_upright
 from scenewright.stages.kit.stage import Context
 
 GRAVITY_FRAMES = 60
@@ -30,8 +31,10 @@ PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
 """Median depth [m] outside of which the depth unit is doubted; by eye."""
 LARGE_STEP = 1.0
 """Step of the camera between two frames [m] that is reported; by eye."""
+ROUGH = 0.05
+"""Roughness of what is no depth; five times that of the roughest sensor."""
 LIT_EVERY, DARK = 10, 8.0
-"""Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
+"""Every so many frames' images are looked at; pictures with a lower mean of 255 show nothing."""
 StreamName = Literal["color", "depth", "right", "labels", "pose"]
 
 
@@ -67,6 +70,8 @@ class _Written:
     pose_cameras: list[str] = field(default_factory=list)
     """Camera of each frame that has a pose."""
     median_depths: list[float] = field(default_factory=list)
+    roughness: list[float] = field(default_factory=list)
+    """Of every tenth depth image (`depth_roughness`)."""
     brightness: list[float] = field(default_factory=list)
     """Mean of every tenth picture, 0 to 255."""
     streams: set[StreamName] = field(default_factory=set)
@@ -185,6 +190,8 @@ def _write_frames(
 def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
     if loaded.color is not None and len(written.times) % LIT_EVERY == 0:
         written.brightness.append(brightness_of(loaded.color))
+    if loaded.depth is not None and len(written.times) % LIT_EVERY == 0:
+        written.roughness.append(depth_roughness(loaded.depth))
     written.times.append(time)
     written.cameras.append(camera_name)
     streams: dict[StreamName, object] = {
@@ -220,7 +227,7 @@ def _finish(
     parameters: IngestParameters,
     context: Context,
 ) -> Sequence:
-    notes = [*source.notes, *_pose_notes(parameters), *_warnings(source, written)]
+    notes = [*source.notes, *_pose_notes(parameters), *_gravity_notes(gravity), *_warnings(source, written)]
     for note in notes:
         (context.logger.warning if note.startswith("WARNING") else context.logger.info)("%s", note)
     write_tum(
@@ -280,6 +287,14 @@ def _pose_notes(parameters: IngestParameters) -> list[str]:
     return notes
 
 
+def _gravity_notes(gravity: Gravity) -> list[str]:
+    """Why up may be wrong."""
+    reason = REASON.search(gravity.detail)
+    if reason is None or reason[1] != "doubtful":
+        return []
+    return [f"WARNING: up may be wrong: {reason[2]} (--gravity given --up AXIS)"]
+
+
 def brightness_of(picture: np.ndarray | bytes) -> float:
     """Return the mean of a picture (H, W, 3) uint8, or of a JPEG's or PNG's bytes, 0 to 255."""
     if isinstance(picture, bytes):
@@ -296,6 +311,11 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
         notes.append(
             f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? "
             "`scenewright inspect` tells"
+        )
+    if written.roughness and (rough := float(np.median(written.roughness))) > ROUGH:
+        notes.append(
+            f"WARNING: neighbouring pixels of depth differ by {100 * rough:.0f} %, as in no depth image: is it stored "
+            "otherwise (--depth-bits)? `scenewright inspect` tells"
         )
     if written.brightness and (lit := float(np.median(written.brightness))) < DARK:
         notes.append(

@@ -14,19 +14,12 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.cad_models import model_folder
 from scenewright.stages.kit.formats.model_writer import write_model_folder
+from scenewright.stages.kit.geometry.file_axes import AXES, UNITS, Direction, axis_name, upright_rotation
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.library.importing.assembly import Assembled, assembled
 from scenewright.stages.library.importing.classes import class_of, usual_size
 from scenewright.stages.library.importing.discovery import Unread, find_models
-from scenewright.stages.library.importing.frames import (
-    AXES,
-    UNITS,
-    Choice,
-    axis_name,
-    choose,
-    model_rotation,
-    upright_rotation,
-)
+from scenewright.stages.library.importing.frames import Choice, choose, model_rotation
 from scenewright.stages.library.importing.fronts import BACKED, front_of_back_rest, told_front
 from scenewright.stages.library.importing.grouping import Group, grouped, source_corners, source_points
 from scenewright.stages.library.importing.limits import few_findings, plain_text, told_refusals
@@ -35,7 +28,7 @@ from scenewright.stages.library.importing.mesh_units import apart, far_hinge, in
 from scenewright.stages.library.importing.placing import centered, placed_parts, plain_name, turned
 from scenewright.stages.library.importing.report import table_lines
 from scenewright.stages.library.importing.source_folder import SourceFolder
-from scenewright.stages.library.importing.source_model import Declared, Direction, SourceModel
+from scenewright.stages.library.importing.source_model import Declared, SourceModel
 from scenewright.stages.library.importing.versions import uses_coacd
 from scenewright.stages.library.parameters import AdditionParameters
 

@@ -32,9 +32,6 @@ PAIR_NAMES = (("left.yaml", "right.yaml"), ("left.yml", "right.yml"), ("cam0/sen
 """One file for each eye."""
 LARGEST_FILE = 256_000
 """Bytes of a calibration file: its parser is slow, and it holds some dozens of numbers."""
-LARGEST_BASELINE = 1.0
-"""Largest distance of two eyes [m]. OpenCV's stereo files have the unit of whoever calibrated; eyes further apart than
-this are taken to be stated in millimetres, and a note says so."""
 OPENCV_TAG = re.compile(r"!!opencv-matrix\b")
 KITTI = re.compile(r"^P([0-3]):((?:\s+\S+){12})\s*$", re.MULTILINE)
 MIDDLEBURY_KEYS = ("cam0", "cam1", "doffs", "baseline")
@@ -184,13 +181,8 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
     rotation, offset = _matrix(document.get("R"), 3, 3), _numbers(document.get("T"))
     if rotation is None or offset is None or len(offset) != 3 or not is_rigid(transform_from(rotation, np.zeros(3))):
         raise BadInput(f"{path}: R and T do not say how the two cameras stand to each other")
-    translation = np.array(offset)
-    notes: tuple[str, ...] = ()
-    if np.linalg.norm(translation) > LARGEST_BASELINE:
-        notes = (f"WARNING: baseline of {np.linalg.norm(translation):.4g} in {path.name} taken as millimetres",)
-        translation = translation / 1000
-    left_from_right = inverse(transform_from(rotation, translation))
-    return FolderCalibration(records[0], records[1], left_from_right, notes=notes)
+    left_from_right = inverse(transform_from(rotation, np.array(offset)))
+    return FolderCalibration(records[0], records[1], left_from_right)
 
 
 def _kalibr(document: dict[Any, Any], path: Path) -> FolderCalibration:

@@ -14,7 +14,7 @@ from scenewright.schemas.outside import file_content, json_of
 from scenewright.schemas.places import resolved
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
-from scenewright.stages.ingest.images import decode_image, usable_color, usable_depth
+from scenewright.stages.ingest.images import DepthForm, decode_image, usable_color, usable_depth
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import LoadedFrame, Role, StreamInfo, Unusable
 from scenewright.stages.kit.formats.foxglove import decode_color
@@ -121,7 +121,7 @@ def file_bytes(path: Path, stream: str) -> bytes:
 
 
 def image_loader(
-    color: Path | None, depth: Path | None, camera: Camera, units_per_metre: float, *, has_color: bool = True
+    color: Path | None, depth: Path | None, camera: Camera, form: DepthForm, *, has_color: bool = True
 ) -> Callable[[], LoadedFrame]:
     """Return a function that reads and checks both images of a frame; `has_color`: whether the log has colour at all,
     without which a frame of it is unusable then."""
@@ -133,7 +133,7 @@ def image_loader(
             raise Unusable("missing_depth")
         return LoadedFrame(
             color=None if color is None else usable_color(file_bytes(color, "color"), camera),
-            depth=usable_depth(file_bytes(depth, "depth"), camera, units_per_metre),
+            depth=usable_depth(file_bytes(depth, "depth"), camera, form),
         )
 
     return load
@@ -256,11 +256,12 @@ def camera_from_options(size: tuple[int, int] | None, parameters: IngestParamete
     return Camera(width=width, height=height, **{name: getattr(parameters, name) for name in names})
 
 
-def depth_units(parameters: IngestParameters, default: float) -> tuple[float, str]:
-    """Return depth units per metre and a note that says where the number comes from."""
+def depth_form(parameters: IngestParameters, default: float) -> tuple[DepthForm, str]:
+    """Return how depth is stored, by `default` units per metre, and a note that says where the unit comes from."""
     if parameters.depth_scale is not None:
-        return parameters.depth_scale, f"depth unit given by option: 1/{parameters.depth_scale:g} m"
-    return default, f"depth unit assumed: 1/{default:g} m"
+        unit = f"depth unit given by option: 1/{parameters.depth_scale:g} m"
+        return DepthForm(parameters.depth_scale, parameters.depth_bits), unit
+    return DepthForm(default, parameters.depth_bits), f"depth unit assumed: 1/{default:g} m"
 
 
 def chosen_cameras(counts: dict[str, int], parameters: IngestParameters, where: str) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import file_bytes, raw_depth
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, undistorted
-from scenewright.stages.ingest.images import depth_millimetres, fitted_color, usable_color
+from scenewright.stages.ingest.images import DepthForm, depth_millimetres, fitted_color, usable_color
 from scenewright.stages.ingest.source import LoadedFrame, Unusable
 from scenewright.stages.kit.formats.foxglove import decode_color
 
@@ -34,7 +34,7 @@ class FrameFormat:
     has_color: bool
     """Whether the log has colour at all: then a frame without it is unusable."""
     has_depth: bool
-    units_per_metre: float = 1000.0
+    depth: DepthForm = DepthForm()
 
 
 def frame_loader(files: FrameFiles, form: FrameFormat) -> Callable[[], LoadedFrame]:
@@ -49,7 +49,7 @@ def frame_loader(files: FrameFiles, form: FrameFormat) -> Callable[[], LoadedFra
             raw = raw_depth(files.depth)
             if raw.shape == (form.camera.height, form.camera.width):
                 raw = undistorted(raw, form.recorded, form.camera, smooth=False)
-            depth = depth_millimetres(raw, form.camera, form.units_per_metre)
+            depth = depth_millimetres(raw, form.camera, form.depth)
         return LoadedFrame(color, depth)
 
     return load

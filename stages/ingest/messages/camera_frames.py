@@ -9,7 +9,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.association import fresh, partners
 from scenewright.stages.ingest.depth_registration import registered_depth
-from scenewright.stages.ingest.images import depth_millimetres, fitted_color
+from scenewright.stages.ingest.images import DepthForm, depth_millimetres, fitted_color
 from scenewright.stages.ingest.lenses import Lens
 from scenewright.stages.ingest.messages.camera_geometry import CameraGeometry
 from scenewright.stages.ingest.messages.cameras import CameraTopics
@@ -132,7 +132,7 @@ def _loader(
         if geometry.right is not None and "right" in places:
             right = picture(_fetch_image(log, places["right"], "right"), geometry.right, geometry.camera)
         if geometry.depth is not None and "depth" in places:
-            depth = _depth(_fetch_image(log, places["depth"], "depth"), geometry, parameters.depth_scale)
+            depth = _depth(_fetch_image(log, places["depth"], "depth"), geometry, parameters)
         if "labels" in places:
             labels = _labels(_fetch_image(log, places["labels"], "labels"), geometry)
         return LoadedFrame(color, depth, labels, right)
@@ -154,11 +154,12 @@ def picture(record: ImageRecord, lens: Lens, camera: Camera) -> np.ndarray | byt
     return fitted_color(lens.picture(pixels_or_picture), camera)
 
 
-def _depth(record: ImageRecord, geometry: CameraGeometry, scale: float | None) -> np.ndarray:
+def _depth(record: ImageRecord, geometry: CameraGeometry, parameters: IngestParameters) -> np.ndarray:
     assert geometry.depth is not None
     lens = geometry.depth
     recorded = lens.camera.model_copy(update={"width": lens.size[0], "height": lens.size[1]})
-    millimetres = depth_millimetres(depth_pixels(record), recorded, scale or depth_unit(record))
+    form = DepthForm(parameters.depth_scale or depth_unit(record), parameters.depth_bits)
+    millimetres = depth_millimetres(depth_pixels(record), recorded, form)
     millimetres = lens.pixels(millimetres, "depth")
     if geometry.target_from_depth is not None:
         millimetres = registered_depth(millimetres, lens.camera, geometry.camera, geometry.target_from_depth)

@@ -231,10 +231,11 @@ def _with_right(topics: CameraTopics, content: LogContent, parameters: IngestPar
         None if frames[0] == frames[1] else fixed_transform(frames[0], frames[1], content),
         names,
         where,
+        parameters.baseline,
     )
     turn = np.eye(3) if left.camera_from_frame is None else left.camera_from_frame
     frame_from_camera = transform_from(turn.T, np.zeros(3))
-    notes = (*left.notes, *right.notes, f"stereo pair {names[0]} and {names[1]}, {baseline:.4g} m apart")
+    notes = (*left.notes, *right.notes, f"stereo pair {names[0]} and {names[1]}, {abs(baseline):.4g} m apart")
     geometry = CameraGeometry(
         left.camera, frames[0], frame_from_camera, left, None, right, baseline, notes=tuple(dict.fromkeys(notes))
     )

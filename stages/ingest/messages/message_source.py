@@ -113,7 +113,9 @@ class _Built:
     def camera(self, registered: bool) -> SourceCamera:
         """Return the camera; `registered` is what the log says itself."""
         geometry = self._geometry
-        return SourceCamera(self.topics.name, geometry.camera, geometry.baseline, geometry.registered and registered)
+        eyes = (self.topics.color or "left", self.topics.right or "right")
+        registered = geometry.registered and registered
+        return SourceCamera(self.topics.name, geometry.camera, geometry.baseline, eyes=eyes, registered=registered)
 
     def notes(self, named: bool) -> list[str]:
         """Return what was assumed, with the camera's name in front when there are several."""

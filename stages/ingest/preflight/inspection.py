@@ -14,6 +14,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.detection import log_format, open_log
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
+from scenewright.stages.ingest.preflight.bits import bits_finding
 from scenewright.stages.ingest.preflight.calibration import calibration_findings, calibration_report
 from scenewright.stages.ingest.preflight.choice import Choice, choose
 from scenewright.stages.ingest.preflight.depth import depth_findings, depth_report, units_per_metre
@@ -21,8 +22,15 @@ from scenewright.stages.ingest.preflight.epipolar import FeaturePairs
 from scenewright.stages.ingest.preflight.looking import Look, look_at_entry
 from scenewright.stages.ingest.preflight.motion import motion_findings, motion_report
 from scenewright.stages.ingest.preflight.pictures import picture_findings, picture_report
-from scenewright.stages.ingest.preflight.pose_findings import depth_is_blamed, pose_findings, rigidity_words
-from scenewright.stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES, LEAST_PAIRS, PoseOutcome, check_poses
+from scenewright.stages.ingest.preflight.pose_findings import pose_findings, rigidity_words
+from scenewright.stages.ingest.preflight.poses import (
+    BY_DEPTH,
+    BY_FEATURES,
+    LEAST_PAIRS,
+    Candidate,
+    PoseOutcome,
+    check_poses,
+)
 from scenewright.stages.ingest.preflight.registration import check_registration, registration_findings
 from scenewright.stages.ingest.preflight.report import (
     CameraReport,
@@ -42,6 +50,7 @@ from scenewright.stages.ingest.preflight.settings import ingest_parameters
 from scenewright.stages.ingest.preflight.steps import step_reports
 from scenewright.stages.ingest.preflight.stereo import stereo_findings, stereo_report, with_stereo_depth
 from scenewright.stages.ingest.preflight.streams import all_streams, clock_lines, stream_findings, stream_reports
+from scenewright.stages.ingest.preflight.units import Reading, readings, room_extent
 from scenewright.stages.ingest.preflight.upright import gravity_findings, gravity_report
 from scenewright.stages.ingest.registry import all_layouts
 from scenewright.stages.ingest.selection import NOT_SELECTED, select
@@ -159,8 +168,12 @@ def inspect_source(
             judged, outcome, camera_findings = _judge_camera(
                 source_camera, by_camera[source_camera.name], material, source, parameters
             )
+            misread = bits_finding(path, parameters, source_camera, material.looks)
         materials.append(replace(material, outcome=outcome))
         reports.append(judged)
+        if misread is not None:  # what else depth seems to be wrong by follows from it
+            blamed = ("depth", "poses", "registration")
+            camera_findings = [misread, *(finding for finding in camera_findings if finding.check not in blamed)]
         findings += camera_findings
     frames = _frames_report(source, selected, drops, materials, unusable)
     streams = stream_reports(source)
@@ -239,13 +252,15 @@ def _judge_camera(
     stereo = stereo_report(looks, source_camera.baseline)
     outcome = _pose_outcome(source_camera, material, depth is not None)
     calibration = calibration_report(source_camera.camera)
-    best = outcome.report.best
+    best, ways = outcome.report.best, []
     if best is not None and outcome.report.decisive:
         if best.focal_factor != 1:
             calibration = calibration.model_copy(update={"focal_fit": significant(best.focal_factor, 3)})
         only_scale = best.convention == "as-is" and best.translation_scale != 1
-        if depth is not None and only_scale and depth_is_blamed(best.translation_scale, depth.median):
-            depth = depth.model_copy(update={"factor": exact(1 / best.translation_scale), "factor_by": "poses"})
+        if depth is not None and outcome.best is not None and best.translation_scale != 1:
+            ways = _readings(outcome.best, material, units, depth.median)
+            if only_scale and "depth_scale" in ways[0].changes:
+                depth = depth.model_copy(update={"factor": exact(units / ways[0].depth_scale), "factor_by": "poses"})
     registration = check_registration(looks, choice.runs, source_camera.registered)
     pictures = picture_report(looks, choice.runs)
     motion = motion_report(poses, material.times, looks, choice.runs) if poses is not None else None
@@ -257,12 +272,12 @@ def _judge_camera(
     if poses is not None:
         findings += pose_findings(
             outcome.report,
-            depth,
+            ways,
             source_camera.camera,
             interval,
             name,
-            untouched=_are_poses_untouched(parameters),
-            units=units,
+            convention=parameters.pose_convention,
+            pose_scale=parameters.pose_scale,
         )
     if motion is not None:
         findings += motion_findings(motion, outcome.report.verdict == "agree", name)
@@ -314,9 +329,12 @@ def _pose_outcome(source_camera: SourceCamera, material: CameraMaterial, has_dep
     return replace(outcome, report=outcome.report.model_copy(update=changes))
 
 
-def _are_poses_untouched(parameters: IngestParameters) -> bool:
-    """Whether poses are taken as the log has them."""
-    return parameters.pose_convention == "as-is" and parameters.pose_scale == 1
+def _readings(best: Candidate, material: CameraMaterial, units: float, median_depth: float) -> list[Reading]:
+    """Return how depth, read with `units` a metre, and translations may agree as a hypothesis says."""
+    assert material.poses is not None
+    poses = best.poses(material.poses)
+    room = room_extent([(look, poses[index]) for index, look in material.looks.items()])
+    return readings(best.scale, units, median_depth, room)
 
 
 def _gravity(

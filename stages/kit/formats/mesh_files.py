@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import trimesh
@@ -87,6 +87,37 @@ def mesh_of_bytes(
     mesh = mesh or trimesh.Trimesh(process=False)
     _check_mesh(mesh, path, may_be_empty=may_be_empty, hint=hint)
     return mesh if len(mesh.faces) else trimesh.Trimesh(mesh.vertices, np.zeros((0, 3), np.int64), process=False)
+
+
+class Cloud(NamedTuple):
+    """points (N, 3) float, colors (N, 3) uint8, grey where the file has none, and whether points have a label."""
+
+    points: np.ndarray
+    colors: np.ndarray
+    labelled: bool
+
+
+def read_cloud(path: Path, *, hint: str) -> Cloud | None:
+    """Return the points of a PLY file without faces, None for one with faces. Raises BadInput as `read_mesh` does."""
+    data = file_content(Path(path), LARGEST_FILE, hint=hint)
+    header = data[:LARGEST_HEADER].partition(b"end_header")[0]
+    try:
+        if _check_ply(data) or re.search(rb"^[ \t]*element[ \t]+face[ \t]+0*[1-9]", header, re.MULTILINE):
+            return None
+        loaded = trimesh.load(io.BytesIO(data), file_type="ply", process=False)
+    except BadInput as error:
+        raise BadInput(f"{path}: {error.message}", hint=hint) from None
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BadInput(f"{path}: cannot be read as points: {reason:.120}", hint=hint) from None
+    points = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=float)
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points) or not np.isfinite(points).all():
+        raise BadInput(f"{path}: holds no points, or some that are not finite", hint=hint)
+    colors = np.asarray(getattr(loaded, "colors", ()))
+    if colors.ndim != 2 or len(colors) != len(points) or colors.shape[1] < 3:
+        colors = np.full(points.shape, 160, np.uint8)
+    labelled = re.search(rb"^[ \t]*property[ \t]+\S+[ \t]+label\s*$", header, re.MULTILINE) is not None
+    return Cloud(points, colors[:, :3].astype(np.uint8), labelled)
 
 
 def meshes_of_glb(

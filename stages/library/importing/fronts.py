@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.stages.kit.geometry.file_axes import Direction
 from scenewright.stages.library.importing.placing import Part
-from scenewright.stages.library.importing.source_model import Direction
 
 FRONT_SHARE = 0.35
 """How far out of the middle, of the half extent, moving parts or a back rest lie to tell the front."""

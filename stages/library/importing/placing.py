@@ -14,13 +14,14 @@ import numpy as np
 from scenewright.schemas.base import as_vector
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.file_axes import Direction
 from scenewright.stages.kit.geometry.solids import Solid
 from scenewright.stages.kit.geometry.transforms import apply, transform_from
 from scenewright.stages.library.importing.frames import model_rotation
 from scenewright.stages.library.importing.grouping import Group
 from scenewright.stages.library.importing.handles import with_handle
 from scenewright.stages.library.importing.pieces import convex_pieces
-from scenewright.stages.library.importing.source_model import Direction, SourceModel, Surface
+from scenewright.stages.library.importing.source_model import SourceModel, Surface
 from scenewright.stages.library.modelling import BODY
 from scipy.spatial.transform import Rotation
 

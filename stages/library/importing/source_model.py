@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.kit.geometry.file_axes import Direction
 from scenewright.stages.kit.geometry.solids import Solid
 from scenewright.stages.kit.geometry.transforms import apply
 
-Direction = tuple[float, float, float]
 JointKind = Literal["fixed", "floating", "revolute", "continuous", "prismatic"]
 
 

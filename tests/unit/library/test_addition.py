@@ -22,6 +22,7 @@ from scenewright.stages.kit.formats.cad_models import (
     read_model,
 )
 from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.geometry.file_axes import AXES
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
@@ -29,7 +30,7 @@ from scenewright.stages.library.addition import run
 from scenewright.stages.library.importing.classes import class_of
 from scenewright.stages.library.importing.collada_file import parse_collada
 from scenewright.stages.library.importing.discovery import Unread, find_models
-from scenewright.stages.library.importing.frames import AXES, model_rotation
+from scenewright.stages.library.importing.frames import model_rotation
 from scenewright.stages.library.importing.pieces import convex_pieces
 from scenewright.stages.library.importing.placing import normal_limits
 from scenewright.stages.library.importing.source_folder import SourceFolder

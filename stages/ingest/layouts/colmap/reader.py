@@ -17,8 +17,8 @@ from scenewright.stages.ingest.folders.files import (
     DEPTH_SUFFIXES,
     chosen_cameras,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     named_file,
     natural_key,
@@ -79,7 +79,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unregistered = _unregistered_images(image_folder, colors)
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(root))
-    units, unit_note = depth_units(parameters, 1.0 if depth_words == DENSE_MAPS else 1000.0)
+    stored, unit_note = depth_form(parameters, 1.0 if depth_words == DENSE_MAPS else 1000.0)
     group_of = {index: group for group in groups for index in group.members}
     entries = []
     ordered: list[tuple[str, int | None]] = [(image.name, index) for index, image in enumerate(images)]
@@ -89,7 +89,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if index is None:
             entries.append(Entry(name, time, None, _never, "missing_pose", chosen[0]))
         elif group_of[index].name in chosen:
-            form = FrameFormat(recorded[index], group_of[index].camera, has_color, has_depth, units)
+            form = FrameFormat(recorded[index], group_of[index].camera, has_color, has_depth, stored)
             load = frame_loader(FrameFiles(colors[index], depths[index]), form)
             pose = images[index].world_from_camera
             problem = "non_rigid_pose" if pose is None else None

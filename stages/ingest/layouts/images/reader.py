@@ -19,8 +19,8 @@ from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     file_bytes,
     raw_depth,
     refuse_exr,
@@ -29,14 +29,14 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
 from scenewright.stages.ingest.folders.stamped_poses import LATEST_STAMP, StampedPoses
-from scenewright.stages.ingest.images import depth_millimetres, usable_color
+from scenewright.stages.ingest.images import DepthForm, depth_millimetres, usable_color
 from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
 from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
 from scenewright.stages.ingest.lenses import Lens, lens_of
 from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, StreamInfo, Unusable
-from scenewright.stages.ingest.stereo import stereo_lenses
+from scenewright.stages.ingest.stereo import in_metres, stereo_lenses
 from scenewright.stages.kit.formats.foxglove import decode_color
 from scenewright.stages.kit.formats.trajectories import number_rows
 
@@ -80,8 +80,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     has_depth = any(images.depths)
     calibration = _calibration(root, images, parameters)
     size = _size(images, video, has_depth)
-    eyes = _eyes(calibration, size, any(images.rights), root)
-    units, unit_note = depth_units(parameters, 1000.0)
+    eyes = _eyes(calibration, size, any(images.rights), root, parameters.baseline)
+    form, unit_note = depth_form(parameters, 1000.0)
     if images.depth_is_disparity:
         unit_note = "depth computed from the disparity: Z = fx * baseline / (disparity + doffs)"
     times, time_note = _times(root, names, video, parameters)
@@ -92,7 +92,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         load = (
             _video_loader(video, index, eyes)
             if video is not None
-            else _loader(images, index, eyes, has_depth, units, calibration.disparity_offset)
+            else _loader(images, index, eyes, has_depth, form, calibration.disparity_offset)
         )
         entries.append(Entry(name, times[index] * 1e-9, pose, load, problem))
     notes = (
@@ -157,8 +157,10 @@ def _size(images: FolderImages, video: VideoFrames | None, has_depth: bool) -> t
     return color_image_size(path for path in images.colors if path)
 
 
-def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_right: bool, root: Path) -> _Eyes:
-    """Return the lenses for pictures of `size`."""
+def _eyes(
+    calibration: FolderCalibration, size: tuple[int, int] | None, has_right: bool, root: Path, given: float | None
+) -> _Eyes:
+    """Return the lenses for pictures of `size`; `given` [m] is the baseline that the options say."""
     width, height = size or (calibration.left.width, calibration.left.height)
     side_by_side = calibration.right is not None and not has_right and _is_double(calibration.left, width, height)
     if side_by_side:
@@ -175,9 +177,16 @@ def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_righ
         return _Eyes(lens, notes=lens.notes)
     shape, flat = (width, height), calibration.rectified
     left, right, baseline = stereo_lenses(
-        (sized[0], sized[1]), (shape, shape), (flat, flat), calibration.left_from_right, ("left", "right"), str(root)
+        (sized[0], sized[1]),
+        (shape, shape),
+        (flat, flat),
+        calibration.left_from_right,
+        ("left", "right"),
+        str(root),
+        given,
     )
-    notes = [f"stereo pair, baseline {baseline * 1000:.4g} mm", *left.notes]
+    baseline, unit_note = (baseline, None) if given is not None else in_metres(baseline, str(root))
+    notes = [f"stereo pair, baseline {abs(baseline) * 1000:.4g} mm", *([unit_note] if unit_note else ()), *left.notes]
     if side_by_side:
         notes.append("each picture holds both eyes side by side, left first")
     if calibration.disparity_offset:
@@ -204,7 +213,7 @@ def _with_size(record: CalibrationRecord, width: int, height: int) -> Calibratio
 
 
 def _loader(
-    images: FolderImages, index: int, eyes: _Eyes, has_depth: bool, units: float, disparity_offset: float | None
+    images: FolderImages, index: int, eyes: _Eyes, has_depth: bool, form: DepthForm, disparity_offset: float | None
 ) -> Callable[[], LoadedFrame]:
     color, depth, right = images.colors[index], images.depths[index], images.rights[index]
 
@@ -223,9 +232,9 @@ def _loader(
             raise Unusable("missing_depth")
         raw = eyes.left.pixels(raw_depth(depth), "depth")
         if not images.depth_is_disparity:
-            return depth_millimetres(raw, eyes.left.camera, units)
-        metres = depth_of_disparity(raw, eyes.left.camera, eyes.baseline or 0.0, disparity_offset or 0.0)
-        return depth_millimetres(metres, eyes.left.camera, 1.0)
+            return depth_millimetres(raw, eyes.left.camera, form)
+        metres = depth_of_disparity(raw, eyes.left.camera, abs(eyes.baseline or 0.0), disparity_offset or 0.0)
+        return depth_millimetres(metres, eyes.left.camera, DepthForm(1.0))
 
     return load
 

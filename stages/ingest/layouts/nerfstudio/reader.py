@@ -22,8 +22,8 @@ from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     chosen_cameras,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     named_file,
     natural_key,
     pinhole,
@@ -104,7 +104,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
     if not default_unit > 0:
         raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
-    units, unit_note = depth_units(parameters, 1 / default_unit)
+    stored, unit_note = depth_form(parameters, 1 / default_unit)
     recorded, notes_of_options = _recorded_cameras(frames, has_depth, parameters)
     groups, group_notes = grouped(recorded, _labels(frames, recorded))
     counts = {group.name: len(group.members) for group in groups}
@@ -116,7 +116,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         group = group_of[index]
         if group.name not in chosen:
             continue
-        form = FrameFormat(recorded[index], group.camera, has_color, has_depth, units)
+        form = FrameFormat(recorded[index], group.camera, has_color, has_depth, stored)
         load = frame_loader(FrameFiles(frame.color, frame.depth), form)
         pose = None if frame.pose is None else world(frame.pose)
         time = index / parameters.frame_rate if frame.time is None or not stamped else frame.time

@@ -9,8 +9,8 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import (
     camera_from_options,
+    depth_form,
     depth_image_size,
-    depth_units,
     image_loader,
     images_by_number,
     overridden,
@@ -56,13 +56,13 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     else:
         camera, source = camera_from_options(size, parameters, f"{root}: there is no {CAMERA}"), "no cam_params.json"
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, default_units)
+    form, unit_note = depth_form(parameters, default_units)
     entries = tuple(
         Entry(
             f"frame {number}",
             number / parameters.frame_rate,
             rows[number][1].reshape(4, 4) if number < len(rows) else None,
-            image_loader(colors.get(number), depths.get(number), camera, units, has_color=bool(colors)),
+            image_loader(colors.get(number), depths.get(number), camera, form, has_color=bool(colors)),
         )
         for number in numbers
     )

@@ -15,8 +15,8 @@ from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     camera_from_options,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     image_loader,
     images_by_stem,
@@ -56,11 +56,11 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if len(rows) != len(stems):
         raise BadInput(f"{pose_file}: {len(rows)} poses for {len(stems)} images", hint="one line an image, in order")
     camera = camera_from_options(depth_image_size(list(depths.values())), parameters, f"{root}: posed images")
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0)
     entries = []
     for index, (stem, (line, numbers)) in enumerate(zip(stems, rows, strict=True)):
         pose, problem = _pose(numbers, f"{pose_file}: line {line}")
-        loader = image_loader(colors.get(stem), depths.get(stem), camera, units, has_color=bool(colors))
+        loader = image_loader(colors.get(stem), depths.get(stem), camera, form, has_color=bool(colors))
         entries.append(Entry(stem, index / parameters.frame_rate, pose, loader, problem))
     notes = (
         "intrinsics given by option",

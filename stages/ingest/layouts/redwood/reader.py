@@ -10,8 +10,8 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     image_loader,
     images_by_stem,
@@ -48,7 +48,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     poses = read_open3d_log(root / TRAJECTORY)
     camera, notes = _camera(root, depth_image_size(depths))
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0)
     if colors and len(colors) != len(depths):
         raise BadInput(
             f"{root}: {len(colors)} colour and {len(depths)} depth images are not pairs",
@@ -62,7 +62,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             name=depth.name,
             time=index / parameters.frame_rate,
             world_from_camera=poses[index] if index < len(poses) else None,
-            load=image_loader(color, depth, camera, units, has_color=bool(colors)),
+            load=image_loader(color, depth, camera, form, has_color=bool(colors)),
         )
         for index, (color, depth) in enumerate(zip(paired, depths, strict=True))
     )

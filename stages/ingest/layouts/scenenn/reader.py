@@ -18,8 +18,8 @@ from scenewright.stages.ingest.folders.files import (
     DEPTH_SUFFIXES,
     all_intrinsics_given,
     camera_from_options,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     image_loader,
     images_by_number,
@@ -68,13 +68,13 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     stray = len(poses.keys() - set(numbers))
     times = _times(root)
     camera, notes = _camera(root, depth_image_size(depths.values()), parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0)
     entries = [
         Entry(
             name=f"frame {number}",
             time=times.get(number, 0) * 1e-6 if times else (number - first) / parameters.frame_rate,
             world_from_camera=poses.get(number),
-            load=image_loader(colors.get(number), depths.get(number), camera, units, has_color=bool(colors)),
+            load=image_loader(colors.get(number), depths.get(number), camera, form, has_color=bool(colors)),
             problem="missing_time" if times and number not in times else None,
         )
         for number in numbers

@@ -9,7 +9,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.color_registration import registered_loader
-from scenewright.stages.ingest.folders.files import depth_image_size, depth_units, image_loader, overridden, stream
+from scenewright.stages.ingest.folders.files import depth_form, depth_image_size, image_loader, overridden, stream
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_matrix
@@ -47,7 +47,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     size = depth_image_size([images["depth"] for _, images in sorted(files.items()) if "depth" in images])
     camera, notes = _camera(root, size)
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0)
     theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
     register = parameters.register_color and theirs
     has_color = any("color" in images for images in files.values())
@@ -55,7 +55,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     for number in sorted(files):
         images = files[number]
         pose, problem = _pose(images.get("pose"))
-        load = image_loader(images.get("color"), images.get("depth"), camera, units, has_color=has_color)
+        load = image_loader(images.get("color"), images.get("depth"), camera, form, has_color=has_color)
         if register:
             load = registered_loader(load, camera, COLOR_CAMERA, COLOR_FROM_DEPTH)
         entries.append(

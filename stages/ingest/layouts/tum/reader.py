@@ -19,8 +19,8 @@ from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     named_file,
     pinhole,
     refuse_exr,
@@ -86,8 +86,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
     recorded, notes = _camera(root, size, parameters, icl_nuim)
     recorded, notes_of_options = overridden_recording(recorded, parameters)
-    units, unit_note = depth_units(parameters, UNITS_PER_METRE)
-    form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), units)
+    stored, unit_note = depth_form(parameters, UNITS_PER_METRE)
+    form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), stored)
     tolerance = round(parameters.maximum_time_difference * 1e9)
     main_list = colors if colors.paths else depths
     partners = mutual_nearest(main_list.stamps, depths.stamps, tolerance)
