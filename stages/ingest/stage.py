@@ -6,13 +6,14 @@ from collections import Counter
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import cv2
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
+from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile, StreamName
 from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.origins import named_sources
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
 from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
@@ -32,7 +33,6 @@ LARGE_STEP = 1.0
 """Step of the camera between two frames [m] that is reported; by eye."""
 LIT_EVERY, DARK = 10, 8.0
 """Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
-StreamName = Literal["color", "depth", "right", "labels", "pose"]
 
 
 def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequence:
@@ -52,6 +52,9 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
             written = _write_frames(source, entries, gravity, drops, parameters, context)
     finally:
         source.close()
+    sources = named_sources(written.entries, source.entries, log if log.is_dir() else log.parent)
+    if sources is not None:
+        sources.write(context.output / "sources.json")
     return _finish(source, gravity, drops, written, parameters, context)
 
 
@@ -59,6 +62,7 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
 class _Written:
     """What was written, as far as the summary needs it."""
 
+    entries: list[Entry] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
     posed_times: list[float] = field(default_factory=list)
     poses: list[np.ndarray] = field(default_factory=list)
@@ -176,17 +180,18 @@ def _write_frames(
                 right=loaded.right,
                 camera_name=entry.camera_name,
             )
-            _note(written, time, entry.camera_name, loaded, pose)
+            _note(written, time, entry, loaded, pose)
         if writing is not None:
             writing.result()
     return written
 
 
-def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
+def _note(written: _Written, time: float, entry: Entry, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
     if loaded.color is not None and len(written.times) % LIT_EVERY == 0:
         written.brightness.append(brightness_of(loaded.color))
+    written.entries.append(entry)
     written.times.append(time)
-    written.cameras.append(camera_name)
+    written.cameras.append(entry.camera_name)
     streams: dict[StreamName, object] = {
         "color": loaded.color,
         "depth": loaded.depth,
@@ -200,7 +205,7 @@ def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame,
     if pose is not None:
         written.posed_times.append(time)
         written.poses.append(pose)
-        written.pose_cameras.append(camera_name)
+        written.pose_cameras.append(entry.camera_name)
 
 
 def _within(loaded: LoadedFrame, maximum_depth: float | None) -> LoadedFrame:

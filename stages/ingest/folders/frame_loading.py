@@ -11,16 +11,8 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import file_bytes, raw_depth
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, undistorted
 from scenewright.stages.ingest.images import depth_millimetres, fitted_color, usable_color
-from scenewright.stages.ingest.source import LoadedFrame, Unusable
+from scenewright.stages.ingest.source import FrameFiles, LoadedFrame, Unusable
 from scenewright.stages.kit.formats.foxglove import decode_color
-
-
-@dataclass(frozen=True)
-class FrameFiles:
-    """The files of one frame. None is a file that is missing."""
-
-    color: Path | None = None
-    depth: Path | None = None
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from scenewright.stages.ingest.messages.pose_source import PoseSource, find_pose
 from scenewright.stages.ingest.messages.survey import LogContent, survey
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
-from scenewright.stages.kit.formats.frames import LABELS_METADATA, WORLD_METADATA
+from scenewright.stages.kit.formats.frame_streams import LABELS_METADATA, WORLD_METADATA
 
 REFUSE_HINT = "leave out --damage refuse to use what is whole"
 

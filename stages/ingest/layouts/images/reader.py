@@ -35,7 +35,15 @@ from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
 from scenewright.stages.ingest.lenses import Lens, lens_of
 from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, StreamInfo, Unusable
+from scenewright.stages.ingest.source import (
+    Entry,
+    FrameFiles,
+    LoadedFrame,
+    LogSource,
+    SourceCamera,
+    StreamInfo,
+    Unusable,
+)
 from scenewright.stages.ingest.stereo import stereo_lenses
 from scenewright.stages.kit.formats.foxglove import decode_color
 from scenewright.stages.kit.formats.trajectories import number_rows
@@ -94,7 +102,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             if video is not None
             else _loader(images, index, eyes, has_depth, units, calibration.disparity_offset)
         )
-        entries.append(Entry(name, times[index] * 1e-9, pose, load, problem))
+        files = FrameFiles() if video is not None else FrameFiles(images.colors[index], images.depths[index])
+        stamp = int(times[index]) if time_note.startswith("times from") else None
+        entries.append(Entry(name, times[index] * 1e-9, pose, load, problem, files=files, stamp=stamp))
     notes = (
         *calibration.notes,
         *eyes.notes,

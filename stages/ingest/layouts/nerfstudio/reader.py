@@ -32,11 +32,11 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
 from scenewright.stages.ingest.folders.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
 from scenewright.stages.ingest.layouts.nerfstudio import replica
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.geometry.transforms import inverse, is_rigid
 
 NAMES = ("transforms.json", "transforms_train.json")
@@ -117,10 +117,13 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if group.name not in chosen:
             continue
         form = FrameFormat(recorded[index], group.camera, has_color, has_depth, units)
-        load = frame_loader(FrameFiles(frame.color, frame.depth), form)
+        files = FrameFiles(frame.color, frame.depth)
         pose = None if frame.pose is None else world(frame.pose)
         time = index / parameters.frame_rate if frame.time is None or not stamped else frame.time
-        entries.append(Entry(frame.name, time, pose, load, frame.problem, group.name))
+        stamp = None if frame.time is None else round(frame.time * 1e9)
+        entries.append(
+            Entry(frame.name, time, pose, frame_loader(files, form), frame.problem, group.name, files, stamp)
+        )
     cameras = [SourceCamera(group.name, group.camera) for group in groups if group.name in chosen]
     if not cameras:
         raise BadInput(f"{file}: has no frames")

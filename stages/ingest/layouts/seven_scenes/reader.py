@@ -11,7 +11,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.color_registration import registered_loader
 from scenewright.stages.ingest.folders.files import depth_image_size, depth_units, image_loader, overridden, stream
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_matrix
 from scenewright.stages.kit.geometry.transforms import transform_from
 
@@ -65,6 +65,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
                 world_from_camera=pose,
                 load=load,
                 problem=problem,
+                files=FrameFiles(images.get("color"), images.get("depth")),
             )
         )
     notes = (

@@ -27,11 +27,11 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_text
 
 COLOR_LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
@@ -101,8 +101,19 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if pose is not None and icl_nuim:
             pose = MIRROR @ pose @ MIRROR
         problem = "no_depth_within_tolerance" if missing else None
-        load = frame_loader(FrameFiles(path if colors.paths else None, depth), form)
-        entries.append(Entry(str(path.relative_to(root)), moment * 1e-9, pose, load, problem))
+        files = FrameFiles(path if colors.paths else None, depth)
+        own_stamp = None if icl_nuim else int(stamp)
+        entries.append(
+            Entry(
+                str(path.relative_to(root)),
+                moment * 1e-9,
+                pose,
+                frame_loader(files, form),
+                problem,
+                files=files,
+                stamp=own_stamp,
+            )
+        )
     unpaired = len(depths.paths) - int((partners >= 0).sum())
     notes = (
         *notes,
