@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import ClassVar, Literal
 
+import numpy as np
 from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
 from scenewright.schemas.base import Count, Model, Transform
 from scenewright.schemas.scene_parts import Camera
@@ -96,6 +97,12 @@ class FrameSources(Model):
         """Raise ValueError when the lists are of different lengths."""
         if len({len(entries) for entries in (self.color, self.depth, self.stamps) if entries}) > 1:
             raise ValueError("its lists are of different lengths")
+
+    def times_beside(self, times: np.ndarray) -> np.ndarray:
+        """Return the times (N,) [s] of the frames and, beside each, that of its picture in the log: (N, 2)."""
+        stamps = self.stamps or (None,) * len(times)
+        own = [time if stamp is None else stamp * 1e-9 for time, stamp in zip(times, stamps, strict=True)]
+        return np.stack([times, np.array(own, dtype=float)], axis=1)
 
     def of_frames(self, indices: Iterable[int]) -> FrameSources:
         """Return those of the frames at `indices`, in their order."""
