@@ -28,9 +28,9 @@ GIVEN = {"fx": CAMERA.fx, "fy": CAMERA.fy, "cx": CAMERA.cx, "cy": CAMERA.cy}
 @pytest.mark.parametrize(
     ("write", "color", "depth", "options"),
     [
-        (write_seven_scenes, "frame-000001.color.png", "frame-000001.depth.png", GIVEN),
-        (write_redwood, None, "depth/00001.png", {}),
-        (write_posed_images, None, "depth/0001.png", GIVEN),
+        (write_seven_scenes, "frame-000001.color.jpg", "frame-000001.depth.png", GIVEN),
+        (write_redwood, "image/00001.jpg", "depth/00001.png", {}),
+        (write_posed_images, "color/2.png", "depth/2.pgm", GIVEN),
         (write_replica, "results/frame000001.jpg", "results/depth000001.png", {}),
         (write_scannet, "color/1.jpg", "depth/1.png", {}),
         (write_scenenn, "image/image00002.png", "depth/depth00002.png", {}),

@@ -28,7 +28,7 @@ from scenewright.stages.ingest.folders.files import (
     text_stream,
 )
 from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
-from scenewright.stages.ingest.folders.stamped_poses import LATEST_STAMP, StampedPoses
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes
 from scenewright.stages.ingest.images import depth_millimetres, usable_color
 from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
 from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
@@ -46,7 +46,8 @@ from scenewright.stages.ingest.source import (
 )
 from scenewright.stages.ingest.stereo import stereo_lenses
 from scenewright.stages.kit.formats.foxglove import decode_color
-from scenewright.stages.kit.formats.trajectories import number_rows
+from scenewright.stages.kit.formats.stamps import exact_stamps
+from scenewright.stages.kit.formats.trajectories import read_text
 
 TIMES = ("times.txt", "timestamps.txt", "timestamp.txt")
 OPTIONS = ("fx", "fy", "cx", "cy")
@@ -297,12 +298,15 @@ def _times(
     """Return the stamp of every frame (N,) int64 [ns], and where it is from."""
     path = next((root / name for name in TIMES if (root / name).is_file()), None)
     if path is not None:
-        seconds = np.array([row[0] for _, row in number_rows(path, 1)])
-        if len(seconds) != len(names):
-            raise BadInput(f"{path}: {len(seconds)} times for {len(names)} images", hint="one line an image, in order")
-        if not (np.isfinite(seconds) & (seconds >= 0) & (seconds < LATEST_STAMP)).all():
-            raise BadInput(f"{path}: times are not between 0 and {LATEST_STAMP} seconds")
-        return np.rint(seconds * 1e9).astype(np.int64), f"times from {path.name}, seconds"
+        texts = [line.split("#", 1)[0].strip() for line in read_text(path).splitlines()]
+        rows = [(f"{path}: line {line}", text) for line, text in enumerate(texts, start=1) if text]
+        if len(rows) != len(names):
+            raise BadInput(f"{path}: {len(rows)} times for {len(names)} images", hint="one line an image, in order")
+        column = exact_stamps([text for _, text in rows], [where for where, _ in rows])
+        words = column.note or "seconds"
+        return np.array([stamp for stamp in column.stamps if stamp is not None], np.int64), (
+            f"times from {path.name}, {words.removeprefix('stamps in ')}"
+        )
     stamps = stamps_of(names)
     if stamps is not None:
         return stamps, "times from the file names"
@@ -322,8 +326,10 @@ def _poses(
     poses = read_pose_list(path, list(names))
     notes: tuple[str, ...] = (f"poses from {path.name}, assumed to be world_from_camera",)
     if isinstance(poses, StampedPoses):
-        notes = (*notes, *poses.notes)
-        poses = [(poses.at(int(stamp), parameters), None) for stamp in times]
+        matrices = [poses.at(int(stamp), parameters) for stamp in times]
+        covered = coverage_notes(poses, [int(t) for t in times], [pose is not None for pose in matrices], parameters)
+        notes = (*notes, *poses.notes, *covered)
+        poses = [(pose, None) for pose in matrices]
     offset = calibration.posed_from_left
     if offset is not None and np.abs(offset - np.eye(4)).max() > 0:
         notes = (*notes, f"poses moved by {offset[0, 3]:.4g} m along x: KITTI states those of camera 0")

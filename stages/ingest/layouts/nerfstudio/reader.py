@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,7 @@ from scenewright.stages.ingest.folders.undistortion import PINHOLE, Lens, Record
 from scenewright.stages.ingest.layouts.nerfstudio import replica
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
+from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.geometry.transforms import inverse, is_rigid
 
 NAMES = ("transforms.json", "transforms_train.json")
@@ -58,7 +59,7 @@ class _Frame:
     pose: np.ndarray | None
     problem: str | None
     time: float | None
-    """`timestamp` of the frame [s], which our own exports have."""
+    """`timestamp` of the frame [s], which our own exports have; in any unit until all frames are known."""
     fields: dict[str, Any]
     """Intrinsics of the frame over those of the file."""
 
@@ -96,7 +97,11 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         raise BadInput(f"{file}: has no list of frames")
     frames = sorted(_frames(document, file), key=lambda frame: natural_key(frame.name))
     stamped = all(frame.time is not None for frame in frames)
+    column = None
     if stamped:
+        column = exact_stamps([repr(frame.time) for frame in frames], [frame.where for frame in frames])
+        timed = zip(frames, column.stamps, strict=True)
+        frames = [replace(frame, time=(stamp or 0) * 1e-9) for frame, stamp in timed]
         frames.sort(key=lambda frame: frame.time or 0.0)
     has_depth = any(frame.depth is not None for frame in frames)
     has_color = not has_depth or any(frame.color is not None and frame.color.is_file() for frame in frames)
@@ -139,8 +144,8 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         ),
         *((unit_note,) if has_depth else ()),
         *world_notes,
-        "times from timestamp"
-        if stamped
+        f"times from timestamp{f', {column.note}' if column.note else ''}"
+        if column is not None
         else f"times assumed: order of the names / {parameters.frame_rate:g} per second",
     )
     stamps = np.array([round((frame.time or 0.0) * 1e9) for frame in frames if stamped], np.int64)
@@ -185,7 +190,7 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
                 None if depth is None else named_file(root, depth, where),
                 pose,
                 problem,
-                None if fields.get("timestamp") is None else _number(fields, "timestamp", where, largest=9e9),
+                None if fields.get("timestamp") is None else _number(fields, "timestamp", where, largest=9e18),
                 {**shared, **fields},
             )
         )
