@@ -14,6 +14,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile, StreamName
 from scenewright.stages.ingest.detection import open_log
 from scenewright.stages.ingest.origins import named_sources
+from scenewright.stages.ingest.own_poses import with_own_poses
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
 from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
@@ -35,11 +36,16 @@ LIT_EVERY, DARK = 10, 8.0
 """Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
 
 
-def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequence:
-    """Write the usable frames of a log with calibration, gravity-aligned poses and the reasons for all others."""
+def run(log: Path, trajectory: Path | None = None, *, parameters: IngestParameters, context: Context) -> Sequence:
+    """Write the usable frames of a log with calibration, gravity-aligned poses and the reasons for all others.
+
+    A trajectory of one's own takes the place of the log's poses.
+    """
     with context.progress.step("read the log"):
         source = open_log(Path(log), parameters)
     try:
+        if trajectory is not None:
+            source = with_own_poses(source, Path(trajectory), parameters)
         check_cameras(source, log)
         context.logger.info("%s: %s", log, source.rule)
         for line in source.damage:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.transform_tree import TransformTree
-from scenewright.stages.kit.formats.stamps import read_column
-from scenewright.stages.kit.formats.trajectories import number_rows, read_text, transform_from_numbers
+from scenewright.stages.kit.formats.stamps import spans_text
+from scenewright.stages.kit.formats.trajectories import read_stamped_rows
 
 
 @dataclass(frozen=True)
@@ -48,10 +46,7 @@ def coverage_notes(
     notes = []
     if not any(posed):
         counted = f"WARNING: none of the {len(poses.stamps)} poses of {poses.name} is of a frame"
-        notes.append(
-            f"{counted}: frames are from {_seconds(times.min())} to {_seconds(times.max())} s, poses from "
-            f"{_seconds(stamps[0])} to {_seconds(stamps[-1])} s, which begin {_offset(int(stamps[0] - times.min()))}"
-        )
+        notes.append(f"{counted}: {spans_text(times, stamps)}")
     if _are_rounded(poses.stamps, times):
         return (*notes, f"WARNING: stamps of {poses.name} are rounded: write them with all their decimals")
     inside = lacking[(lacking > stamps[0]) & (lacking < stamps[-1])]
@@ -63,18 +58,10 @@ def coverage_notes(
             f"over {parameters.maximum_transform_gap:g} s apart there (--maximum-transform-gap {needed:g} interpolates)"
         )
     elif any(posed):
-        notes.append(f"{counted}: {poses.name} has poses from {_seconds(stamps[0])} to {_seconds(stamps[-1])} s")
+        notes.append(f"{counted}: {spans_text(times, stamps)}")
     elif not stamps[0] <= times.max() or not times.min() <= stamps[-1]:
         notes.append("write the stamps of the poses in the clock of the pictures")
     return tuple(notes)
-
-
-def _seconds(stamp: int) -> str:
-    return f"{int(stamp) * 1e-9:.6f}"
-
-
-def _offset(difference: int) -> str:
-    return f"{abs(difference) * 1e-9:.9g} s {'after' if difference > 0 else 'before'} the frames"
 
 
 def _are_rounded(stamps: np.ndarray, frames: np.ndarray) -> bool:
@@ -89,31 +76,11 @@ def read_stamped_poses(path: Path, seconds_per_unit: float = 1.0) -> StampedPose
     `seconds_per_unit` is for stamps that are numbers of frames. Raises BadInput for a wrong number of columns, or what
     is no number.
     """
-    tree, stamps, problems = TransformTree(), [], Counter[str]()
-    rows = number_rows(path, 8)
-    # Stamps since 1970 do not fit float64 to the nanosecond, so they are taken from the text.
-    texts = [line.split(None, 1)[0] for line in read_text(path).splitlines() if line.split("#", 1)[0].split()]
-    column = read_column(texts)
-    for (line, row), stamp in zip(rows, column.stamps, strict=True):
-        if stamp is None:
-            problems["no time"] += 1
-            continue
-        if not np.isfinite(row).all():
-            problems["not finite"] += 1
-            continue
-        try:
-            pose = transform_from_numbers(row[1:], f"{path}: line {line}")
-        except BadInput:
-            problems["quaternion not of length 1"] += 1
-            continue
-        stamps.append(scaled(stamp, seconds_per_unit))
-        tree.add("world", "camera", stamps[-1], pose)
-    notes = (f"{path.name}: {column.note}",) if column.note else ()
-    if problems:
-        listed = ", ".join(f"{reason}: {count}" for reason, count in sorted(problems.items()))
-        bad_lines = f"WARNING: {sum(problems.values())} of {len(rows)} lines of {path.name} are no poses ({listed})"
-        notes = (*notes, bad_lines)
-    return StampedPoses(np.array(stamps, np.int64), tree, notes, path.name)
+    rows = read_stamped_rows(path)
+    tree, stamps = TransformTree(), [scaled(stamp, seconds_per_unit) for stamp in rows.stamps.tolist()]
+    for stamp, pose in zip(stamps, rows.poses, strict=True):
+        tree.add("world", "camera", stamp, pose)
+    return StampedPoses(np.array(stamps, np.int64), tree, rows.notes, path.name)
 
 
 def scaled(stamp: int, seconds_per_unit: float) -> int:

@@ -424,7 +424,7 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
     if "color" not in streams:
         add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes")
     if "pose" not in streams:
-        advice = "run reconstruct-without-poses, which estimates them, or give fuse a --trajectory"
+        advice = "run reconstruct-without-poses, which estimates them, or give ingest or fuse your own --trajectory"
         add("doubtful", "poses", "the frames have no poses: fuse needs them", advice)
     return findings
 

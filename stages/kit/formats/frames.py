@@ -274,6 +274,11 @@ class FrameReader:
         return np.array([stamp * 1e-9 for stamp, _, _ in self._index])
 
     @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each frame."""
+        return tuple(name for _, name, _ in self._index)
+
+    @property
     def streams(self) -> tuple[str, ...]:
         """Which of PIXEL_STREAMS and pose some frame has."""
         have = {stream for _, _, places in self._index for stream in places}

@@ -61,6 +61,14 @@ def exact_stamps(texts: Sequence[str], where: Sequence[str]) -> StampColumn:
     return column
 
 
+def spans_text(frames: np.ndarray, poses: np.ndarray) -> str:
+    """Return in words when frames (N,) and poses (M,) [ns] are, and how far apart they begin."""
+    apart = int(poses.min()) - int(frames.min())
+    spans = (f"from {int(of.min()) * 1e-9:.6f} to {int(of.max()) * 1e-9:.6f} s" for of in (frames, poses))
+    relation = f"{abs(apart) * 1e-9:.9g} s {'after' if apart > 0 else 'before'} the frames"
+    return f"frames are {next(spans)}, poses {next(spans)}, which begin {relation}"
+
+
 def _number(text: str) -> Decimal | None:
     try:
         return Decimal(text)
