@@ -19,6 +19,7 @@ from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
 from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
 from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
+from scenewright.stages.kit.formats.exif import orientation_of
 from scenewright.stages.kit.formats.foxglove import millimetres_to_depth, nanoseconds
 from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.kit.formats.trajectories import write_tum
@@ -76,6 +77,8 @@ class _Written:
     """Camera of each frame."""
     pose_cameras: list[str] = field(default_factory=list)
     """Camera of each frame that has a pose."""
+    orientations: int = 0
+    """Pictures with an EXIF orientation that was taken off."""
     median_depths: list[float] = field(default_factory=list)
     brightness: list[float] = field(default_factory=list)
     """Mean of every tenth picture, 0 to 255."""
@@ -195,6 +198,8 @@ def _write_frames(
 def _note(written: _Written, time: float, entry: Entry, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
     if loaded.color is not None and len(written.times) % LIT_EVERY == 0:
         written.brightness.append(brightness_of(loaded.color))
+    if isinstance(loaded.color, bytes) and orientation_of(loaded.color) != 1:
+        written.orientations += 1
     written.entries.append(entry)
     written.times.append(time)
     written.cameras.append(entry.camera_name)
@@ -324,6 +329,11 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
         notes.append(
             "WARNING: frames have no colour: what is mapped has the shape that depth gives, names are guessed from "
             "shape alone, and steps that need pictures refuse"
+        )
+    if written.orientations:
+        notes.append(
+            f"{written.orientations} pictures state an EXIF orientation: the calibration is taken to be of the pixels "
+            "as they are stored, and the orientation is left out"
         )
     if written.times and "depth" not in written.streams:
         notes.append("frames have no depth")

@@ -14,10 +14,9 @@ from scenewright.schemas.outside import file_content, json_of
 from scenewright.schemas.places import resolved
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
-from scenewright.stages.ingest.images import decode_image, usable_color, usable_depth
+from scenewright.stages.ingest.images import decode_as_calibrated, decode_image, usable_color, usable_depth
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import LoadedFrame, Role, StreamInfo, Unusable
-from scenewright.stages.kit.formats.foxglove import decode_color
 from scenewright.stages.kit.formats.trajectories import read_text
 from scenewright.stages.kit.geometry.cameras import scaled
 
@@ -167,11 +166,14 @@ def depth_image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
     return None
 
 
-def color_image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
-    """Return (width, height) of the first colour image that decodes, None when none does."""
+def color_image_size(paths: Iterable[Path], stated: tuple[int, int] = (0, 0)) -> tuple[int, int] | None:
+    """Return (width, height) of the first colour image that decodes, None when none does.
+
+    Where the calibration states a size, that of a picture which its EXIF orientation turns into that shape is turned.
+    """
     for path in paths:
         try:
-            image = decode_color(file_bytes(path, "color"))
+            image = decode_as_calibrated(file_bytes(path, "color"), stated)
         except Unusable:
             continue
         if image is not None:

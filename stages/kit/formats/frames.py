@@ -27,6 +27,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import LabelEntry, Sequence
 from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.exif import without_orientation
 from scenewright.stages.kit.formats.frame_streams import (
     CAMERA_FRAME,
     CAMERA_NAME,
@@ -215,7 +216,7 @@ class FrameWriter:
         if not isinstance(picture, bytes):
             self._check(picture, camera, "colour", (3,), np.uint8)
             picture = foxglove.encode_jpeg(picture)
-        return foxglove.color_message(stamp, picture, name)
+        return foxglove.color_message(stamp, without_orientation(picture), name)
 
     @staticmethod
     def _check(image: np.ndarray, camera: Camera, name: str, channels: tuple[int, ...], kind: Any) -> None:
@@ -364,9 +365,12 @@ class FrameReader:
         return Frame(index, stamp * 1e-9, **arrays, world_from_camera=pose, camera_name=name)
 
     def encoded(self, index: int, stream: Literal["color", "right", "picture"] = "color") -> bytes | None:
-        """Return the stored JPEG or PNG of a frame, or None when it has none."""
+        """Return the stored JPEG or PNG of a frame, or None when it has none.
+
+        It states no EXIF orientation, by which others would turn it under intrinsics that are not turned.
+        """
         places = self._index[index][2]
-        return bytes(self._decode(stream, places[stream]).data) if stream in places else None
+        return without_orientation(bytes(self._decode(stream, places[stream]).data)) if stream in places else None
 
     def _array(self, index: int, stream: str, message: Any) -> np.ndarray:
         try:

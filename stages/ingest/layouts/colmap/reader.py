@@ -202,7 +202,7 @@ def _recorded_cameras(
         of_camera = [index for index, image in enumerate(images) if image.camera == number]
         where = f"{model.folder}: camera {number}"
         size = depth_image_size(path for index in of_camera if (path := depths[index]) is not None)
-        size = size or color_image_size(colors[index] for index in of_camera)
+        size = size or color_image_size((colors[index] for index in of_camera), model.cameras[number].size)
         camera = _camera(model.cameras[number], where).at(size, where)
         cameras[number], notes = overridden_recording(camera, parameters)
     return [cameras[image.camera] for image in images], notes

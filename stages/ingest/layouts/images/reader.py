@@ -29,7 +29,7 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes
-from scenewright.stages.ingest.images import depth_millimetres, usable_color
+from scenewright.stages.ingest.images import decode_as_calibrated, depth_millimetres, usable_color
 from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
 from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
 from scenewright.stages.ingest.lenses import Lens, lens_of
@@ -45,7 +45,6 @@ from scenewright.stages.ingest.source import (
     Unusable,
 )
 from scenewright.stages.ingest.stereo import stereo_lenses
-from scenewright.stages.kit.formats.foxglove import decode_color
 from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.formats.trajectories import read_text
 
@@ -88,7 +87,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     refuse_exr((path.name for path in images.depths if path), str(root))
     has_depth = any(images.depths)
     calibration = _calibration(root, images, parameters)
-    size = _size(images, video, has_depth)
+    size = _size(images, video, has_depth, (calibration.left.width, calibration.left.height))
     eyes = _eyes(calibration, size, any(images.rights), root)
     units, unit_note = depth_units(parameters, 1000.0)
     if images.depth_is_disparity:
@@ -159,13 +158,15 @@ def _pinhole_record(camera: Camera) -> CalibrationRecord:
     return CalibrationRecord(0, "", camera.width, camera.height, "plumb_bob", (), matrix, (), ())
 
 
-def _size(images: FolderImages, video: VideoFrames | None, has_depth: bool) -> tuple[int, int] | None:
+def _size(
+    images: FolderImages, video: VideoFrames | None, has_depth: bool, stated: tuple[int, int]
+) -> tuple[int, int] | None:
     """Return (width, height) of the depth images, of the pictures where there are none."""
     if video is not None:
         return video.size
     if has_depth:
         return depth_image_size(path for path in images.depths if path)
-    return color_image_size(path for path in images.colors if path)
+    return color_image_size((path for path in images.colors if path), stated)
 
 
 def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_right: bool, root: Path) -> _Eyes:
@@ -221,7 +222,7 @@ def _loader(
 
     def load() -> LoadedFrame:
         if eyes.side_by_side:
-            left, second = _halves(_decode(color, "color"), eyes)
+            left, second = _halves(_decode(color, "color", (0, 0)), eyes)
             return LoadedFrame(left, _depth() if has_depth else None, right=second)
         return LoadedFrame(
             _picture(color, eyes.left, "color") if any(images.colors) else None,
@@ -261,16 +262,16 @@ def _halves(image: np.ndarray, eyes: _Eyes) -> tuple[np.ndarray, np.ndarray]:
 def _picture(path: Path | None, lens: Lens, stream_name: str) -> np.ndarray | bytes:
     """Return a file's picture without distortion; its own bytes where these can be kept."""
     if lens.maps is not None:
-        return lens.picture(_decode(path, stream_name))
+        return lens.picture(_decode(path, stream_name, lens.size))
     if path is None:
         raise Unusable(f"missing_{stream_name}")
     return usable_color(file_bytes(path, stream_name), lens.camera)
 
 
-def _decode(path: Path | None, stream_name: str) -> np.ndarray:
+def _decode(path: Path | None, stream_name: str, size: tuple[int, int]) -> np.ndarray:
     if path is None:
         raise Unusable(f"missing_{stream_name}")
-    image = decode_color(file_bytes(path, stream_name))
+    image = decode_as_calibrated(file_bytes(path, stream_name), size)
     if image is None:
         raise Unusable(f"undecodable_{stream_name}", path.name)
     return image

@@ -235,7 +235,7 @@ def _recorded_cameras(
     for stated_camera, same in alike.items():
         where = same[0].where
         color_size = (
-            color_image_size(frame.color for frame in same if frame.color)
+            color_image_size((frame.color for frame in same if frame.color), stated_camera.size or (0, 0))
             if stated_camera.size is None or not has_depth
             else None
         )
