@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -121,6 +121,8 @@ class LogSource:
     streams: tuple[StreamInfo, ...] = ()
     other_cameras: tuple[str, ...] = ()
     """Cameras of the log that were not asked for."""
+    missing: Mapping[str, str] = field(default_factory=dict)
+    """Stream (`depth`, `pose`) that the log lacks -> why, where it holds something of the kind."""
     close: Callable[[], None] = field(default=lambda: None)
 
     @property

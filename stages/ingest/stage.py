@@ -323,7 +323,7 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
     step = max((largest_step(poses[names == name]) for name in sorted(set(written.pose_cameras))), default=0.0)
     if step > LARGE_STEP:
         notes.append(f"WARNING: the camera jumps {step:.2f} m between two frames")
-    if written.times and not written.poses:
+    if written.times and not written.poses and "pose" not in source.missing:
         notes.append("frames have no poses")
     if written.times and "color" not in written.streams:
         notes.append(
@@ -335,7 +335,7 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
             f"{written.orientations} pictures state an EXIF orientation: the calibration is taken to be of the pixels "
             "as they are stored, and the orientation is left out"
         )
-    if written.times and "depth" not in written.streams:
+    if written.times and "depth" not in written.streams and "depth" not in source.missing:
         notes.append("frames have no depth")
     if source.other_cameras:
         notes.append(f"other cameras of the log: {', '.join(source.other_cameras)} (--camera NAME, --camera all)")

@@ -416,16 +416,19 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
     def add(severity: Severity, check: str, message: str, fix: str = "") -> None:
         findings.append(Finding(severity=severity, check=check, message=message, fix=fix))
 
+    def why(stream: str) -> str:
+        return f" ({source.missing[stream]})" if stream in source.missing else ""
+
     if "depth" not in streams and not stereo:
         advice = "record depth; colour alone can only be looked at"
-        add("wasted", "depth", "there is no depth and no stereo pair with a baseline", advice)
+        add("wasted", "depth", f"there is no depth and no stereo pair with a baseline{why('depth')}", advice)
     elif "depth" not in streams:
         add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")
     if "color" not in streams:
         add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes")
     if "pose" not in streams:
         advice = "run reconstruct-without-poses, which estimates them, or give ingest or fuse your own --trajectory"
-        add("doubtful", "poses", "the frames have no poses: fuse needs them", advice)
+        add("doubtful", "poses", f"the frames have no poses, which fuse needs{why('pose')}", advice)
     return findings
 
 
