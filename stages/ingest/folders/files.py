@@ -22,6 +22,8 @@ from scenewright.stages.kit.geometry.cameras import scaled
 
 COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp")
 DEPTH_SUFFIXES = (".png", ".pgm", ".tif", ".tiff")
+FARTHEST = 65.534
+"""Largest depth that a sequence holds [m]."""
 LARGEST_IMAGE_FILE = 1_000_000_000
 """Bytes of an image file that are read."""
 
@@ -83,13 +85,16 @@ def first_subfolder(root: Path, names: tuple[str, ...]) -> Path | None:
 
 
 def named_file(root: Path, name: Any, where: str) -> Path:
-    """Return the file that a log names, whether it exists or not.
+    """Return the file that a log names, whether it exists or not. Where no file is called so, a backslash separates
+    folders, as on Windows.
 
     Raises BadInput when the name is no name, or leads out of the folder `root`, by `..`, from the root of the file
     system, or over a link.
     """
     if not isinstance(name, str) or not name.strip() or "\0" in name or len(name) > 4096:
         raise BadInput(f"{where}: {name!r:.60} is no file name")
+    if "\\" in name and not (root / name).exists():
+        name = name.replace("\\", "/")
     path = root / name
     try:
         inside = not Path(name).is_absolute() and resolved(path).is_relative_to(root.resolve())
@@ -187,7 +192,7 @@ def refuse_exr(names: Iterable[str], where: str) -> None:
     if exr is not None:
         raise BadInput(
             f"{where}: depth {exr} is OpenEXR, which is not read",
-            hint="convert it to 16-bit PNG in millimetres, or to .npy",
+            hint="convert it to 16-bit PNG in millimetres, or to .npy in metres",
         )
 
 
@@ -258,11 +263,27 @@ def camera_from_options(size: tuple[int, int] | None, parameters: IngestParamete
     return Camera(width=width, height=height, **{name: getattr(parameters, name) for name in names})
 
 
-def depth_units(parameters: IngestParameters, default: float) -> tuple[float, str]:
-    """Return depth units per metre and a note that says where the number comes from."""
+def depth_units(parameters: IngestParameters, default: float, depths: Iterable[Path | None] = ()) -> tuple[float, str]:
+    """Return depth units per metre and a note that says where the number comes from.
+
+    `default` is that of the layout for whole numbers. The `depths` of a layout that says nothing of floating point are
+    looked at: such depth is in metres by habit, unless its median is farther than a sequence can hold.
+    """
     if parameters.depth_scale is not None:
         return parameters.depth_scale, f"depth unit given by option: 1/{parameters.depth_scale:g} m"
+    first = next((image for path in depths if path is not None and (image := _readable_depth(path)) is not None), None)
+    if first is not None and first.dtype.kind == "f":
+        valid = first[np.isfinite(first) & (first > 0)]
+        if len(valid) and float(np.median(valid)) < FARTHEST:
+            return 1.0, "depth unit assumed: 1/1 m, as it is floating point"
     return default, f"depth unit assumed: 1/{default:g} m"
+
+
+def _readable_depth(path: Path) -> np.ndarray | None:
+    try:
+        return raw_depth(path)
+    except Unusable:
+        return None
 
 
 def chosen_cameras(counts: dict[str, int], parameters: IngestParameters, where: str) -> tuple[str, ...]:

@@ -79,7 +79,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unregistered = _unregistered_images(image_folder, colors)
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(root))
-    units, unit_note = depth_units(parameters, 1.0 if depth_words == DENSE_MAPS else 1000.0)
+    units, unit_note = (
+        depth_units(parameters, 1.0) if depth_words == DENSE_MAPS else depth_units(parameters, 1000.0, depths)
+    )
     group_of = {index: group for group in groups for index in group.members}
     entries = []
     ordered: list[tuple[str, int | None]] = [(image.name, index) for index, image in enumerate(images)]

@@ -89,11 +89,13 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     calibration = _calibration(root, images, parameters)
     size = _size(images, video, has_depth, (calibration.left.width, calibration.left.height))
     eyes = _eyes(calibration, size, any(images.rights), root)
-    units, unit_note = depth_units(parameters, 1000.0)
+    units, unit_note = depth_units(parameters, 1000.0, () if images.depth_is_disparity else images.depths)
     if images.depth_is_disparity:
         unit_note = "depth computed from the disparity: Z = fx * baseline / (disparity + doffs)"
     times, time_note = _times(root, names, video, parameters)
-    poses, pose_notes = _poses(root, names, times, calibration, parameters)
+    pictures = [color or depth for color, depth in zip(images.colors, images.depths, strict=True)]
+    files = [path.stem if path else name for path, name in zip(pictures, images.names, strict=True)]
+    poses, pose_notes = _poses(root, names, files, times, calibration, parameters)
     entries = []
     for index, name in enumerate(names):
         pose, problem = poses[index]
@@ -318,13 +320,18 @@ def _times(
 
 
 def _poses(
-    root: Path, names: tuple[str, ...], times: np.ndarray, calibration: FolderCalibration, parameters: IngestParameters
+    root: Path,
+    names: tuple[str, ...],
+    files: list[str],
+    times: np.ndarray,
+    calibration: FolderCalibration,
+    parameters: IngestParameters,
 ) -> tuple[list[Pose], tuple[str, ...]]:
     """Return the pose of each frame, and what was assumed of them."""
     path = pose_file(root)
     if path is None:
         return [(None, None)] * len(names), ()
-    poses = read_pose_list(path, list(names))
+    poses = read_pose_list(path, list(names), files)
     notes: tuple[str, ...] = (f"poses from {path.name}, assumed to be world_from_camera",)
     if isinstance(poses, StampedPoses):
         matrices = [poses.at(int(stamp), parameters) for stamp in times]

@@ -109,7 +109,8 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
     if not default_unit > 0:
         raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
-    units, unit_note = depth_units(parameters, 1 / default_unit)
+    unstated = [] if "depth_unit_scale_factor" in document else [frame.depth for frame in frames]
+    units, unit_note = depth_units(parameters, 1 / default_unit, unstated)
     recorded, notes_of_options = _recorded_cameras(frames, has_depth, parameters)
     groups, group_notes = grouped(recorded, _labels(frames, recorded))
     counts = {group.name: len(group.members) for group in groups}

@@ -56,7 +56,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if len(rows) != len(stems):
         raise BadInput(f"{pose_file}: {len(rows)} poses for {len(stems)} images", hint="one line an image, in order")
     camera = camera_from_options(depth_image_size(list(depths.values())), parameters, f"{root}: posed images")
-    units, unit_note = depth_units(parameters, 1000.0)
+    units, unit_note = depth_units(parameters, 1000.0, depths.values())
     entries = []
     for index, (stem, (line, numbers)) in enumerate(zip(stems, rows, strict=True)):
         pose, problem = _pose(numbers, f"{pose_file}: line {line}")

@@ -48,7 +48,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     poses = read_open3d_log(root / TRAJECTORY)
     camera, notes = _camera(root, depth_image_size(depths))
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    units, unit_note = depth_units(parameters, 1000.0, depths)
     if colors and len(colors) != len(depths):
         raise BadInput(
             f"{root}: {len(colors)} colour and {len(depths)} depth images are not pairs",

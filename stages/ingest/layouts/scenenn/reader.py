@@ -68,7 +68,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     stray = len(poses.keys() - set(numbers))
     times = _times(root)
     camera, notes = _camera(root, depth_image_size(depths.values()), parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    units, unit_note = depth_units(parameters, 1000.0, depths.values())
     entries = [
         Entry(
             name=f"frame {number}",

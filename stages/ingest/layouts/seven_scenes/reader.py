@@ -47,7 +47,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     size = depth_image_size([images["depth"] for _, images in sorted(files.items()) if "depth" in images])
     camera, notes = _camera(root, size)
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    units, unit_note = depth_units(parameters, 1000.0, [images.get("depth") for _, images in sorted(files.items())])
     theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
     register = parameters.register_color and theirs
     has_color = any("color" in images for images in files.values())

@@ -89,7 +89,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
     recorded, notes = _camera(root, size, parameters, icl_nuim)
     recorded, notes_of_options = overridden_recording(recorded, parameters)
-    units, unit_note = depth_units(parameters, UNITS_PER_METRE)
+    units, unit_note = depth_units(parameters, UNITS_PER_METRE, depths.paths)
     form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), units)
     tolerance = round(parameters.maximum_time_difference * 1e9)
     main_list = colors if colors.paths else depths
