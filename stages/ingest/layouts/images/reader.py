@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.folders.calibration_files import NAMES as CALIBRATION_NAMES
 from scenewright.stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
@@ -29,6 +30,7 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes
+from scenewright.stages.ingest.foreign import unread_tables
 from scenewright.stages.ingest.images import decode_as_calibrated, depth_millimetres, usable_color
 from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
 from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
@@ -136,10 +138,14 @@ def _calibration(root: Path, images: FolderImages, parameters: IngestParameters)
     options = [name for name in OPTIONS if getattr(parameters, name) is not None]
     if all_intrinsics_given(parameters) and not any(images.rights):
         camera = camera_from_options(None, parameters, str(root))
-        return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option",))
+        beside = unread_tables(root, CALIBRATION_NAMES)
+        unread = (f"not read: {beside}, which may hold poses or intrinsics",) if beside else ()
+        return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option", *unread))
     calibration = find_calibration(root, images.camera_number)
     if calibration is None:
-        camera_from_options(None, parameters, f"{root}: there is no calibration file")
+        beside = unread_tables(root, CALIBRATION_NAMES)
+        why = f"{root}: there is no calibration file" + (f" (not read: {beside})" if beside else "")
+        camera_from_options(None, parameters, why)
         raise BadInput(f"{root}: there is no calibration file for left and right images", hint=PAIR_HINT)
     if options and calibration.right is not None:
         raise UsageError(f"--{options[0]} cannot describe a stereo pair", hint="change the calibration file instead")
