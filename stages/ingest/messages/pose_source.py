@@ -101,7 +101,8 @@ def why_no_poses(content: LogContent, frame: str) -> str:
     leading = f"no transforms lead to the camera frame {frame!r}"
     parts = [leading if not content.tree.has_parent(frame) else f"transforms of {frame!r} do not say where it is"]
     parts.append(f"frames that the log knows: {known}" if frames else "the log holds no transforms")
-    moving = bool(frames) or any(poses.child_frame_id for poses in content.poses.values())
+    moving = any(topic.rpartition("/")[2] == "tf" for topic in content.transform_topics)
+    moving = moving or any(poses.child_frame_id for poses in content.poses.values())
     if moving and not any(name.endswith(STATIC) for name in content.topics):
         parts.append(f"/{STATIC} is not among its topics, which says where the camera is mounted (record it too)")
     return "; ".join(parts)
