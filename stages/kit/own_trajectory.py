@@ -45,7 +45,7 @@ def frame_poses(
         spans = spans_text(reader.stamps, rows.stamps) if len(rows.stamps) and len(reader) else "it holds none"
         raise BadInput(
             f"{trajectory.root}: none of its {len(rows.stamps)} poses is of one of the {len(reader)} frames: {spans}",
-            hint="write its stamps in the clock of the frames, or raise --pose-tolerance where they are near",
+            hint="write its stamps in the clock of the frames",
         )
     upright = make_upright(
         "auto",
