@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -36,7 +37,8 @@ def _picture(entry: Entry, root: Path) -> str | None:
 
 
 def _relative(path: Path | None, root: Path) -> str | None:
-    return None if path is None else path.relative_to(root).as_posix()
+    """Return a file's name below the log, readable in any JSON: what is no UTF-8 in it is replaced."""
+    return None if path is None else os.fsencode(path.relative_to(root).as_posix()).decode("utf-8", "replace")
 
 
 def _known(values: Iterable[Value | None]) -> tuple[Value | None, ...]:

@@ -33,6 +33,7 @@ PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
 """Median depth [m] outside of which the depth unit is doubted; by eye."""
 LARGE_STEP = 1.0
 """Step of the camera between two frames [m] that is reported; by eye."""
+NO_POSES = "frames have no poses"
 LIT_EVERY, DARK = 10, 8.0
 """Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
 
@@ -323,8 +324,8 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
     step = max((largest_step(poses[names == name]) for name in sorted(set(written.pose_cameras))), default=0.0)
     if step > LARGE_STEP:
         notes.append(f"WARNING: the camera jumps {step:.2f} m between two frames")
-    if written.times and not written.poses and "pose" not in source.missing:
-        notes.append("frames have no poses")
+    if written.times and not written.poses and not any(note.startswith(NO_POSES) for note in source.notes):
+        notes.append(NO_POSES)
     if written.times and "color" not in written.streams:
         notes.append(
             "WARNING: frames have no colour: what is mapped has the shape that depth gives, names are guessed from "

@@ -100,6 +100,10 @@ FILES = {
     "log.zip": ("an archive", b"PK\x03\x04"),
     "log.tar.gz": ("an archive", b"\x1f\x8b"),
     "scan.glb": ("a scan", b"glTF"),
+    "log.vrs": ("a Project Aria recording", b"VisionRe"),
+    "log.rrd": ("a Rerun recording", b"RRF2"),
+    "log.h5": ("a table of arrays", b"\x89HDF"),
+    "own.tum": ("a trajectory, no recording", b"1.0 0 0 0 0 0 0 1"),
 }
 
 

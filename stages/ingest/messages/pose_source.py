@@ -63,6 +63,14 @@ class PoseSource:
                 return reason
         return ""
 
+    def gap_at(self, frame: str, stamp: int) -> int:
+        """Return the largest gap [ns] that has to be interpolated over for the pose of a frame at a stamp [ns]."""
+        if self.poses is None:
+            return self.tree.gap_at(self.world, frame, stamp)
+        pairs = ((self.child, frame), (self.world, self.poses.frame_id))
+        gaps = [self.tree.gap_at(*pair, stamp) for pair in pairs if pair[0] != pair[1]]
+        return max([self.poses.track.gap_at(stamp), *gaps])
+
     def _between(self, target: str, source: str, stamp: int) -> np.ndarray | None:
         if target == source:
             return np.eye(4)

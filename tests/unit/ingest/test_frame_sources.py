@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,6 +60,13 @@ def test_stamps_are_the_log_s_own_and_pictures_left_out_are_named(tmp_path: Path
         left_out=tuple(f"rgb/{stamp_text(k)}.png" for k in (1, 3)),
     )
     assert sequence.info.start_time == pytest.approx(float(stamp_text(0, 0.004)), abs=1e-6)  # of the depth
+
+
+def test_names_that_are_no_utf8_are_written_all_the_same(tmp_path: Path) -> None:
+    log = write_redwood(tmp_path / "log", frames(2))
+    (log / "image" / "00001.jpg").rename(os.fsdecode(os.fsencode(log / "image") + b"/00001\xff.jpg"))
+    ingest(log, tmp_path / "out")
+    assert FrameSources.read(tmp_path / "out" / "sources.json").color == ("image/00000.jpg", "image/00001\ufffd.jpg")
 
 
 def test_lists_of_different_lengths_are_refused(tmp_path: Path) -> None:

@@ -78,7 +78,9 @@ def test_gap_in_the_transforms_costs_the_frames_within_it(tmp_path: Path) -> Non
         _images(log, 20)
     info = ingest(log.path, tmp_path / "out", gravity="none").info
     assert info.drops == {"missing_pose": 10} and info.frame_count == 10
-    assert any("10 of 20 frames have no pose" in note and "2.1 s apart there" in note for note in info.notes)
+    (note,) = (note for note in info.notes if "10 of 20 frames have no pose" in note)
+    assert "2.1 s apart there (--maximum-transform-gap 2.1 interpolates)" in note
+    assert ingest(log.path, tmp_path / "advised", gravity="none", maximum_transform_gap=2.1).info.drops == {}
 
 
 def test_static_transforms_alone_are_no_poses(tmp_path: Path) -> None:

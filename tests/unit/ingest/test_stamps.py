@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from scenewright.stages.ingest.detection import open_log
 from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.preflight.inspection import inspect_log
 from scenewright.stages.ingest.source import LogSource
 from scenewright.stages.kit.formats.stamps import read_column
+from scenewright.stages.kit.progress import SilentProgress
 
 from tests.unit.ingest.folder_writers import FIRST_STAMP, write_image_folder, write_nerfstudio, write_tum
 from tests.unit.ingest.tiny_room import frames
@@ -116,3 +118,11 @@ def test_key_frames_far_apart_name_the_option_that_helps_and_it_does(tmp_path: P
     assert posed == 2 and "10 of 12 frames have no pose" in notes
     advised = re.search(r"--maximum-transform-gap ([0-9.]+) interpolates", notes)
     assert advised is not None and opened(log, maximum_transform_gap=float(advised[1]))[1] == COUNT
+
+
+def test_inspect_says_so_too(tmp_path: Path) -> None:
+    log = write_tum(tmp_path / "log", frames(COUNT))
+    restamped(log / "groundtruth.txt", "+3600")
+    report = inspect_log(log, IngestParameters(), 4, SilentProgress()).report
+    (finding,) = (finding for finding in report.findings if finding.check == "poses")
+    assert "begin 3600 s after the frames" in finding.message

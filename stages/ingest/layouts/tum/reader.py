@@ -136,7 +136,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if poses:
         streams.append(text_stream("groundtruth.txt", "pose", len(poses.stamps), poses.stamps))
     camera = SourceCamera("camera", recorded.camera)
-    return LogSource("tum", rule, (camera,), tuple(entries), notes, streams=tuple(streams))
+    missing = {} if any(posed) or not covered else {"pose": "; ".join(covered).removeprefix("WARNING: ")}
+    return LogSource("tum", rule, (camera,), tuple(entries), notes, streams=tuple(streams), missing=missing)
 
 
 def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
