@@ -157,7 +157,7 @@ FOLDERS: tuple[tuple[Foreign, Callable[[Path], bool]], ...] = (
     (
         Foreign(
             "a Stray Scanner recording",
-            "make a ROS bag of it with StrayVisualizer: python create_rosbag.py THIS --out OUT.bag, then ingest OUT.bag",
+            "make a ROS bag of it: python create_rosbag.py THIS --out OUT.bag (StrayVisualizer), then ingest OUT.bag",
         ),
         _is_stray_scanner,
     ),
