@@ -65,8 +65,8 @@ def coverage_notes(
 
 
 def _are_rounded(stamps: np.ndarray, frames: np.ndarray) -> bool:
-    """Whether stamps of poses [ns] repeat, or are whole seconds while those of the frames are not."""
-    repeat = len(np.unique(stamps)) < len(stamps)
+    """Whether most stamps of poses [ns] repeat others, or all are whole seconds while those of the frames are not."""
+    repeat = 2 * len(np.unique(stamps)) <= len(stamps)
     return repeat or bool((stamps % 10**9 == 0).all() and (frames % 10**9 != 0).any())
 
 

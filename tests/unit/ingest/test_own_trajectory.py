@@ -11,6 +11,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.engine.reading import open_outside
 from scenewright.stages.engine.runner import _open_inputs
+from scenewright.stages.evaluate.stage import _trajectory as evaluated
 from scenewright.stages.fuse.parameters import STAGE as FUSE
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.stage import run
@@ -21,6 +22,7 @@ from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
 
 from tests.unit.ingest.folder_writers import stamp_text, tum_line, write_nerfstudio, write_tum
+from tests.unit.ingest.message_logs import FIRST, SECOND, record_room, recorder
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import frames
 
@@ -91,6 +93,22 @@ def test_poses_may_be_named_by_the_pictures_of_the_log(tmp_path: Path) -> None:
     np.testing.assert_allclose(poses_of(made), [pose for *_, pose in recorded], atol=1e-6)
 
 
+@pytest.mark.parametrize("digits", [0, 3, 6, 9])
+def test_a_bag_takes_one_whatever_its_own_transforms_say(tmp_path: Path, digits: int) -> None:
+    recorded = frames(COUNT)
+    with recorder(tmp_path / "bag") as bag:
+        record_room(bag, [(color, depth, np.eye(4)) for color, depth, _ in recorded])
+    stamps = (
+        [(FIRST + k * SECOND // 10) // 10 ** (9 - digits) for k in range(COUNT)]
+        if digits
+        else [f"{FIRST // SECOND + k / 10:.6f}" for k in range(COUNT)]
+    )
+    rows = [tum_line(str(stamp), pose) for stamp, (*_, pose) in zip(stamps, recorded, strict=True)]
+    (tmp_path / "own.tum").write_text("\n".join(rows))
+    made = with_trajectory(bag.path, tmp_path / "own.tum", tmp_path / "out", gravity="none")
+    np.testing.assert_allclose(poses_of(made), [pose for *_, pose in recorded], atol=1e-6)
+
+
 @pytest.mark.parametrize("take", ["ingest", "fuse"])
 def test_another_clock_is_refused_with_the_offset(tmp_path: Path, log: Path, take: str) -> None:
     path = tmp_path / "own.tum"
@@ -120,6 +138,7 @@ def test_steps_take_a_file_in_place_of_an_artifact(tmp_path: Path, log: Path, in
     np.testing.assert_allclose(inverse(found[0]) @ found[-1], inverse(true[0]) @ true[-1], atol=1e-6)
     np.testing.assert_allclose(found[:, 2, :3], true[:, 2, :3], atol=0.03)
     assert open_outside(tmp_path, Trajectory) is None and open_outside(path, Sequence) is None
+    assert len(evaluated(open_outside(path, Trajectory))[0]) == COUNT  # type: ignore[index]
     (opened,) = _open_inputs(FUSE, {"trajectory": path})
     assert opened.kind == "external" and isinstance(opened.value, Trajectory) and not opened.was_written()
     with pytest.raises(BadInput, match=r"neither an artifact nor trajectory\.tum"):

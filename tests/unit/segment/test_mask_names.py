@@ -68,6 +68,11 @@ def test_numbers_count_when_no_name_is_the_log_s() -> None:
     assert late.places == {k + 1: k for k in range(COUNT - 1)} and "begin at 1" in late.warnings[0]
 
 
+def test_names_of_an_export_are_not_those_of_a_log() -> None:
+    matching = match([f"frame_{k:06d}" for k in range(1, COUNT)], sources("frame_{:05d}.png"))
+    assert matching.places == {k: k - 1 for k in range(1, COUNT)} and matching.ways == {"number": COUNT - 1}
+
+
 def test_masks_counted_from_0_for_pictures_counted_from_1() -> None:
     names = [f"frame_{k:05d}" for k in range(COUNT)]
     matching = match(names, sources("frame_{:05d}.jpg"))

@@ -61,8 +61,10 @@ def _file_of(name: str) -> str:
 
 
 def _words_of(name: str) -> str:
-    words = WORDS.findall(_file_of(name).lower())
-    return " ".join(str(int(word)) if word.isdecimal() else word for word in words if word not in OF_NO_MATTER)
+    """Return the words of a name that tell pictures apart. Leading zeros do not, but in numbers of six digits and more,
+    which artifacts and exports have: `frame_000007` of an export is not the log's `frame_00007`."""
+    words = [word for word in WORDS.findall(_file_of(name).lower()) if word not in OF_NO_MATTER]
+    return " ".join(str(int(word)) if word.isdecimal() and len(word) < 6 else word for word in words)
 
 
 def _by_form(pictures: Iterable[tuple[str, int]], form: Callable[[str], str]) -> dict[str, int]:
