@@ -12,6 +12,9 @@ from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, covera
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, LogSource
 
+MICROSECOND = 1000
+"""[ns]"""
+
 
 def with_own_poses(source: LogSource, path: Path, parameters: IngestParameters) -> LogSource:
     """Return the log with the poses of a trajectory, a file or a folder that holds one, taken as world_from_camera.
@@ -53,5 +56,9 @@ def _name_of(entry: Entry) -> str:
 
 
 def _pose_at(poses: StampedPoses, entry: Entry, parameters: IngestParameters) -> np.ndarray | None:
-    pose = poses.at(round(entry.time * 1e9), parameters)
-    return poses.at(entry.stamp, parameters) if pose is None and entry.stamp is not None else pose
+    """Return the pose at the time of a frame, which float seconds have to a microsecond, else at its picture's."""
+    time = round(entry.time * 1e9)
+    stamp = time if entry.stamp is None else entry.stamp
+    first, second = (stamp, time) if abs(stamp - time) < MICROSECOND else (time, stamp)
+    pose = poses.at(first, parameters)
+    return poses.at(second, parameters) if pose is None else pose
