@@ -85,8 +85,8 @@ def frame_entries(
         if unused > 0:
             notes.append(f"{unused} depth images without a colour image of their own were left")
     if poses is not None and without_pose:
-        needed = math.ceil(max(poses.gap_at(geometry.frame, stamp) for stamp in without_pose) / 1e7) / 100
-        helps = f" (--maximum-transform-gap {needed:g} interpolates)" if needed * 1e9 > poses.gap else ""
+        gap = math.ceil(max(poses.gap_at(geometry.frame, stamp) for stamp in without_pose) / 1e7) / 100
+        helps = f" (--maximum-transform-gap {gap:g} interpolates)" if gap * 1e9 > poses.gap else ""
         notes.append(
             f"{len(without_pose)} of {len(entries)} frames have no pose, the first at {without_pose[0] * 1e-9:.3f} s: "
             f"{poses.why_not(geometry.frame, without_pose[0])}{helps}"

@@ -96,8 +96,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         unit_note = "depth computed from the disparity: Z = fx * baseline / (disparity + doffs)"
     times, time_note = _times(root, names, video, parameters)
     pictures = [color or depth for color, depth in zip(images.colors, images.depths, strict=True)]
-    files = [path.stem if path else name for path, name in zip(pictures, images.names, strict=True)]
-    poses, pose_notes = _poses(root, names, files, times, calibration, parameters)
+    stems = [path.stem if path else name for path, name in zip(pictures, images.names, strict=True)]
+    poses, pose_notes = _poses(root, names, stems, times, calibration, parameters)
     entries = []
     for index, name in enumerate(names):
         pose, problem = poses[index]
