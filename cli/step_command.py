@@ -81,6 +81,8 @@ def _input_options(stage: Stage) -> list[inspect.Parameter]:
         optional = isinstance(declared, Optionally)
         kind = declared.what if isinstance(declared, Optionally) else declared
         text = kind.description if isinstance(kind, External) else f"Artifact {kind.kind}: {kind.description}"
+        if not isinstance(kind, External) and kind.outside:
+            text += f"; or a file like {kind.outside} of one's own"
         flag = "--" + role.replace("_", "-")
         optional = optional or role == stage.argument
         annotation = Optional[Path] if optional else Path  # noqa: UP045

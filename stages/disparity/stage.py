@@ -201,6 +201,8 @@ def _finish(
             "color_depth_registered": True,
         }
     ).write(context.output / "sequence.json")
+    if sequence.sources is not None:
+        sequence.sources.of_frames(each.input_frame for each in written.frames).write(context.output / "sources.json")
     DisparityFile(
         method=parameters.method,
         detail=detail,

@@ -9,9 +9,13 @@ from typing import NamedTuple
 
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.eye_order import settled_eyes
+from scenewright.stages.ingest.foreign import refuse_foreign_file, refuse_foreign_folder, refuse_lone_recording
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.registry import LogLayout, all_layouts
 from scenewright.stages.ingest.source import LogSource
+
+OF_ANY_IMAGES = "images"
+"""The layout that matches any folder with images, and so those of other tools."""
 
 
 class LogFormat(NamedTuple):
@@ -34,9 +38,14 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
     if not path.exists():
         raise BadInput(f"{path}: there is no such log", hint="check the path")
     layouts = [layout for layout in all_layouts() if parameters.format in ("auto", layout.name)]
+    guessed = parameters.format == "auto"
+    if guessed and path.is_file():
+        refuse_foreign_file(path)
     for layout in layouts:
         reader = log_format(layout)
         rule = reader.matches(path)
+        if rule is not None and guessed and layout.name == OF_ANY_IMAGES:
+            refuse_foreign_folder(path)
         if rule is not None:
             source = reader.open_source(path, parameters, rule)
             try:
@@ -44,6 +53,9 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
             except BaseException:
                 source.close()
                 raise
+    if path.is_dir():
+        refuse_foreign_folder(path)
+        refuse_lone_recording(path)
     names = ", ".join(layout.name for layout in layouts)
     kind = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
     raise BadInput(

@@ -10,8 +10,9 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.parameters import DepthBits
 from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.formats.exif import TRANSPOSED, orientation_of, turned
 from scenewright.stages.kit.formats.foxglove import JPEG_START, PNG_START, decode_color, depth_to_millimetres
-from scenewright.stages.kit.formats.image_headers import may_be_decoded
+from scenewright.stages.kit.formats.image_headers import image_size, may_be_decoded
 
 INVALID_DEPTH = 65535
 """16-bit depth that some cameras write for "nothing measured" [stored units]."""
@@ -37,12 +38,32 @@ def usable_color(data: bytes, camera: Camera) -> np.ndarray | bytes:
 
     A picture of another size and the same aspect ratio is resized. Raises Unusable.
     """
-    image = decode_color(data)
+    image = decode_as_calibrated(data, (camera.width, camera.height))
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes")
+    if orientation_of(data) in TRANSPOSED and image_size(data) != (image.shape[1], image.shape[0]):
+        return fitted_color(image, camera)
     if image.shape[:2] == (camera.height, camera.width) and _is_plain(data):
         return data
     return fitted_color(image, camera)
+
+
+def decode_as_calibrated(data: bytes, size: tuple[int, int]) -> np.ndarray | None:
+    """Return the picture in some bytes, (H, W, 3) uint8 RGB, None when it cannot be decoded.
+
+    Calibrations are of the pixels as they are stored. Only where pictures of `size` (width, height) have another shape,
+    and the EXIF orientation gives it that shape, the calibration is of the picture as it is looked at: it is turned.
+    """
+    image = decode_color(data)
+    if image is None or (orientation := orientation_of(data)) not in TRANSPOSED:
+        return image
+    stored, looked_at = (image.shape[1], image.shape[0]), (image.shape[0], image.shape[1])
+    return turned(image, orientation) if _alike(looked_at, size) and not _alike(stored, size) else image
+
+
+def _alike(first: tuple[int, int], second: tuple[int, int]) -> bool:
+    """Whether two sizes are of one shape, to a pixel."""
+    return abs(first[0] * second[1] - first[1] * second[0]) <= max(*first, *second)
 
 
 def _is_plain(data: bytes) -> bool:

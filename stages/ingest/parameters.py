@@ -10,7 +10,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.pose_convention_names import PoseConvention
 from scenewright.stages.ingest.registry import all_layouts
 from scenewright.stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
-from scenewright.stages.kit.stage import External, Parameters, Stage
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 if TYPE_CHECKING:
     LogFormatName = str
@@ -119,7 +119,10 @@ STAGE = Stage(
     name="ingest",
     summary="Turn a camera log into a sequence: calibrated, posed, gravity-aligned frames",
     parameters=IngestParameters,
-    reads={"log": External("log: a file (MCAP, bag) or a folder")},
+    reads={
+        "log": External("log: a file (MCAP, bag) or a folder"),
+        "trajectory": Optionally(External("Own poses instead of the log's: lines `t tx ty tz qx qy qz qw` (TUM)")),
+    },
     writes=Sequence,
     libraries=(
         "numpy",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,14 @@ class Unusable(Exception):
         super().__init__(f"{reason}: {detail}" if detail else reason)
         self.reason = reason
         self.detail = detail
+
+
+@dataclass(frozen=True)
+class FrameFiles:
+    """The files of one frame. None is a file that is missing, or a log that has none."""
+
+    color: Path | None = None
+    depth: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,9 @@ class Entry:
     problem: str | None = None
     """Reason for which the frame is known to be unusable without loading it."""
     camera_name: str = "camera"
+    files: FrameFiles = FrameFiles()
+    stamp: int | None = None
+    """Time of its picture as the log states it, of its depth where there is none [ns]."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +124,8 @@ class LogSource:
     streams: tuple[StreamInfo, ...] = ()
     other_cameras: tuple[str, ...] = ()
     """Cameras of the log that were not asked for."""
+    missing: Mapping[str, str] = field(default_factory=dict)
+    """Stream (`depth`, `pose`) that the log lacks -> why, where it holds something of the kind."""
     close: Callable[[], None] = field(default=lambda: None)
 
     @property

@@ -30,6 +30,8 @@ NAMES = tuple(
 ) + ("camera-intrinsics.txt", "K.txt", "sensor.yaml", "camchain.yaml")
 PAIR_NAMES = (("left.yaml", "right.yaml"), ("left.yml", "right.yml"), ("cam0/sensor.yaml", "cam1/sensor.yaml"))
 """One file for each eye."""
+EXTRINSICS = ("extrinsics.yml", "extrinsics.yaml", "extrinsic.yml", "extrinsic.yaml")
+"""What OpenCV's stereo calibration writes beside intrinsics.yml: R and T."""
 LARGEST_FILE = 256_000
 """Bytes of a calibration file: its parser is slow, and it holds some dozens of numbers."""
 OPENCV_TAG = re.compile(r"!!opencv-matrix\b")
@@ -170,6 +172,17 @@ def _camera_of(document: dict[Any, Any], path: Path) -> CalibrationRecord:
 
 def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) -> FolderCalibration:
     """Return the pair in OpenCV's stereo calibration: a point is x_right = R x_left + T."""
+    notes: tuple[str, ...] = ()
+    if "R" not in document or "T" not in document:
+        beside = next((path.parent / name for name in EXTRINSICS if (path.parent / name).is_file()), None)
+        if beside is None:
+            raise BadInput(
+                f"{path}: has no R and T, which say how the two cameras stand to each other",
+                hint=f"put OpenCV's {EXTRINSICS[0]} of the same calibration beside it",
+            )
+        found = _read_yaml(beside)
+        document = {**(found if isinstance(found, dict) else {}), **document}
+        path, notes = beside, (f"R and T read from {beside.name}",)
     size = _size(document, path)
     records = []
     for name, number in ((first, "1"), (second, "2")):
@@ -180,9 +193,12 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
         records.append(_record(matrix, size, path, coefficients, "plumb_bob"))
     rotation, offset = _matrix(document.get("R"), 3, 3), _numbers(document.get("T"))
     if rotation is None or offset is None or len(offset) != 3 or not is_rigid(transform_from(rotation, np.zeros(3))):
-        raise BadInput(f"{path}: R and T do not say how the two cameras stand to each other")
+        raise BadInput(
+            f"{path}: R and T do not say how the two cameras stand to each other",
+            hint="R is a 3x3 rotation and T three numbers, x_right = R x_left + T",
+        )
     left_from_right = inverse(transform_from(rotation, np.array(offset)))
-    return FolderCalibration(records[0], records[1], left_from_right)
+    return FolderCalibration(records[0], records[1], left_from_right, notes=notes)
 
 
 def _kalibr(document: dict[Any, Any], path: Path) -> FolderCalibration:

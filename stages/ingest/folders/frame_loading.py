@@ -10,17 +10,14 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import file_bytes, raw_depth
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, undistorted
-from scenewright.stages.ingest.images import DepthForm, depth_millimetres, fitted_color, usable_color
-from scenewright.stages.ingest.source import LoadedFrame, Unusable
-from scenewright.stages.kit.formats.foxglove import decode_color
-
-
-@dataclass(frozen=True)
-class FrameFiles:
-    """The files of one frame. None is a file that is missing."""
-
-    color: Path | None = None
-    depth: Path | None = None
+from scenewright.stages.ingest.images import (
+    DepthForm,
+    decode_as_calibrated,
+    depth_millimetres,
+    fitted_color,
+    usable_color,
+)
+from scenewright.stages.ingest.source import FrameFiles, LoadedFrame, Unusable
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ def loaded_color(path: Path | None, recorded: RecordedCamera, camera: Camera, st
     data = file_bytes(path, stream)
     if recorded.lens.is_pinhole and recorded.camera == camera:
         return usable_color(data, camera)
-    image = decode_color(data)
+    image = decode_as_calibrated(data, (recorded.camera.width, recorded.camera.height))
     if image is None:
         raise Unusable(f"undecodable_{stream}", f"{path.name}: {len(data)} bytes")
     return undistorted(fitted_color(image, recorded.camera), recorded, camera, smooth=True)

@@ -12,6 +12,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.manifest import MANIFEST_NAME
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.detection import log_format, open_log
+from scenewright.stages.ingest.foreign import refuse_foreign_folder, refuse_lone_recording
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
 from scenewright.stages.ingest.preflight.bits import bits_finding
@@ -116,6 +117,8 @@ def _refuse_what_is_nothing(path: Path, parameters: IngestParameters) -> None:
     if not (path.is_dir() and parameters.format == "auto"):
         return
     if not any(log_format(layout).matches(path) for layout in all_layouts()):
+        refuse_foreign_folder(path)
+        refuse_lone_recording(path)
         raise BadInput(
             f"{path}: not an artifact (no {MANIFEST_NAME}), and no log in a format that is known",
             hint="docs/LOGS.md describes the layouts",
@@ -434,16 +437,19 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
     def add(severity: Severity, check: str, message: str, fix: str = "") -> None:
         findings.append(Finding(severity=severity, check=check, message=message, fix=fix))
 
+    def why(stream: str) -> str:
+        return f" ({source.missing[stream]})" if stream in source.missing else ""
+
     if "depth" not in streams and not stereo:
         advice = "record depth; colour alone can only be looked at"
-        add("wasted", "depth", "there is no depth and no stereo pair with a baseline", advice)
+        add("wasted", "depth", f"there is no depth and no stereo pair with a baseline{why('depth')}", advice)
     elif "depth" not in streams:
         add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")
     if "color" not in streams:
         add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes")
     if "pose" not in streams:
-        advice = "run reconstruct-without-poses, which estimates them, or give fuse a --trajectory"
-        add("doubtful", "poses", "the frames have no poses: fuse needs them", advice)
+        advice = "run reconstruct-without-poses, which estimates them, or give ingest or fuse your own --trajectory"
+        add("doubtful", "poses", f"the frames have no poses, which fuse needs{why('pose')}", advice)
     return findings
 
 

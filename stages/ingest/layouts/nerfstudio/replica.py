@@ -21,7 +21,7 @@ from scenewright.stages.ingest.folders.files import (
     text_stream,
 )
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import number_rows
 
 TRAJECTORY, RESULTS, CAMERA = "traj.txt", "results", "cam_params.json"
@@ -63,6 +63,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             number / parameters.frame_rate,
             rows[number][1].reshape(4, 4) if number < len(rows) else None,
             image_loader(colors.get(number), depths.get(number), camera, form, has_color=bool(colors)),
+            files=FrameFiles(colors.get(number), depths.get(number)),
         )
         for number in numbers
     )

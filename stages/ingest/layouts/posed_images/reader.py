@@ -27,7 +27,7 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.pose_files import columns_of
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import number_rows, transform_from_numbers
 
 COLOR_FOLDERS = ("color", "rgb", "image")
@@ -56,12 +56,13 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if len(rows) != len(stems):
         raise BadInput(f"{pose_file}: {len(rows)} poses for {len(stems)} images", hint="one line an image, in order")
     camera = camera_from_options(depth_image_size(list(depths.values())), parameters, f"{root}: posed images")
-    form, unit_note = depth_form(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0, depths.values())
     entries = []
     for index, (stem, (line, numbers)) in enumerate(zip(stems, rows, strict=True)):
         pose, problem = _pose(numbers, f"{pose_file}: line {line}")
-        loader = image_loader(colors.get(stem), depths.get(stem), camera, form, has_color=bool(colors))
-        entries.append(Entry(stem, index / parameters.frame_rate, pose, loader, problem))
+        files = FrameFiles(colors.get(stem), depths.get(stem))
+        loader = image_loader(files.color, files.depth, camera, form, has_color=bool(colors))
+        entries.append(Entry(stem, index / parameters.frame_rate, pose, loader, problem, files=files))
     notes = (
         "intrinsics given by option",
         unit_note,

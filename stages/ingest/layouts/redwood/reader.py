@@ -22,7 +22,7 @@ from scenewright.stages.ingest.folders.files import (
     text_stream,
 )
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_open3d_log
 
 COLOR_FOLDERS = ("image", "color", "rgb")
@@ -48,7 +48,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     poses = read_open3d_log(root / TRAJECTORY)
     camera, notes = _camera(root, depth_image_size(depths))
     camera, notes_of_options = overridden(camera, parameters)
-    form, unit_note = depth_form(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0, depths)
     if colors and len(colors) != len(depths):
         raise BadInput(
             f"{root}: {len(colors)} colour and {len(depths)} depth images are not pairs",
@@ -63,6 +63,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             time=index / parameters.frame_rate,
             world_from_camera=poses[index] if index < len(poses) else None,
             load=image_loader(color, depth, camera, form, has_color=bool(colors)),
+            files=FrameFiles(color, depth),
         )
         for index, (color, depth) in enumerate(zip(paired, depths, strict=True))
     )

@@ -31,7 +31,7 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.images import DepthForm, usable_color, usable_depth
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
+from scenewright.stages.ingest.source import Entry, FrameFiles, LoadedFrame, LogSource, SourceCamera, Unusable
 from scenewright.stages.kit.formats.trajectories import read_matrix, read_text
 
 INTRINSIC_FILES = ("intrinsic/intrinsic_depth.txt", "intrinsic_depth.txt")
@@ -83,7 +83,8 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         load = _loader(colors.get(number), depths.get(number), color_camera, camera, form)
         if color_camera is not None and calibration.color != camera:
             load = registered_loader(load, camera, calibration.color, np.eye(4))
-        entries.append(Entry(f"frame {number}", number / parameters.frame_rate, pose, load, problem))
+        files = FrameFiles(colors.get(number), depths.get(number))
+        entries.append(Entry(f"frame {number}", number / parameters.frame_rate, pose, load, problem, files=files))
     stray = len(poses.keys() - colors.keys() - depths.keys())
     notes = (
         *calibration.notes,

@@ -11,7 +11,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.color_registration import registered_loader
 from scenewright.stages.ingest.folders.files import depth_form, depth_image_size, image_loader, overridden, stream
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_matrix
 from scenewright.stages.kit.geometry.transforms import transform_from
 
@@ -47,7 +47,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     size = depth_image_size([images["depth"] for _, images in sorted(files.items()) if "depth" in images])
     camera, notes = _camera(root, size)
     camera, notes_of_options = overridden(camera, parameters)
-    form, unit_note = depth_form(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0, [images.get("depth") for _, images in sorted(files.items())])
     theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
     register = parameters.register_color and theirs
     has_color = any("color" in images for images in files.values())
@@ -65,6 +65,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
                 world_from_camera=pose,
                 load=load,
                 problem=problem,
+                files=FrameFiles(images.get("color"), images.get("depth")),
             )
         )
     notes = (

@@ -27,11 +27,12 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
-from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes, read_stamped_poses, scaled
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
+from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.formats.trajectories import read_text
 
 COLOR_LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
@@ -60,6 +61,8 @@ class _Stamped:
     stamps: np.ndarray
     """(N,) int64 [ns], ascending."""
     paths: tuple[Path, ...]
+    note: str = ""
+    """What the stamps were taken for, for people."""
 
 
 def matches(root: Path) -> str | None:
@@ -86,7 +89,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
     recorded, notes = _camera(root, size, parameters, icl_nuim)
     recorded, notes_of_options = overridden_recording(recorded, parameters)
-    stored, unit_note = depth_form(parameters, UNITS_PER_METRE)
+    stored, unit_note = depth_form(parameters, UNITS_PER_METRE, depths.paths)
     form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), stored)
     tolerance = round(parameters.maximum_time_difference * 1e9)
     main_list = colors if colors.paths else depths
@@ -101,14 +104,29 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if pose is not None and icl_nuim:
             pose = MIRROR @ pose @ MIRROR
         problem = "no_depth_within_tolerance" if missing else None
-        load = frame_loader(FrameFiles(path if colors.paths else None, depth), form)
-        entries.append(Entry(str(path.relative_to(root)), moment * 1e-9, pose, load, problem))
+        files = FrameFiles(path if colors.paths else None, depth)
+        own_stamp = None if icl_nuim else int(stamp)
+        entries.append(
+            Entry(
+                str(path.relative_to(root)),
+                moment * 1e-9,
+                pose,
+                frame_loader(files, form),
+                problem,
+                files=files,
+                stamp=own_stamp,
+            )
+        )
+    posed = [entry.world_from_camera is not None for entry in entries]
+    covered = coverage_notes(poses, [round(entry.time * 1e9) for entry in entries], posed, parameters) if poses else ()
     unpaired = len(depths.paths) - int((partners >= 0).sum())
     notes = (
         *notes,
         *notes_of_options,
         *((unit_note,) if depths.paths else ()),
+        *dict.fromkeys(f"images: {images.note}" for images in (colors, depths) if images.note),
         *(poses.notes if poses else ()),
+        *covered,
         *((f"{unpaired} depth images are paired with no colour image",) if unpaired else ()),
         *(_icl_notes(parameters) if icl_nuim else ()),
     )
@@ -118,7 +136,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if poses:
         streams.append(text_stream("groundtruth.txt", "pose", len(poses.stamps), poses.stamps))
     camera = SourceCamera("camera", recorded.camera)
-    return LogSource("tum", rule, (camera,), tuple(entries), notes, streams=tuple(streams))
+    missing = {} if any(posed) or not covered else {"pose": "; ".join(covered).removeprefix("WARNING: ")}
+    return LogSource("tum", rule, (camera,), tuple(entries), notes, streams=tuple(streams), missing=missing)
 
 
 def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
@@ -130,27 +149,32 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
             for name in (COLOR_LIST, DEPTH_LIST)
         )
         return colors, depths
-    columns: tuple[tuple[list[int], list[Path]], ...] = (([], []), ([], []))
+    columns: tuple[list[tuple[str, str, str]], ...] = ([], [])
     for where, fields in _rows(path):
         if len(fields) != 4:
             raise BadInput(f"{where}: {len(fields)} columns, expected stamp, name, stamp, name")
         pairs = [(fields[0], fields[1]), (fields[2], fields[3])]
         if "depth" in fields[1].split("/")[0] and "depth" not in fields[3].split("/")[0]:
             pairs.reverse()  # ICL-NUIM lists depth first
-        for (stamps, paths), (stamp, name) in zip(columns, pairs, strict=True):
-            stamps.append(round(exact_stamp(stamp, where) * unit))
-            paths.append(named_file(root, name, where))
-    return _sort_by_time(*columns[0]), _sort_by_time(*columns[1])
+        for column, (stamp, name) in zip(columns, pairs, strict=True):
+            column.append((where, stamp, name))
+    return _stamped(root, columns[0], unit), _stamped(root, columns[1], unit)
 
 
 def _read_list(root: Path, name: str, unit: float) -> _Stamped:
-    stamps, paths = [], []
+    rows = []
     for where, fields in _rows(root / name, maximum_splits=1):
         if len(fields) != 2:
             raise BadInput(f"{where}: expected a time stamp and a file name")
-        stamps.append(round(exact_stamp(fields[0], where) * unit))
-        paths.append(named_file(root, fields[1].strip(), where))
-    return _sort_by_time(stamps, paths)
+        rows.append((where, fields[0], fields[1].strip()))
+    return _stamped(root, rows, unit)
+
+
+def _stamped(root: Path, rows: list[tuple[str, str, str]], unit: float) -> _Stamped:
+    """Return the images of rows (place, stamp, name)."""
+    column = exact_stamps([stamp for _, stamp, _ in rows], [where for where, _, _ in rows])
+    stamps = [scaled(stamp, unit) for stamp in column.stamps if stamp is not None]
+    return _sort_by_time(stamps, [named_file(root, name, where) for where, _, name in rows], column.note)
 
 
 def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
@@ -163,9 +187,9 @@ def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
     ]
 
 
-def _sort_by_time(stamps: list[int], paths: list[Path]) -> _Stamped:
+def _sort_by_time(stamps: list[int], paths: list[Path], note: str = "") -> _Stamped:
     order = sorted(range(len(stamps)), key=lambda index: stamps[index])
-    return _Stamped(np.array([stamps[i] for i in order], np.int64), tuple(paths[i] for i in order))
+    return _Stamped(np.array([stamps[i] for i in order], np.int64), tuple(paths[i] for i in order), note)
 
 
 def _poses(root: Path, unit: float) -> StampedPoses | None:

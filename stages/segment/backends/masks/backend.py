@@ -14,6 +14,7 @@ from scenewright.stages.kit.labels import ANYTHING, Label, LabelSet, match_label
 from scenewright.stages.segment.backends.masks import MasksParameters
 from scenewright.stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
 from scenewright.stages.segment.backends.masks.listing import HINT, Listing
+from scenewright.stages.segment.backends.masks.log_names import log_names
 from scenewright.stages.segment.backends.masks.matching import WAYS, match_pictures
 from scenewright.stages.segment.backends.masks.unread import kinds_of_files, way_of
 from scenewright.stages.segment.choice import BackendRequest
@@ -47,7 +48,7 @@ class MasksBackend:
     streams: tuple[str, ...] = ("depth",)
 
     def __init__(self, request: BackendRequest) -> None:
-        _, reader = request.log()
+        sequence, reader = request.log()
         assert request.masks is not None  # segment.parameters.check
         options = request.own(MasksParameters)
         self._root = request.masks
@@ -55,9 +56,19 @@ class MasksBackend:
         numbered = {label.id: label.name for label in label_set.labels if label.id is not None} if label_set else {}
         listing = Listing(request.masks, numbered)
         form, self._source = open_folder(listing)
-        times = reader.times
-        self._places, match_counts = match_pictures(self._source.pictures, times, options.masks_tolerance, self._root)
-        matches_text = ", ".join(f"{match_counts[matching]} by {matching}" for matching in WAYS)
+        times, own = reader.times, sequence.sources
+        matching = match_pictures(
+            self._source.pictures,
+            times if own is None else own.times_beside(times),
+            options.masks_tolerance,
+            self._root,
+            log_names(own),
+            options.masks_named_like,
+        )
+        self._places = matching.places
+        matches_text = ", ".join(f"{matching.ways[way]} by {way}" for way in WAYS if matching.ways[way]) or "none"
+        for warning in matching.warnings:
+            logger.warning("%s: %s", self._root, warning)
         logger.info(
             "%s: %s, masks of %d of %d frames: %s", self._root, form.name, len(self._places), len(times), matches_text
         )
