@@ -53,12 +53,13 @@ def _not_messages(node: ast.AST) -> Iterator[ast.AST]:
         yield from (entry.value for entry in strings if isinstance(entry.value, ast.Constant))
     elif isinstance(node, ast.Call) and ast.unparse(node.func).rsplit(".", 1)[-1] in DECLARATIONS:
         yield from ast.walk(node)
-    elif isinstance(node, ast.JoinedStr | ast.BinOp) and _text(node) is not None:
+    elif isinstance(node, ast.JoinedStr | ast.BinOp | ast.Call) and _text(node) is not None:
         yield from (inner for inner in ast.walk(node) if inner is not node)
 
 
 def _text(node: ast.AST) -> str | None:
-    """Return the text of a string, a formatted string or a sum of them; None for anything else."""
+    """Return the text of a string, a formatted string, a sum of them, or an error that is made of two of them (a
+    message and its hint); None for anything else."""
     if isinstance(node, ast.Constant):
         return node.value if isinstance(node.value, str) else None
     if isinstance(node, ast.JoinedStr):
@@ -66,4 +67,7 @@ def _text(node: ast.AST) -> str | None:
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         parts = _text(node.left), _text(node.right)
         return None if parts == (None, None) else "".join("{}" if part is None else part for part in parts)
+    if isinstance(node, ast.Call) and node.args and [keyword.arg for keyword in node.keywords] == ["hint"]:
+        message, hint = _text(node.args[0]), _text(node.keywords[0].value)
+        return None if message is None or hint is None else f"{message} ({hint})"
     return None

@@ -22,6 +22,8 @@ MODULES = [
     for found in pkgutil.iter_modules(tests.advice.table.__path__)
 ]
 ROWS: list[Tried | NotTried] = [row for module in MODULES for row in module.ROWS]
+VALUE = re.compile(r"\{\}|%[.0-9]*[dfgs]")
+"""What stands for a value in a message."""
 
 
 def meant(row: Tried | NotTried) -> list[Message]:
@@ -42,7 +44,7 @@ def test_every_row_is_about_a_message() -> None:
 
 def came_up(row: Tried, output: str) -> bool:
     """Tell whether one of a row's messages is in the output, any value for each `{}`."""
-    patterns = (".*?".join(map(re.escape, message.text.strip().split("{}"))) for message in meant(row))
+    patterns = (".*?".join(map(re.escape, VALUE.split(message.text.strip()))) for message in meant(row))
     return any(re.search(pattern, output, re.DOTALL) for pattern in patterns)
 
 
