@@ -20,7 +20,7 @@ class Tried:
     `path` and a part of its text (`says`) name the message in the source. `first` brings it up and ends with `code`;
     `then` is `first` as the message advises and ends with `then_code`, without the message. Both are command lines as
     for a shell: `NAME=value` in front, `&&` between those that follow each other. A function does what a page or a
-    notebook does; what it returns is said.
+    notebook does, and returns an exit code or what is said.
     """
 
     path: str
@@ -33,9 +33,9 @@ class Tried:
     """What `then` says."""
     lacks: tuple[str, ...] = ()
     """Modules that cannot be imported while `first` runs."""
-    given: Callable[[Path], None] = nothing
+    given: Callable[[Path], object] = nothing
     """Writes the inputs into the folder."""
-    right: Callable[[Path], None] = nothing
+    right: Callable[[Path], object] = nothing
     """Raises AssertionError unless what `then` left in the folder is right."""
 
 

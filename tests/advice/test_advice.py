@@ -109,10 +109,13 @@ def done(line: str) -> int:
 
 
 def called(function: Callable[[], object]) -> int:
-    """Call a function, say what it returns or raises as the command line does, and return the exit code."""
+    """Call a function and return the exit code: its own, or that of what it raises; anything else is said."""
     try:
-        print(function())
+        result = function()
     except ScenewrightError as error:
         print(error)
         return error.exit_code
+    if isinstance(result, int):
+        return result
+    print(result)
     return 0

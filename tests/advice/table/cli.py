@@ -25,9 +25,9 @@ def given_batch(folder: Path) -> None:
     write_batch(folder, {"a": "no log"})
 
 
-def given_ended_array(folder: Path) -> None:
-    """A batch for Slurm whose only scene has ended badly."""
-    spec = write_batch(folder, {"a": "no log"}, '[executor]\nkind = "slurm"\n')
+def given_ended_array(folder: Path, executor: str = "slurm") -> None:
+    """A batch whose only scene has ended badly."""
+    spec = write_batch(folder, {"a": "no log"}, f'[executor]\nkind = "{executor}"\n')
     (job, _), *_ = plan_batch(read_batch(spec), folder / "out")
     (folder / "out").mkdir()
     ResultsFile(folder / "out" / RESULTS_NAME).append(result(job.name, "bad input", fingerprint=job.fingerprint))
@@ -58,12 +58,21 @@ def given_log_without_calibration(folder: Path) -> None:
     shutil.move(folder / "log", folder / "seq-01")
 
 
+CHAIN = """
+name = "chain"
+summary = "one step"
+[variables.log]
+description = "a log"
+[[step]]
+name = "sequence"
+stage = "ingest"
+inputs = { log = "$log" }
+"""
+
+
 def given_tiny_pipeline(folder: Path) -> None:
     """A chain that goes on without frames."""
-    (folder / "chain.toml").write_text(
-        'name = "chain"\nsummary = "one step"\n[variables.log]\ndescription = "a log"\n[[step]]\nname = "sequence"\n'
-        'stage = "ingest"\ninputs = { log = "$log" }\nparameters = { start = 50 }\naccept = ["empty"]\n'
-    )
+    (folder / "chain.toml").write_text(CHAIN + 'parameters = { start = 50 }\naccept = ["empty"]\n')
 
 
 def given_two_artifacts(folder: Path) -> None:

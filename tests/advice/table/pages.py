@@ -83,13 +83,12 @@ def asked(of: Callable[[], str], known: bool = False) -> Callable[[], object]:
     return ask
 
 
-def queried() -> object:
+def queried() -> int:
     """Ask the map with its own encoder."""
     from tests.unit.open_words.stand_ins import ColorEncoder
 
     with mock.patch("scenewright.stages.splat.query_stage.open_encoder", lambda *_: ColorEncoder()):
-        code = run(["splat", "query", "--language", language(), "--text", "red", "--out", "q", "--encoder", "service"])
-    return f"code {code}"
+        return run(["splat", "query", "--language", language(), "--text", "red", "--out", "q", "--encoder", "service"])
 
 
 def given_edits(place: Path) -> None:
@@ -137,7 +136,7 @@ ROWS = [
         right=lambda place: (place / "edits.toml").stat(),
     ),
     Tried(DESK + "desk.py", "scenewright splat language", asked(lambda: room() + "/sequence"), asked(language, True)),
-    Tried(DESK + "asking.py", "scenewright splat query --encoder", asked(language), queried, shows="code 0"),
+    Tried(DESK + "asking.py", "scenewright splat query --encoder", asked(language), queried),
     applied("desk.py", "{} --edits {} --out ...", seen, "map --panoptic-map {seen}"),
     applied("subject.py", "scenewright edit {} {}", seen, "map --panoptic-map {seen}"),
     applied("map_subject.py", "map --panoptic-map", seen, "map --panoptic-map {seen}"),
