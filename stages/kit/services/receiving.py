@@ -72,7 +72,7 @@ class BoundedServer(ThreadingHTTPServer):
         except (OSError, OverflowError) as error:
             raise MachineFailure(
                 f"{host:.80}:{port}: {getattr(error, 'strerror', None) or error}",
-                hint="choose another --port or --host",
+                hint="choose another port or address",
             ) from None
         except (ValueError, TypeError):  # half a character, a zero byte, a label of more than 63 letters
             raise UsageError(f"{host!r:.80} is no name of a host") from None
