@@ -62,6 +62,15 @@ def bare_scene() -> object:
     return apartment_of([], "scene")
 
 
+def goal_in_words() -> object:
+    """Read a goal in words of one's own."""
+    from scenewright.schemas.contact_graph import ContactGraphFile
+    from scenewright.stages.plan.open_goals import named_goal
+
+    graph = ContactGraphFile.read(Path(golden()) / "contact_graph" / "graph.json")
+    return named_goal(('on("red mug","table")',), {}, graph, None)
+
+
 def without_tries() -> int:
     """Draw no packing problem at all."""
     with mock.patch("scenewright.stages.pack.hard_suites.TRIES", 0):
@@ -74,7 +83,9 @@ def given_learned_in_rooms(folder: Path) -> None:
 
     shutil.copytree(Path(golden()) / "learned_domain", folder / "rooms")
     document = json.loads((folder / "rooms" / "domain.json").read_text())
-    (folder / "rooms" / "domain.json").write_text(json.dumps(document | {"setting": "room", "domain": "room"}))
+    nothing: dict[str, list[str]] = {name: [] for name, value in document.items() if isinstance(value, list)}
+    document |= {**nothing, "setting": "room", "domain": "room"}
+    (folder / "rooms" / "domain.json").write_text(json.dumps(document))
     seal(folder / "rooms", "learned_domain")
 
 
@@ -144,33 +155,33 @@ ROWS = [
         code=3,
     ),
     Tried(
-        "stages/plan/stage.py",
+        "stages/plan/parameters.py",
         "--goal and --task cannot be given",
-        PLAN + ON + "--task tidy-the-desk",
+        PLAN + ON + "--task tidy-the-desk --dry-run",
         PLAN + ON + "--dry-run",
     ),
-    NotTried(
-        "stages/plan/stage.py",
-        "--stand has {} values",
-        "it is said once the scene stands in the physics; tests/unit/plan/test_stage.py",
+    Tried(
+        "stages/plan/parameters.py",
+        "--planner fast-downward plans in",
+        PLAN + "--domain own.pddl --planner fast-downward --dry-run",
+        PLAN + "--planner fast-downward --dry-run",
     ),
-    NotTried(
-        "stages/plan/stage.py",
-        "say where it is with --stand",
-        "it is said once the scene stands in the physics; tests/unit/plan/test_stage.py",
-    ),
-    NotTried(
-        "stages/plan/stage.py", "--planner fast-downward plans in", "it is said once the scene stands in the physics"
+    Tried(
+        "stages/plan/parameters.py",
+        "--stand",
+        PLAN + "--stand 1 --stand 2 --dry-run",
+        PLAN + "--stand 1 --stand 2 --stand 90 --dry-run",
     ),
     NotTried(
         "stages/plan/tasks.py",
         "declared with --assume",
         "a planned task of minutes: tests/unit/plan/test_tasks_and_checks.py",
     ),
-    NotTried(
+    Tried(
         "stages/plan/open_goals.py",
         "give --language",
-        "it is said once the scene stands in the physics: tests/unit/plan/test_open_goals.py",
+        goal_in_words,
+        PLAN + """--goal 'on("red mug","table")' --language {golden}/language_map --dry-run""",
     ),
     Tried(
         "stages/predicates/evaluate_stage.py",

@@ -109,7 +109,7 @@ def matched(text: str = "") -> Callable[[], object]:
 
         if text:
             Path("labels.toml").write_text(text)
-        return match_labels({1: "zork"}, read_label_file(Path("labels.toml")) if text else None, where="a.onnx").source
+        return match_labels({1: "zork"}, read_label_file(Path("labels.toml")) if text else None, where="a.onnx")
 
     return match
 

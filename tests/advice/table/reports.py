@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from unittest import mock
@@ -9,7 +10,7 @@ from unittest import mock
 from scenewright.cli.main import run
 from scenewright.stages.report.outlook import Facts, outlook
 
-from tests.advice.inputs import room
+from tests.advice.inputs import golden, room
 from tests.advice.rows import Tried
 
 OUTLOOK = "stages/report/outlook.py"
@@ -21,10 +22,10 @@ def said(role: str, outcome: str = "ok", **summary: object) -> Callable[[], obje
 
 
 def reported(*options: str) -> Callable[[], int]:
-    """Return what writes a report that may have 60 kB."""
+    """Return what writes a report that may have 40 kB."""
 
     def report() -> int:
-        with mock.patch("scenewright.stages.report.stage.MAXIMUM_BYTES", 60_000):
+        with mock.patch("scenewright.stages.report.stage.MAXIMUM_BYTES", 40_000):
             return run(["report", "--sequence", f"{room()}/sequence", "--out", "page", *options])
 
     return report
@@ -38,15 +39,10 @@ def motions() -> object:
 
 
 def given_mjcf(folder: Path) -> None:
-    """A scene in which nothing moves."""
-    import json
-
-    from tests.advice.inputs import golden
-
+    """A scene of nothing."""
     (folder / "scene").mkdir()
     document = json.loads((Path(golden()) / "interactive_scene" / "scene.json").read_text())
-    fixed = [body | {"movable": False} for body in document["bodies"]]
-    (folder / "scene" / "scene.json").write_text(json.dumps(document | {"bodies": fixed}))
+    (folder / "scene" / "scene.json").write_text(json.dumps(document | {"bodies": []}))
     (folder / "scene" / "scene.mjcf.xml").write_text(
         '<mujoco><worldbody/><keyframe><key name="reconstructed"/></keyframe></mujoco>'
     )
@@ -56,7 +52,8 @@ def given_chair(folder: Path) -> None:
     """A box that is called a chair."""
     import trimesh
 
-    trimesh.creation.box((0.5, 0.5, 0.9)).export(folder / "chair.obj")
+    (folder / "models").mkdir()
+    trimesh.creation.box((0.5, 0.5, 0.9)).export(folder / "models" / "chair.obj")
 
 
 ROWS = [
@@ -87,7 +84,7 @@ ROWS = [
         OUTLOOK,
         "scenewright library add",
         said("cad_scene", cad=0, built_in=0, mesh=9),
-        "library add chair.obj --class chair --out library",
+        "library add models --class-name chair --out library",
         code=0,
         given=given_chair,
         right=lambda folder: (folder / "library" / "library.json").stat(),
