@@ -202,7 +202,7 @@ def make_command(stage: Stage) -> Callable[..., int]:
         parameters = parameters_for(stage, given_flags(options), config, str(options["config"]))
         if options.get("argument") is not None:
             if options[f"input_{stage.argument}"] is not None:
-                raise UsageError(f"{stage.name}: {stage.argument} is given twice", hint="see --help")
+                raise UsageError(f"{stage.name}: {stage.argument} is given twice", hint="give it once")
             options[f"input_{stage.argument}"] = options["argument"]
         inputs = {role: path for role in stage.reads if (path := options[f"input_{role}"]) is not None}
         result = run_stage(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import json
+import os
 import shutil
 import tempfile
 from functools import cache
@@ -25,7 +26,8 @@ from tests.unit.cad.test_cad_stage import mesh_of
 from tests.unit.disparity.pairs import pair as pictured
 from tests.unit.disparity.pairs import write_folder
 from tests.unit.disparity.test_rectification import turned
-from tests.unit.edit.maps import dense
+from tests.unit.edit.maps import dense, room_map
+from tests.unit.housekeeping.tiny_run import make_tiny_run
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 from tests.unit.poses.textured_room import write_sequence as write_textured
 from tests.unit.segment.test_stage import write_sequence
@@ -38,8 +40,13 @@ GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 def folder() -> Path:
     """Return a folder of this process, which goes with it."""
     made = Path(tempfile.mkdtemp(prefix="advice-"))
-    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    atexit.register(_remove, made, os.getpid())
     return made
+
+
+def _remove(made: Path, maker: int) -> None:
+    if os.getpid() == maker:  # and not a process forked from it
+        shutil.rmtree(made, ignore_errors=True)
 
 
 @cache
@@ -156,5 +163,18 @@ def fridge() -> str:
     return str(made)
 
 
-INPUTS = {make.__name__: make for make in (golden, room, masks, table, cut, suture, walks, pair, fridge)}
+@cache
+def tiny() -> str:
+    """Return a run folder with a small whole artifact of every kind, named by it."""
+    return str(make_tiny_run(folder() / "tiny"))
+
+
+@cache
+def seen() -> str:
+    """Return the panoptic map of a floor, a table, two cups and a cabinet."""
+    room_map(folder() / "seen")
+    return str(folder() / "seen")
+
+
+INPUTS = {make.__name__: make for make in (golden, room, masks, table, cut, suture, walks, pair, fridge, tiny, seen)}
 """What stands for `{name}` in a row's commands."""

@@ -8,14 +8,28 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from scenewright.cli import housekeeping
+from scenewright.stages.engine.discovery import all_stages
+
 ROOT = Path(__file__).resolve().parents[2]
 PLACES = ("cli", "stages", "schemas")
-ADVISES = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]+|\bscenewright [a-z]+|\bpip install\b|\bexport [A-Z{]")
+COMMANDS = {
+    *(function.__name__.replace("_", "-") for function, _ in housekeeping.COMMANDS),
+    *(name for name, *_ in housekeeping.GROUPS),
+    *(name.split()[0] for name in all_stages()),
+    "train",
+}
+"""First words of all commands."""
+ADVISES = re.compile(
+    r"(?<![\w-])--[a-z][a-z0-9-]+|`scenewright |\bscenewright (?:" + "|".join(sorted(COMMANDS)) + r")\b|\bpip install\b"
+    r"|\bexport [A-Z{]"
+)
 DECLARATIONS = {
     *("Argument", "Option", "option", "Field", "Stage", "External", "Extra", "BackendDeclaration"),
     *("TrainingDeclaration", "add_argument", "add_parser", "ArgumentParser", "compile", "add_typer", "command"),
+    "_script",
 }
-"""Calls whose strings are help texts or names, which `tests/contract/test_docs.py` reads."""
+"""Calls whose strings are help texts or names, which `tests/contract/test_docs.py` reads, or scripts."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +51,12 @@ def messages() -> list[Message]:
 
 
 def messages_of(source: str, path: str) -> Iterator[Message]:
-    """Yield the messages of one file: no docstrings, help texts, or bare names of options."""
+    """Yield the messages of one file: no docstrings, help texts, scripts, or words that stand alone."""
     tree = ast.parse(source)
     passed_over = {id(inner) for node in ast.walk(tree) for inner in _not_messages(node)}
     for node in ast.walk(tree):
         text = None if id(node) in passed_over else _text(node)
-        if text is not None and ADVISES.search(text) and not re.fullmatch(r"--[a-z0-9-]+", text.strip()):
+        if text is not None and ADVISES.search(text) and " " in text.strip() and not text.startswith("#!"):
             yield Message(path, node.lineno, text)  # type: ignore[attr-defined]
 
 

@@ -108,7 +108,7 @@ ROWS = [
         OWN,
         f"{OWN} --masks {{suture}}/scene/truth",
         code=5,
-        without=(SEGMENTER,),
+        lacks=(SEGMENTER,),
         right=the_needle,
     ),
     Tried(
@@ -117,7 +117,7 @@ ROWS = [
         "suture simulate --out out --sight pictures",
         "suture simulate --out out --sight geometry --dry-run",
         code=5,
-        without=(SEGMENTER,),
+        lacks=(SEGMENTER,),
     ),
     *(
         Tried(

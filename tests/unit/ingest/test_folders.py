@@ -96,6 +96,8 @@ def test_missing_intrinsics_are_asked_for_not_guessed(tmp_path: Path) -> None:
     (write_redwood(tmp_path / "redwood", recorded) / "camera_intrinsic.json").unlink()
     with pytest.raises(BadInput, match="96x72"):
         ingest(tmp_path / "redwood", tmp_path / "c")
+    for name in ("posed", "scenes", "redwood"):
+        assert ingest(tmp_path / name, tmp_path / f"{name}_given", **INTRINSICS).info.camera == CAMERA
 
 
 def test_selection_and_its_count(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
+    camera_from_options,
     depth_form,
     depth_image_size,
     first_subfolder,
@@ -46,7 +47,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     colors = list(images_of_subfolder(color_folder, COLOR_SUFFIXES).values())
     depths = list(images_by_stem(root / "depth", DEPTH_SUFFIXES).values())
     poses = read_open3d_log(root / TRAJECTORY)
-    camera, notes = _camera(root, depth_image_size(depths))
+    camera, notes = _camera(root, depth_image_size(depths), parameters)
     camera, notes_of_options = overridden(camera, parameters)
     form, unit_note = depth_form(parameters, 1000.0, depths)
     if colors and len(colors) != len(depths):
@@ -76,16 +77,15 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     return LogSource("redwood", rule, (SourceCamera("camera", camera),), entries, notes, streams=streams)
 
 
-def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str, ...]]:
+def _camera(root: Path, size: tuple[int, int] | None, parameters: IngestParameters) -> tuple[Camera, tuple[str, ...]]:
     width, height = size or (0, 0)
     for name in INTRINSICS:
         path = root / name
         if path.exists():
             return _read_intrinsics(path, size), (f"intrinsics read from {name}",)
     if size is not None and size != (640, 480):
-        raise BadInput(
-            f"{root}: images are {width}x{height} and there is no {INTRINSICS[0]}", hint="add it (Open3D layout)"
-        )
+        why = f"{root}: images are {width}x{height} and there is no {INTRINSICS[0]} (Open3D layout)"
+        return camera_from_options(size, parameters, why), ()
     note = "intrinsics assumed: PrimeSense default, fx = fy = 525, cx = 319.5, cy = 239.5"
     return Camera(width=width, height=height, **PRIMESENSE), (note,)
 
