@@ -170,7 +170,7 @@ ROWS = [
         "tableware simulate --scene {golden}/tableware_scene --simulator physics --out out",
         "tableware simulate --scene {golden}/tableware_scene --simulator fast --out out",
         code=5,
-        without=("scenewright.stages.tableware.simulation.physics_trial",),
+        lacks=("scenewright.stages.tableware.simulation.physics_trial",),
         right=cleared,
     ),
     NotTried(
