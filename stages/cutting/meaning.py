@@ -3,11 +3,11 @@
 A thing has three directions, at right angles: the long one, the wide one and the thin one. The edges of a fragment are
 those of the smallest box around it, however it lies.
 
-- slices: cut across the long direction alone, each all that there is of the thing between two planes, and no thicker
-  along it than the thing is along its thin direction; all as thick.
+- slices: cut across the long direction alone, each all that there is of the thing between two planes, and at most 1.5
+  times as thick along it as the thing is thin; all as thick.
 - strips: never cut across the long direction, and at least twice as long as wide; all as large.
 - cubes: the longest edge at most 1.5 times the shortest; all as large.
-- chunks: the longest edge at most 3 times the shortest; all as large.
+- chunks: the longest edge at most 4 times the shortest; all as large.
 """
 
 from __future__ import annotations
@@ -27,8 +27,12 @@ from scipy.optimize import linear_sum_assignment
 
 NARROW = 2.0
 """Length over width that makes a strip."""
-CUBE, CHUNK = 1.5, 3.0
-"""Most of the longest edge over the shortest. A block twice as long as thick is two cubes; thrice, no lump."""
+CUBE, CHUNK = 1.5, 4.0
+"""Most of the longest edge over the shortest. A block twice as long as thick is two cubes. Halves and quarters of foods
+are demonstrated as chunks, and are up to four times as long as thick."""
+SLICE = 1.5
+"""Most of a slice's thickness over the thing's thin edge: that of a cube. Fifths of a long carrot are demonstrated as
+slices."""
 EVEN = 2.0
 """The largest fragment over the smallest, beyond which fragments of one word are not alike: it could be halved."""
 ALIKE = 1.1
@@ -75,7 +79,7 @@ def _stout(edges: np.ndarray, length: np.ndarray, thing: np.ndarray) -> np.ndarr
 
 MEANINGS: dict[CategoryName, Meaning] = {
     "chunks": Meaning((LONG, WIDE, THIN), _blunt, CHUNK, "as long as thick"),
-    "slices": Meaning((LONG,), _thick, 1.0, "as thick as the thing is thin", "span the whole cross section", True),
+    "slices": Meaning((LONG,), _thick, SLICE, "as thick as the thing is thin", "span the whole cross section", True),
     "strips": Meaning((WIDE, THIN), _stout, 1.0 / NARROW, "as wide as long", "run the whole length"),
     "cubes": Meaning((LONG, WIDE, THIN), _blunt, CUBE, "as long as thick"),
 }

@@ -10,7 +10,7 @@ import numpy as np
 from scenewright.schemas.cutting_demonstrations import CategoryName
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.cutting.demonstrations.recipes import CATEGORIES, LONG
-from scenewright.stages.cutting.meaning import MEANINGS, Thing
+from scenewright.stages.cutting.meaning import EVEN, MEANINGS, Thing
 from scenewright.stages.cutting.ours.cells import Cloud, Split, Tree, cells, cloud_of
 from scenewright.stages.cutting.ours.grammar import Grammar
 from scenewright.stages.cutting.ours.grids import grids_of
@@ -20,8 +20,8 @@ from scenewright.stages.cutting.world.body import Body
 Words = Sequence[tuple[int, CategoryName]]
 STEPS = 24
 """Steps in which the length of a thing is shared among words."""
-TRIED = 12
-"""Grids that are tried on the points of a thing; by eye."""
+TRIED = 24
+"""Trees that are tried on the points of a thing; by eye."""
 
 
 @dataclass(frozen=True)
@@ -129,17 +129,19 @@ def _part(size: np.ndarray, share: float) -> np.ndarray:
 
 def _region(cloud: Cloud, size: np.ndarray, share: float, count: int, name: CategoryName) -> tuple[Tree, float]:
     """Return the tree of the grid whose worst cell is likest to the word, and its thinnest edge [m]: those that are
-    likest on boxes are tried on the points."""
+    likest on boxes are tried on the points, with cells of one volume and, as long as volumes are even, of one size."""
     meaning = MEANINGS[name]
     trees: dict[Tree, float] = {}
     for grid in grids_of(_part(size, share), size, count, name):
-        trees.setdefault(grid.tree(count, meaning.by_thickness), grid.thinnest)
-        if len(trees) == TRIED:
+        for slabs in (True,) if meaning.by_thickness else (False, True):
+            trees.setdefault(grid.tree(count, slabs), grid.thinnest)
+        if len(trees) >= TRIED:
             break
 
     def misfit(tree: Tree) -> float:
-        edges = np.exp(cells(cloud, tree, [1.0] * count)[:, :3])
-        return float(meaning.misfit(edges, edges[:, 2], size).max())
+        rows = np.exp(cells(cloud, tree, [1.0] * count))
+        shape = float(meaning.misfit(rows[:, :3], rows[:, 2], size).max())
+        return max(shape, float(rows[:, 3].max() / rows[:, 3].min()) / EVEN)
 
     best = min(trees, key=misfit) if len(trees) > 1 else next(iter(trees))
     return best, trees[best]

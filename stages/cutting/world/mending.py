@@ -20,7 +20,8 @@ MOST_FACES = 200_000
 UNLIKE = 0.05
 """Share by which the volume that faces enclose may differ from the space inside: overlaps count twice."""
 GROWN = 0.001
-"""Share by which parts that do not quite touch are grown: beyond what files round, below what a knife can do."""
+"""Share of a body that is nothing: parts that do not quite touch are grown by it, faces so near a hull lie on it. More
+than files round, less than a knife can do."""
 LATTICE = 64
 """Steps along each edge of the box around a mesh, at which it is asked what is inside."""
 SUFFIXES = (".ply", ".obj", ".stl", ".glb")
@@ -128,17 +129,22 @@ def closed_parts(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
 
 
 def _is_hull(mesh: trimesh.Trimesh) -> bool:
-    """Whether every face lies on the convex hull, and there is such a body."""
-    inside = 1e-5 * mesh.scale
-    if min(mesh.extents) < inside:
+    """Whether faces leave no edge open, and each of them lies on the convex hull."""
+    inside = GROWN * mesh.scale
+    if min(mesh.extents) < inside or (_edge_counts(mesh) == 1).any():
         return False
     heights = (mesh.vertices[None] - mesh.triangles_center[:, None]) * mesh.face_normals[:, None]
     sides = heights.sum(axis=2)
     return bool((np.minimum(sides.max(axis=1), -sides.min(axis=1)) < inside).all())
 
 
+def _edge_counts(mesh: trimesh.Trimesh) -> np.ndarray:
+    """Return how many faces each edge has (E,)."""
+    return np.asarray(np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1])
+
+
 def _open(mesh: trimesh.Trimesh, path: Path) -> BadInput:
-    _, counts = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    counts = _edge_counts(mesh)
     if (counts == 1).any():
         return BadInput(f"{path}: open: {(counts == 1).sum()} edges have one face", hint="close it in a mesh editor")
     return BadInput(

@@ -24,12 +24,12 @@ def chord(mesh: trimesh.Trimesh, origin: np.ndarray, direction: np.ndarray) -> f
     a, b, c = (mesh.triangles[:, k] for k in range(3))
     p = np.cross(direction, c - a)
     det = ((b - a) * p).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         u = ((origin - a) * p).sum(axis=1) / det
         q = np.cross(origin - a, b - a)
         v = (q @ direction) / det
         t = ((c - a) * q).sum(axis=1) / det
-    hits = (np.abs(det) > 1e-18) & (u >= 0) & (v >= 0) & (u + v <= 1)
+        hits = (np.abs(det) > 1e-18) & (u >= 0) & (v >= 0) & (u + v <= 1)
     entering = np.sign(mesh.face_normals[hits] @ direction)
     return abs(float((t[hits] * entering).sum()))
 
@@ -50,30 +50,24 @@ def is_what_it_is_called(name: str, fragments: Sequence[trimesh.Trimesh], thing:
         middle = mesh.center_mass + long * (0.5 * (along.min() + along.max()) - mesh.center_mass @ long)
         if name == "slices":
             whole = section_area(mesh, middle, long) > 0.9 * section_area(thing, middle, long)
-            right.append(whole and np.ptp(along) < 1.02 * edges[0])
+            right.append(whole and np.ptp(along) < 1.55 * edges[0])
         elif name == "strips":
             uncut = np.ptp(along) > 0.9 * chord(thing, mesh.center_mass, long)
             right.append(uncut and box[2] > 1.9 * box[1])
         else:
-            right.append(box[2] / box[0] < (1.6 if name == "cubes" else 3.1))
+            right.append(box[2] / box[0] < (1.55 if name == "cubes" else 4.1))
     return right
 
 
 def long_direction(name: str, fragments: Sequence[trimesh.Trimesh], thing: trimesh.Trimesh) -> np.ndarray:
-    """Return the direction (3,) along which a thing is longest. Where several are (a ball, a disc, a cube), that along
-    which slices follow each other or strips run."""
+    """Return the direction (3,) along which a thing is longest. Where several are (a ball, a disc, a cube; a cone's box
+    leans), that along which slices are thin or strips run, if it is as long as the longest but for a few percent."""
     to_box, edges = trimesh.bounds.oriented_bounds(thing)
     long = to_box[int(np.argmax(edges)), :3]
-    if name == "slices":
-        places = np.array([mesh.center_mass for mesh in fragments])
-        far = np.array([np.linalg.norm(places - place, axis=1) for place in places])
-        i, j = np.unravel_index(int(far.argmax()), far.shape)
-        other = places[i] - places[j]
-    else:
-        to_box, edges_of_first = trimesh.bounds.oriented_bounds(fragments[0])
-        other = to_box[int(np.argmax(edges_of_first)), :3]
-    other = other / np.linalg.norm(other)
-    return other if np.ptp(thing.vertices @ other) > 0.98 * edges.max() else long
+    middle = fragments[len(fragments) // 2]
+    to_box, edges_of_middle = trimesh.bounds.oriented_bounds(middle)
+    other = to_box[int(np.argmin(edges_of_middle) if name == "slices" else np.argmax(edges_of_middle)), :3]
+    return other if np.ptp(thing.vertices @ other) > 0.95 * edges.max() else long
 
 
 def evenness(name: str, fragments: Sequence[trimesh.Trimesh], thing: trimesh.Trimesh) -> float:

@@ -37,11 +37,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-@pytest.fixture(scope="module")
-def grammar() -> Grammar:
-    return learn([make_trial("n1m1", (0, k)) for k in range(12)], 0)
-
-
 def test_a_goal_in_words_is_planned_and_cut_on_a_board(folder: Path) -> None:
     model, plan, trial = (str(folder / name) for name in ("model", "plan", "trial"))
     words = ["--goal", "4 slices, 2 chunks", "--out", plan]
@@ -183,7 +178,7 @@ def test_bad_goals_are_one_line_and_lose_nothing(
     """Meshes as what is cut and as what is wanted; the last holds less than is wanted of it. A plan that lies there
     stays, but for one that says why not."""
     out, model = str(tmp_path / "plan"), str(folder / "model")
-    words = ["--model", model, "--goal", "2 chunks", "--out", out]
+    words = ["--model", model, "--goal", "4 chunks", "--out", out]
     assert run(["cutting", "plan", *words, *SMALL]) == 0
     before = {path.name: path.read_bytes() for path in (tmp_path / "plan").iterdir()}
     capsys.readouterr()
@@ -201,18 +196,17 @@ def test_bad_goals_are_one_line_and_lose_nothing(
 
 def test_a_plan_of_64_fragments_has_all_of_them(grammar: Grammar) -> None:
     objects = [make_food("bread", np.random.default_rng(1))]
-    items, _ = imagine(objects, [(64, "cubes")], grammar)
-    carving = carry_out(OursPolicy(grammar, items), objects, most=65)
+    carving = carry_out(OursPolicy(grammar, imagine(objects, [(64, "cubes")], grammar)), objects, most=65)
     assert len(carving.board) == 64 and carving.stopped is None
     volume = sum(body.volume for body in carving.board.values())
     assert volume == pytest.approx(objects[0].volume, rel=1e-6)
-    assert max(body.volume for body in carving.board.values()) < 4 * volume / 64
+    assert max(body.volume for body in carving.board.values()) < 1.3 * volume / 64
 
 
 def test_the_tree_says_how_probable_each_rule_is(folder: Path, tmp_path: Path) -> None:
-    out = ["--goal", "3 slices", "--out", str(tmp_path / "plan")]
+    out = ["--goal", "6 slices", "--out", str(tmp_path / "plan")]
     assert run(["cutting", "plan", "--model", str(folder / "model"), *out, *SMALL]) == 0
     cuts = CuttingPlanFile.read(tmp_path / "plan" / "plan.json").cuts
-    assert len(cuts) == 2 and all(cut.chance is not None and 0.0 < cut.chance < 1.0 for cut in cuts)
+    assert len(cuts) == 5 and all(cut.chance is not None and 0.0 < cut.chance < 1.0 for cut in cuts)
     picture = np.asarray(Image.open(tmp_path / "plan" / "tree.png").convert("RGB"))
     assert picture.std() > 5 and "with probability" in (tmp_path / "plan" / "plan.txt").read_text()
