@@ -129,19 +129,22 @@ def _part(size: np.ndarray, share: float) -> np.ndarray:
 
 def _region(cloud: Cloud, size: np.ndarray, share: float, count: int, name: CategoryName) -> tuple[Tree, float]:
     """Return the tree of the grid whose worst cell is likest to the word, and its thinnest edge [m]: those that are
-    likest on boxes are tried on the points, with cells of one volume and, as long as volumes are even, of one size."""
+    likest on boxes are tried on the points, with cells of one volume, and where none of them is met, of one size."""
     meaning = MEANINGS[name]
-    trees: dict[Tree, float] = {}
-    for grid in grids_of(_part(size, share), size, count, name):
-        for slabs in (True,) if meaning.by_thickness else (False, True):
-            trees.setdefault(grid.tree(count, slabs), grid.thinnest)
-        if len(trees) >= TRIED:
-            break
+    grids = grids_of(_part(size, share), size, count, name)[:TRIED]
 
     def misfit(tree: Tree) -> float:
         rows = np.exp(cells(cloud, tree, [1.0] * count))
         shape = float(meaning.misfit(rows[:, :3], rows[:, 2], size).max())
-        return max(shape, float(rows[:, 3].max() / rows[:, 3].min()) / EVEN)
+        return shape if meaning.by_thickness else max(shape, float(rows[:, 3].max() / rows[:, 3].min()) / EVEN)
 
-    best = min(trees, key=misfit) if len(trees) > 1 else next(iter(trees))
-    return best, trees[best]
+    trees: dict[Tree, tuple[float, float]] = {}
+    for slabs in (True,) if meaning.by_thickness else (False, True):
+        for grid in grids:
+            tree = grid.tree(count, slabs)
+            if tree not in trees:
+                trees[tree] = misfit(tree), grid.thinnest
+        if min(trees.values())[0] <= 1.0:
+            break
+    best = min(trees, key=lambda tree: trees[tree][0])
+    return best, trees[best][1]

@@ -82,10 +82,11 @@ def _close(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
         parts = [once.convex_hull]
         mended.append("faces that lie over each other taken for the convex body that they enclose")
     else:
-        once.fill_holes()
-        if not once.is_watertight:
+        filled = once.copy()
+        filled.fill_holes()
+        if not filled.is_watertight:
             raise _open(once, path)
-        parts = [once]
+        parts = [filled]
         mended.append("holes filled")
     if any(not part.is_winding_consistent or part.volume < 0 for part in parts):
         for part in parts:

@@ -163,6 +163,43 @@ def test_bodies_that_pass_through_each_other_are_united_and_it_is_said(tmp_path:
         read_body(_mesh(tmp_path, trimesh.util.concatenate([first, second])), "m")
 
 
+def _beside(mesh: trimesh.Trimesh, by: float, flipped: bool = False) -> trimesh.Trimesh:
+    """A mesh moved along x; flipped, its faces have the other diagonals."""
+    vertices = mesh.vertices * ((1, -1, 1) if flipped else (1, 1, 1)) + (by, 0, 0)
+    return trimesh.Trimesh(vertices, mesh.faces[:, ::-1] if flipped else mesh.faces, process=False)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj"])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_parts_that_share_faces_are_united(suffix: str, flipped: bool, tmp_path: Path) -> None:
+    """As decompositions into convex parts are: each closed, neighbours with one face, or with its other diagonal."""
+    box = trimesh.creation.box((0.04, 0.04, 0.1))
+    parts = trimesh.util.concatenate([box, _beside(box, 0.04, flipped), _beside(box, 0.08)])
+    parts.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))
+    parts.export(tmp_path / f"parts.{suffix}")
+    body, mended = read_body(tmp_path / f"parts.{suffix}", "m")
+    assert body.volume == pytest.approx(4.8e-4, rel=4e-3)
+    assert mended[0] == "3 closed parts that share faces or edges united"
+
+
+def test_faces_that_lie_over_each_other_are_told_from_holes(tmp_path: Path) -> None:
+    """A box whose one side is there twice, with either diagonal; pushed in on another side it is no convex body."""
+    box = trimesh.creation.box((0.04, 0.04, 0.1))
+    side = [k for k, normal in enumerate(box.face_normals) if normal[0] > 0.9]
+    corners = np.unique(box.faces[side])
+    a, b = (corner for corner in corners if (box.faces[side] == corner).sum() == 2)
+    c, d = (corner for corner in corners if corner not in (a, b))
+    faces = np.concatenate([box.faces, [(a, c, d), (b, d, c)]])
+    doubled = trimesh.Trimesh(box.vertices, faces, process=False)
+    body, mended = read_body(_mesh(tmp_path, doubled), "m")
+    assert body.volume == pytest.approx(1.6e-4, rel=1e-5) and "lie over each other" in mended[0]
+    p, q, r = faces[next(k for k, normal in enumerate(box.face_normals) if normal[0] < -0.9)]
+    pushed_in = np.concatenate([faces[(faces != (p, q, r)).any(axis=1)], [(p, q, 8), (q, r, 8), (r, p, 8)]])
+    dent = trimesh.Trimesh(np.concatenate([box.vertices, [(-0.01, 0.0, 0.01)]]), pushed_in, process=False)
+    with pytest.raises(BadInput, match="edges have three faces or more"):
+        read_body(_mesh(tmp_path, dent), "m")
+
+
 @pytest.mark.parametrize(
     ("mesh", "code", "said"),
     [
