@@ -35,6 +35,8 @@ def verdict(
         refused = [f"the knife refused: {carving.refusals[-1].message}"] if carving.refusals else []
         return "not_reached", [*said, *refused]
     right = len(carving.board) == wanted and is_met(words)
+    if len(carving.board) > wanted:
+        said.append(f"{len(carving.board) - wanted} too many")
     if scores is not None and scores.iou < SHARED:
         said.append(f"they overlap by {scores.iou:.2f} with what is wanted, at least {SHARED} is a likeness")
         right = False
