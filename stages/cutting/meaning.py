@@ -210,7 +210,7 @@ def _met(
     count = int(fits[list(taken)].sum())
     said = f"{count} of {wanted} are {name}"
     if taken and (worst := max(misfit[k] for k in taken)) > MET:
-        said += f": the worst is {worst * meaning.bound:.2f} times {meaning.said}, at most {meaning.bound:g}"
+        said += f": the worst is {worst * meaning.bound:.3g} times {meaning.said}, at most {meaning.bound:g}"
     if cut_otherwise := sum(not whole[k] for k in taken):
         said += f": {cut_otherwise} do not {meaning.uncut}"
     kind = ("thickest", "thinnest") if meaning.by_thickness else ("largest", "smallest")
