@@ -88,12 +88,18 @@ def cells(cloud: Cloud, tree: Tree, volumes: Sequence[float] | None = None) -> n
     Planes stand by thickness, after the weights; with `volumes` [m^3] of the leaves they stand so that each part has
     the volume of its leaves, but in slabs.
     """
-    count = leaves(tree)
-    number, covariance = _moments(
-        cloud.points, *_flat(tree), np.zeros(0) if volumes is None else np.asarray(volumes, float), count
-    )
+    given = np.zeros(0) if volumes is None else np.asarray(volumes, float)
+    number, covariance, _ = _moments(cloud.points, *_flat(tree), given, leaves(tree))
     edges = np.maximum(box_edges(covariance), 1e-6)
     return np.column_stack([np.log(edges), np.log(np.maximum(number, 0.1) * cloud.share)])
+
+
+def spans(cloud: Cloud, tree: Tree) -> tuple[np.ndarray, np.ndarray]:
+    """Return the edges (leaves, 3) [m] by axis of the boxes around the fragments of a tree whose leaves get one volume
+    each, but in slabs, and their volumes (leaves,) [m^3]."""
+    number, _, between = _moments(cloud.points, *_flat(tree), np.ones(leaves(tree)), leaves(tree))
+    along_edge = np.maximum(np.cbrt(number), 1.5)[:, None]  # points stand for more than what lies between them
+    return np.maximum(between * along_edge / (along_edge - 1.0), 1e-6), np.maximum(number, 0.1) * cloud.share
 
 
 def _flat(tree: Tree) -> tuple[np.ndarray, np.ndarray]:
@@ -116,12 +122,13 @@ def _flat(tree: Tree) -> tuple[np.ndarray, np.ndarray]:
 @compiled
 def _moments(
     points: np.ndarray, nodes: np.ndarray, weights: np.ndarray, volumes: np.ndarray, leaves: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many points each leaf gets, and their covariance (leaves, 3, 3)."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return how many points each leaf gets, their covariance (leaves, 3, 3), and what they span (leaves, 3)."""
     order, spare = np.arange(len(points)), np.empty(len(points), dtype=np.int64)
     start, end = np.zeros(len(nodes), dtype=np.int64), np.zeros(len(nodes), dtype=np.int64)
     end[0] = len(points)
     number, mean, covariance = np.zeros(leaves), np.zeros((leaves, 3)), np.zeros((leaves, 3, 3))
+    low, high = np.full((leaves, 3), np.inf), np.full((leaves, 3), -np.inf)
     for node in range(len(nodes)):
         axis, child, part_count, leaf, _, slabs = nodes[node]
         by_volume = len(volumes) > 0 and slabs == 0
@@ -131,6 +138,8 @@ def _moments(
             for i in inside:
                 for j in range(3):
                     mean[leaf, j] += points[i, j]
+                    low[leaf, j] = min(low[leaf, j], points[i, j])
+                    high[leaf, j] = max(high[leaf, j], points[i, j])
             mean[leaf] /= max(len(inside), 1)
             for i in inside:
                 for j in range(3):
@@ -164,4 +173,4 @@ def _moments(
                         at += 1
                 end[child + k] = at
             order[start[node] : end[node]] = spare[start[node] : end[node]]
-    return number, covariance
+    return number, covariance, np.maximum(high - low, 0.0)

@@ -11,7 +11,7 @@ from scenewright.schemas.cutting_demonstrations import CategoryName
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.cutting.demonstrations.recipes import CATEGORIES, LONG
 from scenewright.stages.cutting.meaning import EVEN, MEANINGS, Thing
-from scenewright.stages.cutting.ours.cells import Cloud, Split, Tree, cells, cloud_of
+from scenewright.stages.cutting.ours.cells import Cloud, Split, Tree, cells, cloud_of, spans
 from scenewright.stages.cutting.ours.grammar import Grammar
 from scenewright.stages.cutting.ours.grids import grids_of
 from scenewright.stages.cutting.ours.items import Item
@@ -134,9 +134,9 @@ def _region(cloud: Cloud, size: np.ndarray, share: float, count: int, name: Cate
     grids = grids_of(_part(size, share), size, count, name)[:TRIED]
 
     def misfit(tree: Tree) -> float:
-        rows = np.exp(cells(cloud, tree, [1.0] * count))
-        shape = float(meaning.misfit(rows[:, :3], rows[:, 2], size).max())
-        return shape if meaning.by_thickness else max(shape, float(rows[:, 3].max() / rows[:, 3].min()) / EVEN)
+        edges, volumes = spans(cloud, tree)
+        shape = float(meaning.misfit(np.sort(edges, axis=1), edges[:, LONG], size).max())
+        return shape if meaning.by_thickness else max(shape, float(volumes.max() / volumes.min()) / EVEN)
 
     trees: dict[Tree, tuple[float, float]] = {}
     for slabs in (True,) if meaning.by_thickness else (False, True):

@@ -44,7 +44,9 @@ def test_a_goal_in_words_is_planned_and_cut_on_a_board(folder: Path) -> None:
     planned = CuttingPlanFile.read(folder / "plan" / "plan.json")
     assert len(planned.cuts) == 5 and [w.name for w in planned.wanted].count("slices") == 4
     assert run(["cutting", "simulate", "--plan", plan, "--model", model, "--out", trial, *SMALL]) == 0
-    assert CuttingTrialFile.read(folder / "trial" / "trial.json").fragments == 6
+    tried = CuttingTrialFile.read(folder / "trial" / "trial.json")
+    assert tried.fragments == 6 and {word.name: word.made for word in tried.words} == {"slices": 4, "chunks": 2}
+    assert planned.sure is None and all(cut.likeness is None for cut in planned.cuts)
 
 
 def test_ours_makes_the_fragments_of_a_trial(grammar: Grammar) -> None:
