@@ -5,14 +5,15 @@ those of the smallest box around it, however it lies.
 
 - slices: cut across the long direction alone, each all that there is of the thing between two planes, and at most 1.5
   times as thick along it as the thing is thin; all as thick.
-- strips: never cut across the long direction, and at least twice as long as wide; all as large.
+- strips: never cut across the long direction (of the part of the thing that is made strips), and at least twice as long
+  as wide; all as large.
 - cubes: the longest edge at most 1.5 times the shortest; all as large.
 - chunks: the longest edge at most 4 times the shortest; all as large.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -117,9 +118,12 @@ class Thing:
         low, high = self.bounds(fragment)
         return np.append(np.sort(trimesh.bounds.oriented_bounds(fragment.vertices)[1]), high[LONG] - low[LONG])
 
-    def share(self, fragment: Body, across: Sequence[int]) -> float:
-        """Return how much of what lies between the planes that bound a fragment along directions is in it."""
-        box = self.bounds(self.body) + np.array([[-1e-3], [1e-3]])
+    def share(self, fragment: Body, across: Sequence[int], part: tuple[float, float]) -> float:
+        """Return how much of what lies between the planes that bound a fragment along directions is in it; of a part of
+        the thing, from one share of its length to another."""
+        box = self.bounds(self.body)
+        box[:, LONG] = box[0, LONG] + np.array(part) * self.size[LONG]
+        box += np.array([[-1e-6], [1e-6]])
         box[:, list(across)] = self.bounds(fragment)[:, list(across)]
         return fragment.volume / max(self.body.within(self.first_from_axes, *box), 1e-15)
 
@@ -153,17 +157,24 @@ class Made:
     thing: int
 
 
+Parts = Mapping[CategoryName, tuple[float, float]]
+"""From where to where along the length of a thing the fragments of a word lie, as shares; all along where it is not."""
+
+
 def judge(
-    things: Sequence[Thing], fragments: Sequence[Made], wanted: Sequence[tuple[CategoryName, float]]
+    things: Sequence[Thing],
+    fragments: Sequence[Made],
+    wanted: Sequence[tuple[CategoryName, float]],
+    parts: Sequence[Parts],
 ) -> tuple[WordMet, ...]:
-    """Return how well fragments are what was wanted: words with volumes [m^3], one each.
+    """Return how well fragments are what was wanted: words with volumes [m^3], one each, in parts of each thing.
 
     Each fragment is taken for one that is wanted, so that as many as can be are what the word says; where several
     could be, for that of the likest volume.
     """
     edges = np.array([things[made.thing].edges(made.body) for made in fragments])
     names = list(dict.fromkeys(name for name, _ in wanted))
-    misfits = {name: _misfits(things, fragments, edges, name) for name in names}
+    misfits = {name: _misfits(things, fragments, edges, name, parts) for name in names}
     off = np.abs(np.log(np.divide.outer([made.body.volume for made in fragments], [volume for _, volume in wanted])))
     fits = np.stack([misfits[name][0] for name, _ in wanted], axis=1)
     rows, columns = linear_sum_assignment(~fits + 0.01 * np.minimum(off, 1.0))
@@ -175,7 +186,7 @@ def judge(
 
 
 def _misfits(
-    things: Sequence[Thing], fragments: Sequence[Made], edges: np.ndarray, name: CategoryName
+    things: Sequence[Thing], fragments: Sequence[Made], edges: np.ndarray, name: CategoryName, parts: Sequence[Parts]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return whether each fragment (N,) is what a word says, its misfit, and whether it is cut as the word says."""
     meaning = MEANINGS[name]
@@ -183,7 +194,10 @@ def _misfits(
     misfit = meaning.misfit(edges[:, :3], edges[:, 3], sizes.T)
     whole = np.ones(len(fragments), dtype=bool)
     if len(meaning.across) < 3:
-        shares = [things[made.thing].share(made.body, meaning.across) for made in fragments]
+        shares = [
+            things[made.thing].share(made.body, meaning.across, parts[made.thing].get(name, (0.0, 1.0)))
+            for made in fragments
+        ]
         whole = np.array(shares) > WHOLE
     return (misfit <= MET) & whole, misfit, whole
 

@@ -20,7 +20,7 @@ def words_met(wish: Wish, carving: Carving) -> tuple[WordMet, ...]:
     for step in carving.steps:
         origin |= dict.fromkeys(step.results, origin[step.action.piece])
     made = [Made(body, origin[number]) for number, body in carving.board.items()]
-    return judge([laid.thing for laid in wish.laid], made, wish.wanted)
+    return judge([laid.thing for laid in wish.laid], made, wish.wanted, [laid.parts for laid in wish.laid])
 
 
 def verdict(

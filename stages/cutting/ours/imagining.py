@@ -10,7 +10,7 @@ import numpy as np
 from scenewright.schemas.cutting_demonstrations import CategoryName
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.cutting.demonstrations.recipes import CATEGORIES, LONG
-from scenewright.stages.cutting.meaning import EVEN, MEANINGS, Thing
+from scenewright.stages.cutting.meaning import EVEN, MEANINGS, Parts, Thing
 from scenewright.stages.cutting.ours.cells import Cloud, Split, Tree, cells, cloud_of, spans
 from scenewright.stages.cutting.ours.grammar import Grammar
 from scenewright.stages.cutting.ours.grids import grids_of
@@ -31,6 +31,7 @@ class Laid:
     thing: Thing
     tree: Tree
     items: tuple[Item, ...]
+    parts: Parts
 
 
 @dataclass(frozen=True)
@@ -58,33 +59,52 @@ class Wish:
 def imagine(objects: Sequence[Body], words: Words, grammar: Grammar) -> Wish:
     """Return words laid out.
 
-    Each object gets of every category a share by its volume; within an object categories lie one after the other along
-    its length, of which each gets so much that the worst of them is met best. Raises BadInput for a category that no
-    demonstration showed.
+    Each object gets of every category a share by its volume, of slices by its length, and one fragment at least; within
+    an object categories lie one after the other along its length, of which each gets so much that the worst of them is
+    met best. Raises BadInput for a category that no demonstration showed.
     """
     for _, name in words:
         if not grammar.named[:, CATEGORIES.index(name)].any():
             raise BadInput(f"the model has not been shown {name}", hint="learn from more demonstrations")
-    room = np.array([body.volume for body in objects])
-    shares = {name: shared_out(count, room) for count, name in words}
+    things = [Thing.of(body) for body in objects]
+    counts = _counts(things, words)
     laid: list[Laid] = []
     names: list[CategoryName] = []
     thinnest = np.inf
-    for number, body in enumerate(objects):
-        thing = Thing.of(body)
-        mine = [(int(shares[name][number]), name) for _, name in words if shares[name][number]]
-        tree, items = None, ()
-        if mine:
-            cloud = cloud_of(body, body.world_from_first @ thing.first_from_axes)
-            tree, thin = _tree(cloud, thing, mine)
-            thinnest = min(thinnest, thin)
-            rows = np.exp(cells(cloud, tree, [1.0] * sum(count for count, _ in mine)))
-            items = tuple(
-                Item(len(names) + k, (float(a), float(b), float(c)), float(v)) for k, (a, b, c, v) in enumerate(rows)
-            )
+    for thing, body, mine in zip(things, objects, counts, strict=True):
+        if not mine:
+            laid.append(Laid(thing, None, (), {}))
+            continue
+        cloud = cloud_of(body, body.world_from_first @ thing.first_from_axes)
+        lengths = _lengths(thing.size, mine)
+        tree, thin = _tree(cloud, thing, mine, lengths)
+        thinnest = min(thinnest, thin)
+        rows = np.exp(cells(cloud, tree, [1.0] * sum(count for count, _ in mine)))
+        items = tuple(
+            Item(len(names) + k, (float(a), float(b), float(c)), float(v)) for k, (a, b, c, v) in enumerate(rows)
+        )
         names += [name for count, name in mine for _ in range(count)]
-        laid.append(Laid(thing, tree, items))
+        ends = np.cumsum([0.0, *lengths]).tolist()
+        laid.append(Laid(thing, tree, items, {word[1]: (ends[k], ends[k + 1]) for k, word in enumerate(mine)}))
     return Wish(tuple(laid), tuple(names), float(thinnest))
+
+
+def _counts(things: Sequence[Thing], words: Words) -> list[list[tuple[int, CategoryName]]]:
+    """Return what each thing gets of the words; none is left without a fragment where there are enough."""
+    shares = np.array(
+        [
+            shared_out(
+                count, np.array([t.size[LONG] if MEANINGS[name].by_thickness else t.body.volume for t in things])
+            )
+            for count, name in words
+        ]
+    )
+    while (shares.sum(axis=0) == 0).any() and shares.sum() >= len(things):
+        giving = np.where(shares.sum(axis=0) > 1, shares, 0)
+        word, giver = np.unravel_index(int(giving.argmax()), giving.shape)
+        shares[word, giver] -= 1
+        shares[word, int(shares.sum(axis=0).argmin())] += 1
+    return [[(int(n), name) for n, (_, name) in zip(column, words, strict=True) if n] for column in shares.T]
 
 
 def shared_out(count: int, room: np.ndarray) -> np.ndarray:
@@ -95,9 +115,8 @@ def shared_out(count: int, room: np.ndarray) -> np.ndarray:
     return counts
 
 
-def _tree(cloud: Cloud, thing: Thing, words: Words) -> tuple[Tree, float]:
+def _tree(cloud: Cloud, thing: Thing, words: Words, lengths: Sequence[float]) -> tuple[Tree, float]:
     """Return the cuts of one thing, and the thinnest edge of a box that they make [m]."""
-    lengths = _lengths(thing.size, words)
     along = cloud.points[:, LONG]
     at = (along - along.min()) / np.ptp(along)
     ends = np.cumsum([0.0, *lengths])

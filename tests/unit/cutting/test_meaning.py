@@ -103,6 +103,17 @@ def test_six_slices_and_eight_cubes_of_a_cucumber_are_those(grammar: Grammar, mo
     assert right["slices"].sum() == 6 and right["cubes"].sum() == 8
 
 
+def test_four_words_of_one_thing_and_slices_of_two_are_met(grammar: Grammar, monkeypatch: pytest.MonkeyPatch) -> None:
+    words: Words = [(3, "slices"), (4, "strips"), (8, "cubes"), (2, "chunks")]
+    carving, outcome, said = carve(monkeypatch, body_of(trimesh.creation.box((0.04, 0.04, 0.24))), words, grammar)
+    assert outcome == "ok" and len(carving.board) == 17, said
+    long, short = (body_of(trimesh.creation.box((0.03, 0.05, z))) for z in (0.15, 0.05))
+    wish = imagine([long, short], [(8, "slices")], grammar)
+    assert [len(laid.items) for laid in wish.laid] == [6, 2]
+    small = body_of(trimesh.creation.box((0.01, 0.01, 0.02)))
+    assert [len(laid.items) for laid in imagine([long, small], [(2, "chunks")], grammar).laid] == [1, 1]
+
+
 @pytest.mark.parametrize(
     ("name", "words", "outcome", "said"),
     [
@@ -134,11 +145,11 @@ def test_uneven_and_lengthwise_pieces_are_told() -> None:
     """Two chunks of which one is larger by far; a bar halved along its length, whose halves are no slices."""
     body = body_of(trimesh.creation.box((0.03, 0.03, 0.07)))
     parts = cut(body, Plane.through(body.moments[0] + 0.0125 * TURNED[:3, 2], TURNED[:3, 2]), Knife())
-    (met,) = judge([Thing.of(body)], [Made(part, 0) for part in parts], [("chunks", body.volume / 2)] * 2)
+    (met,) = judge([Thing.of(body)], [Made(part, 0) for part in parts], [("chunks", body.volume / 2)] * 2, [{}])
     assert met.made == 2 and met.evenness == pytest.approx(47.5 / 22.5) and "at most 2 is even" in met.said
     assert verdict(Carving(dict(enumerate(parts)), {}), 2, None, [met])[0] == "partial"
     halves = cut(body, Plane.through(body.moments[0], TURNED[:3, 1]), Knife())
-    (met,) = judge([Thing.of(body)], [Made(part, 0) for part in halves], [("slices", body.volume / 2)] * 2)
+    (met,) = judge([Thing.of(body)], [Made(part, 0) for part in halves], [("slices", body.volume / 2)] * 2, [{}])
     assert met.made == 0 and "do not span the whole cross section" in met.said
 
 
