@@ -12,6 +12,7 @@ from scenewright.schemas.cutting_demonstrations import CategoryName
 from scenewright.stages.cutting.demonstrations.recipes import LONG
 from scenewright.stages.cutting.meaning import MEANINGS
 from scenewright.stages.cutting.ours.cells import Split, Tree
+from scenewright.stages.cutting.world.knife import Knife
 
 
 @dataclass(frozen=True)
@@ -33,11 +34,11 @@ class Grid:
 
 
 def grids_of(edges: np.ndarray, thing: np.ndarray, count: int, name: CategoryName) -> list[Grid]:
-    """Return grids of so many cells in a box (3,) [m] of a thing (3,), those first whose worst cell is likest to the
-    word, and of these those whose cells are alike."""
+    """Return grids of so many cells in a box (3,) [m] of a thing (3,), those first that the blade can cut, whose worst
+    cell is likest to the word, and whose cells are alike."""
     meaning = MEANINGS[name]
     layers, rows = _ways(count)
-    found: list[tuple[float, float, Grid]] = []
+    found: list[tuple[bool, float, float, Grid]] = []
     for axes in permutations(range(3)):
         kept = np.ones(len(layers), dtype=bool)
         kinds = []
@@ -53,10 +54,24 @@ def grids_of(edges: np.ndarray, thing: np.ndarray, count: int, name: CategoryNam
         misfits = np.max([meaning.misfit(np.sort(cell, axis=1), cell[:, LONG], thing) for cell in kinds], axis=0)
         unlike = np.ptp([cell.max(axis=1) for cell in kinds], axis=0)
         thinnest = np.min([cell.min(axis=1) for cell in kinds], axis=0)
+        too_large = _too_large(edges[list(axes)], layers, rows, count)
         for k in np.flatnonzero(kept):
             grid = Grid(axes, int(layers[k]), int(rows[k]), float(misfits[k]), float(thinnest[k]))
-            found.append((round(grid.misfit, 9), float(unlike[k]), grid))
-    return [grid for _, _, grid in sorted(found, key=lambda row: row[:2])]
+            found.append((bool(too_large[k]), round(grid.misfit, 9), float(unlike[k]), grid))
+    return [grid for *_, grid in sorted(found, key=lambda row: row[:3])]
+
+
+def _too_large(edges: np.ndarray, layers: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
+    """Return whether a face of a cut is longer or higher than the blade (N,), in the order of the cuts."""
+    knife = Knife()
+    layer, row = edges[0] / layers, edges[1] / rows
+    faces = (
+        (layers > 1, np.full_like(layer, edges[1]), edges[2]),
+        (rows > 1, layer, edges[2]),
+        (layers * rows < count, layer, row),
+    )
+    beyond = [cut & ((np.maximum(a, b) > knife.length) | (np.minimum(a, b) > knife.height)) for cut, a, b in faces]
+    return np.asarray(np.any(beyond, axis=0))
 
 
 @lru_cache(maxsize=256)

@@ -37,6 +37,7 @@ def thing_of(name: str) -> Body:
         "bar": lambda: trimesh.creation.box(BAR),
         "square bar": lambda: trimesh.creation.box(SQUARE),
         "block": lambda: trimesh.creation.box(CUBE),
+        "board": lambda: trimesh.creation.box((0.06, 0.2, 0.22)),  # wider than the blade is high
         "cylinder": lambda: trimesh.creation.cylinder(0.02, 0.09),
         "disc": lambda: trimesh.creation.cylinder(0.06, 0.02),
         "cone": lambda: trimesh.creation.cone(0.03, 0.12),
@@ -73,6 +74,7 @@ def mesh_of(body: Body) -> trimesh.Trimesh:
         ("disc", "slices", (8,)),
         ("cucumber", "strips", (4, 7)),
         ("square bar", "strips", (4, 9)),
+        ("board", "strips", (4, 9)),
         ("bread", "cubes", (16, 24)),
         ("block", "cubes", (8,)),
         ("square bar", "cubes", (4,)),
