@@ -34,8 +34,8 @@ class Grid:
 
 
 def grids_of(edges: np.ndarray, thing: np.ndarray, count: int, name: CategoryName) -> list[Grid]:
-    """Return grids of so many cells in a box (3,) [m] of a thing (3,), those first that the blade can cut, whose worst
-    cell is likest to the word, and whose cells are alike."""
+    """Return grids of so many cells in a box (3,) [m] of a thing (3,), those first whose worst cell is likest to the
+    word, and of these those whose cells are alike; only such as the blade can cut, where there are any."""
     meaning = MEANINGS[name]
     layers, rows = _ways(count)
     found: list[tuple[bool, float, float, Grid]] = []
@@ -58,7 +58,8 @@ def grids_of(edges: np.ndarray, thing: np.ndarray, count: int, name: CategoryNam
         for k in np.flatnonzero(kept):
             grid = Grid(axes, int(layers[k]), int(rows[k]), float(misfits[k]), float(thinnest[k]))
             found.append((bool(too_large[k]), round(grid.misfit, 9), float(unlike[k]), grid))
-    return [grid for *_, grid in sorted(found, key=lambda row: row[:3])]
+    found.sort(key=lambda row: row[:3])
+    return [grid for too_large, *_, grid in found if too_large == found[0][0]]
 
 
 def _too_large(edges: np.ndarray, layers: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
