@@ -29,6 +29,8 @@ def verdict(
     """Return the outcome, and what there is to say of it: `ok` where count and shape are as wanted, `partial` where
     there are enough fragments that are not, `not_reached` where there are fewer."""
     said = [word.said for word in words]
+    if not carving.steps and (carving.stopped is not None or len(carving.board) < wanted):
+        said = []  # nothing was cut: why not says more than what the whole thing is
     if carving.stopped is not None:
         return "not_reached", [*said, f"stopped: {carving.stopped.message}"]
     if len(carving.board) < wanted:
