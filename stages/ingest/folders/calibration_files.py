@@ -172,6 +172,14 @@ def _camera_of(document: dict[Any, Any], path: Path) -> CalibrationRecord:
 
 def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) -> FolderCalibration:
     """Return the pair in OpenCV's stereo calibration: a point is x_right = R x_left + T."""
+    size = _size(document, path)
+    records = []
+    for name, number in ((first, "1"), (second, "2")):
+        matrix = _matrix(document[name], 3, 3)
+        if matrix is None:
+            raise BadInput(f"{path}: {name} is no 3x3 matrix")
+        coefficients = _numbers(_first(document, f"D{number}", f"distCoeffs{number}")) or ()
+        records.append(_record(matrix, size, path, coefficients, "plumb_bob"))
     notes: tuple[str, ...] = ()
     if "R" not in document or "T" not in document:
         beside = next((path.parent / name for name in EXTRINSICS if (path.parent / name).is_file()), None)
@@ -183,14 +191,6 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
         found = _read_yaml(beside)
         document = {**(found if isinstance(found, dict) else {}), **document}
         path, notes = beside, (f"R and T read from {beside.name}",)
-    size = _size(document, path)
-    records = []
-    for name, number in ((first, "1"), (second, "2")):
-        matrix = _matrix(document[name], 3, 3)
-        if matrix is None:
-            raise BadInput(f"{path}: {name} is no 3x3 matrix")
-        coefficients = _numbers(_first(document, f"D{number}", f"distCoeffs{number}")) or ()
-        records.append(_record(matrix, size, path, coefficients, "plumb_bob"))
     rotation, offset = _matrix(document.get("R"), 3, 3), _numbers(document.get("T"))
     if rotation is None or offset is None or len(offset) != 3 or not is_rigid(transform_from(rotation, np.zeros(3))):
         raise BadInput(
