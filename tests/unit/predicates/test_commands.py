@@ -34,7 +34,7 @@ def test_a_tower_is_built_and_what_is_missing_is_said(learned: Path, tmp_path: P
 
 def test_what_was_learned_is_counted(learned: Path, tmp_path: Path) -> None:
     out = tmp_path / "evaluation"
-    assert run("evaluate", "--learned", str(learned), "--tasks", "1", "--states", "20", "--out", str(out)) == 0
+    assert run("evaluate", "--learned", str(learned), "--each", "1", "--states", "20", "--out", str(out)) == 0
     results = json.loads((out / "results.json").read_text())
     assert [row["ceiling"] for row in results["rows"]] == [1, 1, 1, 1]
     assert min(results["accuracy"].values()) > 0.9
