@@ -52,13 +52,13 @@ def read_task_sets(path: Path, domain: str, seed: int) -> list[TaskSet]:
     Raises BadInput, which names the task, where there is no task of the domain, and for what is none.
     """
     files = [path] if path.is_file() else sorted(path.rglob("*.json"))
-    other_domains = {_letters(name) for name in DOMAINS} - {_letters(domain)}
+    other_domains = {_letters(name): name for name in DOMAINS if name != domain}
     sets: list[TaskSet] = []
     passed_over: set[str] = set()
     for file in files:
-        folders = {_letters(part) for part in file.relative_to(path).parts[:-1]}
-        if folders & other_domains:
-            passed_over |= folders & other_domains
+        others_named = {other_domains.get(_letters(part), "") for part in file.relative_to(path).parts[:-1]} - {""}
+        passed_over |= others_named
+        if others_named:
             continue
         document = file_json(file, LARGEST_SETTINGS, hint=HINT)
         if file != path and not _holds_tasks(document):
@@ -111,9 +111,25 @@ def _check_objects(objects: Mapping[str, tuple[float, float]], place: str) -> No
                 f"{place}: {name} at ({x:g}, {y:g}) is not above the table",
                 hint=f"x from {TABLE_LEFT:g} to {TABLE_RIGHT:g}, y from 0 to {-TABLE_LEFT:g}",
             )
+        if not _stands(objects, name):
+            raise BadInput(f"{place}: {name} at ({x:g}, {y:g}) stands on nothing", hint="y is the height of its bottom")
     for one, other in combinations(objects, 2):
         if "container" not in (kinds[one].shape, kinds[other].shape) and _overlap(objects, one, other):
             raise BadInput(f"{place}: {one} and {other} are in the same place", hint="(middle x, bottom y) of each")
+
+
+def _stands(objects: Mapping[str, tuple[float, float]], name: str) -> bool:
+    """Whether an object is on the table, on the top of another, or within a container."""
+    kinds = kitchen_file().objects
+    x, y = objects[name]
+    if abs(y) <= TOLERANCE:
+        return True
+    for other, (u, v) in objects.items():
+        kind = kinds[other]
+        near = other != name and abs(x - u) < (kinds[name].width + kind.width) / 2
+        if near and (abs(v + kind.height - y) <= TOLERANCE or (kind.shape == "container" and v < y < v + kind.height)):
+            return True
+    return False
 
 
 def _overlap(objects: Mapping[str, tuple[float, float]], one: str, other: str) -> bool:
