@@ -16,7 +16,7 @@ def _words_of(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-PILING = _words_of("stack stacked stacking pile piled piling build")
+PILING = _words_of("stack stacked stacking pile piled piling build tower")
 VERBS = PILING | _words_of(
     "put place set lay move bring get transfer keep store load arrange drop add pour fill cook boil push slide shift "
     "serve leave position rest prepare make collect placed stored poured filled moved "
@@ -35,7 +35,8 @@ FILLERS = _words_of(
 ANYTHING = _words_of("objects things items blocks foods food cans ingredients everything all")
 """Words for things that do not name them."""
 _ORDER = (
-    r"(?:in (?:the )?(?:this |that |following |given )?(?:order|sequence)(?: of)?|on top of (?:each other|one another))"
+    r"(?:(?:in|with|by) (?:the |an? )?(?:this |that |following |given )?(?:order|sequence)(?: of)?"
+    r"|(?:one )?on(?: top of)? (?:each other|one another|another))"
 )
 _IDIOMS = (
     (re.compile(r"\b(?:from )?(?:the )?top (?:down )?to (?:the )?bottom\b|\btop[- ]down\b"), " ~down "),
@@ -63,6 +64,9 @@ _IDIOMS = (
 )
 """What is said in several words, and what says nothing of where things are."""
 _TOKEN = re.compile(r"~\w+|<\d>|[\w'-]+|\S")
+
+FILLED = ("having", "")
+"""Stands before `water` that was taken with what it is in."""
 
 
 class Unread(Exception):
@@ -113,7 +117,7 @@ def clauses_of(sentence: str, names: Sequence[str]) -> list[Clause]:
         elif kind == "having":
             _have(clause, words, number)
         elif kind == "object" or kind == "anything":
-            if words[number - 1 : number] == [("having", "with")] and word == WATER:
+            if words[number - 1 : number] == [FILLED] and word == WATER:
                 continue
             here = clause.group if clause.listed is None else clause.listed
             for name in _meant(word, [each for each in named if each not in clause.going]):
@@ -128,15 +132,18 @@ def clauses_of(sentence: str, names: Sequence[str]) -> list[Clause]:
 
 
 def _have(clause: Clause, words: list[tuple[str, str]], number: int) -> None:
-    """Take `pot with water` and `water with cup`."""
+    """Take `pot with water`, `water with cup`, and `sausage with water in pot`, where both are wanted there. Raises
+    Unread where something has anything but water."""
     before, after = clause.group, words[number + 1] if number + 1 < len(words) else ("", "")
-    if after == ("object", WATER) and before:
-        words[number] = ("having", "with")
+    if after == ("object", WATER) and before and words[number + 2 : number + 3] != [("place", "in")]:
+        words[number] = FILLED
         filled = [word for word in before if word != WATER]
         clause.with_water.extend(filled if not clause.places else filled[-1:])
     elif before[-1:] == [WATER] and after[0] == "object":
         before.pop()
         clause.with_water.append(after[1])
+    elif words[number][1] != "with":
+        raise Unread(f"{words[number][1]!r} is read of water alone")
 
 
 def _settle(clause: Clause) -> None:
