@@ -92,7 +92,8 @@ def _phrases_by_kind(known: Collection[str]) -> dict[Relation, tuple[str, tuple[
             continue
         if len(relations) == 1:
             kind, objects = _kind_of(relations[0], slots)
-            said.setdefault(kind, (phrase, tuple(slots.index(slot) for slot in objects)))
+            if {slot for slot in slots if slot in phrase} == set(objects):
+                said.setdefault(kind, (phrase, tuple(slots.index(slot) for slot in objects)))
     return said
 
 
