@@ -63,6 +63,21 @@ def test_masks_as_they_should_be(plain: Path, tmp_path: Path) -> None:
     assert min(overlaps(tmp_path / "shifted", frames=list(range(COUNT - 1))).values()) < 0.4
 
 
+@pytest.fixture(scope="module")
+def without_walls(plain: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
+    """How well things lie where they are when their masks are read right and nothing is masked beside them.
+
+    The cabinet has 0.69 here and 0.98 at 640 x 480: of so small a picture few depth segments end at its foot, and what
+    a mask has of a segment that is mostly unmasked wall is lost to it (docs/MAPPING.md, "label of a segment").
+    """
+    root = tmp_path_factory.mktemp("things")
+    masks = id_pictures(root / "masks", [f"{k:06d}.png" for k in range(COUNT)], [image * (image > 1) for image in TRUE])
+    assert segment(plain, masks, root / "segments").code == 0
+    found = overlaps(root / "segments")
+    assert min(found.values()) > 0.6
+    return found
+
+
 # ---- 4: names --------------------------------------------------------------------------------------------------------
 
 
@@ -275,16 +290,18 @@ def test_yolo_polygons(plain: Path, tmp_path: Path) -> None:
     right_or_clear(plain, root, tmp_path, r"YOLO|\.txt|polygon|formats")
 
 
-def test_the_ignore_label(plain: Path, tmp_path: Path) -> None:
+def test_the_ignore_label(plain: Path, without_walls: dict[str, float], tmp_path: Path) -> None:
     """255 is "ignore" in semantic PNGs (open-mmlab/mmsegmentation #2613, CAMMA-public/Endoscapes #5): no thing is
-    made of it, or 255 is named."""
+    made of it, and 255 is named."""
     images = []
     for image in TRUE:
         ignored = image.copy()
         ignored[image == 1] = 255
         images.append(ignored)
     masks = id_pictures(tmp_path / "masks", [f"{k:06d}.png" for k in range(COUNT)], images)
-    right_or_clear(plain, masks, tmp_path, "255")
+    said = segment(plain, masks, tmp_path / "segments")
+    assert said.code == 0 and said.names("255"), said.text
+    assert overlaps(tmp_path / "segments") == without_walls
 
 
 def test_cityscapes_instance_ids(plain: Path, tmp_path: Path) -> None:
@@ -314,14 +331,16 @@ def test_one_bit_masks(plain: Path, tmp_path: Path) -> None:
     assert overlaps(tmp_path / "segments")["cup"] > 0.7, said.text
 
 
-def test_black_and_white_masks_a_folder_a_class(plain: Path, tmp_path: Path) -> None:
+def test_black_and_white_masks_a_folder_a_class(plain: Path, without_walls: dict[str, float], tmp_path: Path) -> None:
     """cup/000000.png, table/000000.png ... in 0 and 255 (HumanSignal/label-studio #7346 exports PNGs a label):
     read, or refused by the folders, not by "keep one of them"."""
     root = tmp_path / "masks"
     for name, number in THINGS.items():
         for k, image in enumerate(TRUE):
             write_ids(root / name / f"{k:06d}.png", np.where(image == number, 255, 0).astype(np.uint8))
-    right_or_clear(plain, root, tmp_path, "folder|class")
+    said = segment(plain, root, tmp_path / "segments")
+    assert said.code == 0, said.text
+    assert overlaps(tmp_path / "segments") == without_walls
 
 
 def test_masks_as_jpeg(plain: Path, tmp_path: Path) -> None:
