@@ -19,9 +19,11 @@ from tests.strangers.logs import write_bag, write_images, write_nerfstudio, writ
 from tests.strangers.pictures import (
     COUNT,
     NAMES,
+    RED_AND_BLUE,
     SHOTS,
     THINGS,
     TRUE,
+    classes_at,
     outline,
     overlaps,
     right_or_clear,
@@ -388,25 +390,8 @@ CUP, CHAIR = 41, 56
 
 
 def shown_red_and_blue(tmp_path: Path) -> Path:
-    """A sequence whose every picture is red on the left and blue on the right, black below: what the tiny networks
-    find."""
-    picture = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    picture[: HEIGHT * 3 // 4, : WIDTH // 2, 0] = 255
-    picture[: HEIGHT * 3 // 4, WIDTH // 2 :, 2] = 255
-    recorded = [(picture, depth, pose) for _, depth, pose in SHOTS[:2]]
-    return sequence_of(write_images(tmp_path / "log", recorded), tmp_path / "sequence")
-
-
-def classes_at(segments: Path, frame: int = 0) -> tuple[float, float]:
-    """Return the shares of the red part that is `cup` and of the blue part that is `chair`."""
-    from scenewright.schemas.segments import Segments
-
-    from tests.strangers.pictures import numbers
-    from tests.unit.segment.test_stage import class_image
-
-    found = class_image(Segments(segments), frame)
-    red, blue = found[8 : HEIGHT // 2, 8 : WIDTH // 2 - 8], found[8 : HEIGHT // 2, WIDTH // 2 + 8 : -8]
-    return float(np.isin(red, list(numbers("cup"))).mean()), float(np.isin(blue, list(numbers("chair"))).mean())
+    """A sequence of what the tiny networks find."""
+    return sequence_of(write_images(tmp_path / "log", RED_AND_BLUE), tmp_path / "sequence")
 
 
 def network_is_right_or_clear(weights: Path, tmp_path: Path, backend: str, *words: str, void: str = "") -> None:
