@@ -23,6 +23,7 @@ from scenewright.stages.library.importing.limits import (
     MOST_TRIANGLES_OF_A_FILE,
     Allowance,
     few_findings,
+    one_color,
     refuse_many,
 )
 from scenewright.stages.library.importing.primitives import ball, capsule
@@ -56,6 +57,8 @@ UNLIMITED = 1e3
 """Limits beyond this many radians or metres mean none (SDF's default is 1e16)."""
 AXES_IN_JOINT_FRAMES = (1, 5)
 """The first version in which an axis is in its joint's frame."""
+LOOKS = {"material script": "material/script/name", "texture": "material/pbr/metal/albedo_map"}
+"""What of a material holds more than a colour, and where it is named."""
 NO_PARENT_MODEL_FRAME = (1, 7)
 """The first version without `use_parent_model_frame`."""
 KNOWN: Table = {
@@ -177,6 +180,9 @@ class _Reader:
             raise BadInput(f"{where}: no geometry")
         pose = self._pose_in_link(element, link)
         color = None
+        for kind, looks in LOOKS.items():
+            for look in element.iterfind(looks):
+                self.findings.append(one_color(kind, (look.text or "").strip()))
         if diffuse := element.findtext("material/diffuse"):
             red, green, blue, _ = numbers(diffuse, 4, f"{where}: diffuse")
             color = (float(red), float(green), float(blue))

@@ -141,6 +141,16 @@ TOLD = {
         PLAIN.replace(LIMIT, f'{LIMIT}<mimic joint="other"><multiplier>1</multiplier></mimic>'),
         "joint 'hinge' follows joint 'other' (mimic): here both move freely",
     ),
+    "script": (
+        PLAIN.replace("</visual>", "<material><script><name>Gazebo/Wood</name></script></material></visual>", 1),
+        "material script 'Gazebo/Wood' is not read: what it covers has one colour",
+    ),
+    "texture": (
+        PLAIN.replace(
+            "</visual>", "<material><pbr><metal><albedo_map>a.png</albedo_map></metal></pbr></material></visual>", 1
+        ),
+        "texture 'a.png' is not read: what it covers has one colour",
+    ),
     "use_parent_model_frame of 1.7": (
         PLAIN.replace(LIMIT, f"<use_parent_model_frame>true</use_parent_model_frame>{LIMIT}"),
         "joint 'hinge': use_parent_model_frame means nothing since SDF 1.7: its axis is in its own frame",
