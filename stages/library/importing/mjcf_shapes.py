@@ -88,7 +88,7 @@ def _mesh(
     geom: Placed, attributes: Attributes, color: tuple[float, float, float] | None, by: Gathered, where: str
 ) -> list[Surface]:
     document, name, label = geom.document, attributes["mesh"], attributes.get("name", "")
-    kind = attributes.get("type", "mesh")
+    kind = attributes.get("type", "sphere")
     if kind not in ("mesh", "sdf"):
         by.findings.append(f"a {kind:.20} is fitted to mesh {name!r:.40} (type, mesh): the mesh itself is taken")
     element = document.assets["mesh"].get(name)
