@@ -8,13 +8,14 @@ from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import opened
-from scenewright.stages.ingest.folders.calibration_files import calibration_file
+from scenewright.stages.ingest.folders.calibration_search import calibration_file
 from scenewright.stages.ingest.folders.files import read_json
 from scenewright.stages.ingest.folders.pose_files import pose_file
 
 HEAD = 4_000_000
 """Bytes of a file in which the words of a tool are looked for."""
 SHOWN = 5
+TABLES = (".json", ".csv", ".yaml", ".yml", ".xml", ".ini", ".toml", ".cfg")
 """Most files that a message names."""
 THEN = ", then ingest OUT"
 UNPACK = "unpack it into a folder and give that folder"
@@ -108,8 +109,8 @@ def refuse_lone_recording(root: Path) -> None:
 
 
 def unread_tables(root: Path, read: tuple[str, ...]) -> str:
-    """Return the JSON and CSV files in a folder, without those `read`: they may say what is missing."""
-    names = sorted(p.name for p in root.iterdir() if p.suffix.lower() in (".json", ".csv") and p.name not in read)
+    """Return the files of tables and settings in a folder, without those `read`: they may say what is missing."""
+    names = sorted(p.name for p in root.iterdir() if p.suffix.lower() in TABLES and p.name not in read)
     return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} files)" if len(names) > SHOWN else "")
 
 
