@@ -14,7 +14,7 @@ from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.ingest.messages.survey import LogContent
 from scenewright.stages.ingest.messages.topic_names import is_rectified, is_registered
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.stereo import stereo_lenses
+from scenewright.stages.ingest.stereo import UNCLEAR, in_metres, projected_baseline, stereo_lenses
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 SAME_PLACE = 1e-6
@@ -233,9 +233,13 @@ def _with_right(topics: CameraTopics, content: LogContent, parameters: IngestPar
         where,
         parameters.baseline,
     )
+    unit: tuple[str, ...] = ()
+    if parameters.baseline is None and projected_baseline(*calibrations) and abs(baseline) >= UNCLEAR[0]:
+        baseline, note = in_metres(baseline, where)  # transforms are in metres, projections of whoever calibrated
+        unit = (note,) if note else ()
     turn = np.eye(3) if left.camera_from_frame is None else left.camera_from_frame
     frame_from_camera = transform_from(turn.T, np.zeros(3))
-    notes = (*left.notes, *right.notes, f"stereo pair {names[0]} and {names[1]}, {abs(baseline):.4g} m apart")
+    notes = (*left.notes, *right.notes, *unit, f"stereo pair {names[0]} and {names[1]}, {abs(baseline):.4g} m apart")
     geometry = CameraGeometry(
         left.camera, frames[0], frame_from_camera, left, None, right, baseline, notes=tuple(dict.fromkeys(notes))
     )
