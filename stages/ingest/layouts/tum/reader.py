@@ -223,10 +223,11 @@ def _camera(
 ) -> tuple[RecordedCamera, float | None, tuple[str, ...]]:
     """Return the colour camera, from a file, else the data set's own by the folder's name, else from options; and the
     stored depth per metre where the file states it."""
-    path = next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
+    given = all_intrinsics_given(parameters)  # what files say of the camera does not count then
+    path = None if given else next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
     if path is not None:
         return _read_calibration(path, size), None, (f"intrinsics read from {path.name}",)
-    path = None if all_intrinsics_given(parameters) else calibration_of(root)
+    path = None if given else calibration_of(root)
     if path is not None:
         calibration = read_calibration(path)
         return recorded_camera(calibration.left, size, str(path)), calibration.depth_units, calibration.notes
@@ -244,7 +245,7 @@ def _camera(
         recorded = RecordedCamera(pinhole(numbers, size, str(root)), lens_of(coefficients, str(root)))
         undone = ", lens distortion undone in colour and depth" if coefficients else ""
         return recorded, None, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
-    if all_intrinsics_given(parameters):
+    if given:
         return RecordedCamera(camera_from_options(size, parameters, str(root))), None, ()
     refuse_several(root)
     shape = f"images are {size[0]}x{size[1]}" if size else "no image can be decoded"
