@@ -207,7 +207,7 @@ def _apart_geometry(
     note = f"WARNING: {_apart(topics, content)}: {why}"
     if fits:
         return CameraGeometry(depth.camera, frame, np.eye(4), color, depth, registered=False, notes=(*notes, note))
-    note += f"; colour ({width}x{height}) left out, as it is of another shape (--color-topic alone takes it alone)"
+    note += f"; colour ({width}x{height}) left out, as it is of another shape"
     return CameraGeometry(depth.camera, frame, np.eye(4), None, depth, notes=(*notes, note))
 
 
@@ -219,7 +219,7 @@ def _apart(topics: CameraTopics, content: LogContent) -> str:
 
 def _with_right(topics: CameraTopics, content: LogContent, parameters: IngestParameters, where: str) -> CameraGeometry:
     if topics.color is None or topics.right is None:
-        raise BadInput(f"{where}: no left images for {topics.right}", hint="give --color-topic")
+        raise BadInput(f"{where}: no left images for {topics.right}", hint="a pair needs the images of both")
     names = topics.color, topics.right
     calibrations = tuple(_needed_calibration(name, content, where) for name in names)
     sizes = tuple(content.images[name].size for name in names)
