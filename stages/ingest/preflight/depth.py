@@ -69,7 +69,11 @@ def units_per_metre(notes: Iterable[str], depth_scale: float | None) -> float:
     (millimetres, which every other reader takes)."""
     if depth_scale is not None:
         return depth_scale
-    noted = [match for note in notes if (match := re.match(r"depth unit assumed: 1/([0-9.e+]+) m", note))]
+    noted = [
+        match
+        for note in notes
+        if (match := re.match(r"depth unit (?:assumed|stated by the calibration): 1/([0-9.e+]+) m", note))
+    ]
     return float(noted[0][1]) if noted else 1000.0
 
 

@@ -13,6 +13,7 @@ from scenewright.schemas.manifest import MANIFEST_NAME
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.detection import log_format, open_log
 from scenewright.stages.ingest.foreign import refuse_foreign_folder, refuse_lone_recording
+from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
 from scenewright.stages.ingest.preflight.bits import bits_finding
@@ -64,16 +65,6 @@ LEAST_FRAMES = 12
 HEAVY_LOSS, LOSS = 0.5, 0.1
 """Shares of the frames that are lost from which a log is wasted, and doubtful."""
 NO_POSES = PoseReport(verdict="none", method="none", detail="the frames have no poses")
-ADVICE = {
-    "no_depth_within_tolerance": "compare the clocks of colour and depth; ingest has --maximum-time-difference",
-    "missing_pose": "ingest has --maximum-transform-gap, --pose-topic and --world-frame",
-    "size_mismatch": "colour and depth of a frame must have one shape",
-    "depth_not_16_bit": "pictures of depth for people are no depth: record 16-bit or float images",
-    "no_valid_depth": "is the depth unit right (--depth-scale)?",
-    "missing_color": "colour and depth files must pair",
-    "missing_depth": "colour and depth files must pair",
-}
-"""Reason for which frames are lost -> what to do."""
 SEVERITIES = ("wasted", "doubtful", "note")
 
 

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.scene_parts import Camera
-from scenewright.stages.ingest.folders.calibration_files import NAMES as CALIBRATION_NAMES
-from scenewright.stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
+from scenewright.stages.ingest.folders.calibration_files import FolderCalibration
+from scenewright.stages.ingest.folders.calibration_search import NAMES as CALIBRATION_NAMES
+from scenewright.stages.ingest.folders.calibration_search import calibration_of, find_calibration, refuse_several
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
@@ -62,7 +63,7 @@ def matches(root: Path) -> str | None:
     words = has_images(root)
     if words is None:
         return None
-    file = calibration_file(root)
+    file = calibration_of(root)
     return f"folder with {words}" + (f" and {file.name}" if file else "") + ": plain images"
 
 
@@ -91,7 +92,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     calibration = _calibration(root, images, parameters)
     size = _size(images, video, has_depth, (calibration.left.width, calibration.left.height))
     eyes = _eyes(calibration, size, any(images.rights), root, parameters.baseline)
-    form, unit_note = depth_form(parameters, 1000.0, () if images.depth_is_disparity else images.depths)
+    units = calibration.depth_units
+    form, unit_note = depth_form(parameters, 1000.0, () if images.depth_is_disparity else images.depths, units)
     if images.depth_is_disparity:
         unit_note = "depth computed from the disparity: Z = fx * baseline / (disparity + doffs)"
     times, time_note = _times(root, names, video, parameters)
@@ -143,6 +145,7 @@ def _calibration(root: Path, images: FolderImages, parameters: IngestParameters)
         return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option", *unread))
     calibration = find_calibration(root, images.camera_number)
     if calibration is None:
+        refuse_several(root)
         beside = unread_tables(root, CALIBRATION_NAMES)
         why = f"{root}: there is no calibration file" + (f" (not read: {beside})" if beside else "")
         camera_from_options(None, parameters, why)

@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.association import mutual_nearest
+from scenewright.stages.ingest.folders.calibration_files import read_calibration
+from scenewright.stages.ingest.folders.calibration_search import calibration_of, refuse_several
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
@@ -29,7 +31,12 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes, read_stamped_poses, scaled
-from scenewright.stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
+from scenewright.stages.ingest.folders.undistortion import (
+    RecordedCamera,
+    lens_of,
+    overridden_recording,
+    recorded_camera,
+)
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.stamps import exact_stamps
@@ -87,9 +94,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     refuse_exr((path.name for path in depths.paths), str(root))
     poses = _poses(root, unit)
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
-    recorded, notes = _camera(root, size, parameters, icl_nuim)
+    recorded, units, notes = _camera(root, size, parameters, icl_nuim)
     recorded, notes_of_options = overridden_recording(recorded, parameters)
-    stored, unit_note = depth_form(parameters, UNITS_PER_METRE, depths.paths)
+    stored, unit_note = depth_form(parameters, UNITS_PER_METRE, depths.paths, units)
     form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), stored)
     tolerance = round(parameters.maximum_time_difference * 1e9)
     main_list = colors if colors.paths else depths
@@ -213,15 +220,23 @@ def _icl_notes(parameters: IngestParameters) -> tuple[str, ...]:
 
 def _camera(
     root: Path, size: tuple[int, int] | None, parameters: IngestParameters, icl_nuim: bool
-) -> tuple[RecordedCamera, tuple[str, ...]]:
-    """Return the colour camera: from a file, else the data set's own by the folder's name, else from options."""
-    path = next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
+) -> tuple[RecordedCamera, float | None, tuple[str, ...]]:
+    """Return the colour camera, from a file, else the data set's own by the folder's name, else from options; and the
+    stored depth per metre where the file states it."""
+    given = all_intrinsics_given(parameters)  # what files say of the camera does not count then
+    path = None if given else next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
     if path is not None:
-        return _read_calibration(path, size), (f"intrinsics read from {path.name}",)
+        return _read_calibration(path, size), None, (f"intrinsics read from {path.name}",)
+    path = None if given else calibration_of(root)
+    if path is not None:
+        calibration = read_calibration(path)
+        return recorded_camera(calibration.left, size, str(path)), calibration.depth_units, calibration.notes
     standard = size in (None, (640, 480))
     if icl_nuim and standard:
-        return RecordedCamera(pinhole(ICL_NUIM, size, str(root))), (
-            "intrinsics assumed: ICL-NUIM, 481.2 480 319.5 239.5",
+        return (
+            RecordedCamera(pinhole(ICL_NUIM, size, str(root))),
+            None,
+            ("intrinsics assumed: ICL-NUIM, 481.2 480 319.5 239.5",),
         )
     match = FREIBURG_NAME.search(root.resolve().name.lower())
     if match and standard:
@@ -229,9 +244,10 @@ def _camera(
         listed = " ".join(f"{value:g}" for value in numbers)
         recorded = RecordedCamera(pinhole(numbers, size, str(root)), lens_of(coefficients, str(root)))
         undone = ", lens distortion undone in colour and depth" if coefficients else ""
-        return recorded, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
-    if all_intrinsics_given(parameters):
-        return RecordedCamera(camera_from_options(size, parameters, str(root))), ()
+        return recorded, None, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
+    if given:
+        return RecordedCamera(camera_from_options(size, parameters, str(root))), None, ()
+    refuse_several(root)
     shape = f"images are {size[0]}x{size[1]}" if size else "no image can be decoded"
     raise BadInput(
         f"{root}: intrinsics are not known: there is no {CALIBRATIONS[0]}, and the folder's name and images ({shape}) "
