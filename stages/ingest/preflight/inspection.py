@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -74,6 +75,8 @@ ADVICE = {
     "missing_depth": "colour and depth files must pair",
 }
 """Reason for which frames are lost -> what to do."""
+TAKEN = re.compile(r"WARNING: (.* taken .*) \((--.*)\)")
+"""A warning of a reader that takes one thing for another, and the option that decides."""
 SEVERITIES = ("wasted", "doubtful", "note")
 
 
@@ -184,9 +187,10 @@ def inspect_source(
     has_poses = any(report.poses.verdict != "none" for report in reports)
     findings = [
         *_frame_findings(frames, source),
+        *warning_findings(source),
         *_content_findings(reports, source),
         *findings,
-        *stream_findings(streams),
+        *stream_findings(streams, source.notes),
         *gravity_findings(gravity, has_poses),
     ]
     if len(source.cameras) == 1:
@@ -418,6 +422,12 @@ def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
         further = f" (and {len(source.damage) - 1} more)" if len(source.damage) > 1 else ""
         add("doubtful", f"the log is damaged: {source.damage[0]}{further}", "what is whole is used")
     return findings
+
+
+def warning_findings(source: LogSource) -> list[Finding]:
+    """Return the reader's warnings about times and depth: what it took in the place of what the log seems to say."""
+    found = (TAKEN.fullmatch(note) for note in source.notes)
+    return [Finding(severity="doubtful", check="reading", message=match[1], fix=match[2]) for match in found if match]
 
 
 def _matrices(source: LogSource) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from scenewright.stages.ingest.clocks import FASTEST, NO_RATE
 from scenewright.stages.ingest.preflight.report import Finding, Gaps, StreamReport, exact, significant
 from scenewright.stages.ingest.source import Entry, LogSource, StreamInfo
 
@@ -121,13 +122,18 @@ def _offset_line(color: np.ndarray, depth: np.ndarray) -> str:
     return line
 
 
-def stream_findings(streams: Iterable[StreamReport]) -> list[Finding]:
-    """Return what is odd about the streams."""
+def stream_findings(streams: Iterable[StreamReport], notes: Iterable[str] = ()) -> list[Finding]:
+    """Return what is odd about the streams; a rate that a note of the reader speaks of is not spoken of again."""
     findings = []
+    told = any(NO_RATE in note for note in notes)
     for stream in streams:
         if stream.role in ("calibration", "transforms", "other", "unreadable"):
             continue
-        if stream.gaps.count and (
+        if stream.role in ("color", "depth", "right") and (stream.rate or 0.0) > FASTEST:
+            if not told:
+                message = f"{stream.name}: stamps make {stream.rate:,.0f} pictures a second, {NO_RATE}"
+                findings.append(Finding(severity="doubtful", check="streams", message=message))
+        elif stream.gaps.count and (
             stream.gaps.longest > LONG_GAP or stream.gaps.count > MANY_GAPS * max(stream.count - 1, 1) + 1
         ):
             findings.append(
