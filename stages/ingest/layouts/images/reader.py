@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.ingest.clocks import in_file_order, order_note, stamps_problem
 from scenewright.stages.ingest.folders.calibration_files import NAMES as CALIBRATION_NAMES
 from scenewright.stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
 from scenewright.stages.ingest.folders.files import (
@@ -28,7 +29,7 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
+from scenewright.stages.ingest.folders.pose_files import Pose, columns_of, pose_file, read_pose_list
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes
 from scenewright.stages.ingest.foreign import unread_tables
 from scenewright.stages.ingest.images import DepthForm, decode_as_calibrated, depth_millimetres, usable_color
@@ -364,7 +365,7 @@ def _poses(
 def _streams(
     images: FolderImages, names: tuple[str, ...], times: np.ndarray, time_note: str, posed: int
 ) -> tuple[StreamInfo, ...]:
-    recorded = not time_note.startswith("times assumed")
+    recorded = time_note.startswith(("times from", "times of"))
     if images.video is not None:
         return (StreamInfo(images.video.name, "color", "video", times if recorded else times[:0], len(names)),)
     streams = []
