@@ -322,13 +322,17 @@ def _times(
         if len(rows) != len(names):
             raise BadInput(f"{path}: {len(rows)} times for {len(names)} images", hint="one line an image, in order")
         column = exact_stamps([text for _, text in rows], [where for where, _ in rows])
+        stamps = np.array([stamp for stamp in column.stamps if stamp is not None], np.int64)
+        poses = pose_file(root)
+        are_looked_up = poses is not None and poses.is_file() and columns_of(poses) == 8
+        problem = None if are_looked_up else stamps_problem(stamps.tolist(), names)
+        if problem is not None:
+            return in_file_order(len(names), parameters.frame_rate), order_note(f"{path.name}: {problem}", parameters)
         words = column.note or "seconds"
-        return np.array([stamp for stamp in column.stamps if stamp is not None], np.int64), (
-            f"times from {path.name}, {words.removeprefix('stamps in ')}"
-        )
-    stamps = stamps_of(names)
-    if stamps is not None:
-        return stamps, "times from the file names"
+        return stamps, f"times from {path.name}, {words.removeprefix('stamps in ')}"
+    named = stamps_of(names)
+    if named is not None:
+        return named, "times from the file names"
     rate = video.rate if video is not None and 0 < video.rate < 1e5 else parameters.frame_rate
     where = "of the video" if rate != parameters.frame_rate else "assumed"
     stamps = np.rint(np.arange(len(names)) * 1e9 / rate).astype(np.int64)

@@ -215,7 +215,7 @@ def _paired(
     if all(counts) and counts[0] != counts[1]:
         raise BadInput(
             f"{root}: {problem}, and {counts[0]} pictures and {counts[1]} depth images have no common order",
-            hint=f"write {ASSOCIATIONS[1]} in the place of {COLOR_LIST}: a line `number picture number depth` for a frame",
+            hint=f"put {ASSOCIATIONS[1]} in the place of {COLOR_LIST}: a line `number picture number depth` a frame",
         )
     stamps = in_file_order(max(counts), parameters.frame_rate)
     colors, depths = (replace(each, stamps=stamps[: len(each.paths)]) for each in (colors, depths))
