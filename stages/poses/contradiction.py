@@ -35,7 +35,8 @@ def contradicted(
 
     Compared are key frames, or all where there are none, both ways: what lies behind a surface may be hidden, what
     lies before it should have been seen. The median over them counts. Frames that fail are judged again beside those
-    that do not, so that a wrong neighbour is not held against them.
+    that do not, so that a wrong neighbour is not held against them; where none of these sees the same, nobody can say
+    which is wrong, and all are.
     """
     placed = [pose for pose in poses if pose.world_from_camera is not None]
     if len(placed) <= LEAST_COMPARED:
@@ -43,9 +44,20 @@ def contradicted(
     views = _Views(reader, camera, placed, maximum_depth)
     keys = [row for row, pose in enumerate(placed) if pose.status == "key"]
     others = keys if len(keys) > COMPARED else list(range(len(placed)))
-    failed = {row for row in range(len(placed)) if views.agreement(row, others) < least_agreement}
+    failed = [
+        row for row in range(len(placed)) if _below(views.agreements(row, others), LEAST_COMPARED, least_agreement)
+    ]
     sound = [row for row in others if row not in failed]
-    return {placed[row].frame for row in sorted(failed) if views.agreement(row, sound) < least_agreement}
+
+    def is_cleared(row: int) -> bool:
+        beside_sound = views.agreements(row, sound)
+        return bool(beside_sound) and not _below(beside_sound, 1, least_agreement)
+
+    return {placed[row].frame for row in failed if not is_cleared(row)}
+
+
+def _below(agreements: Sequence[float], fewest: int, least: float) -> bool:
+    return len(agreements) >= fewest and float(np.median(agreements)) < least
 
 
 class _Views:
@@ -64,8 +76,8 @@ class _Views:
             image = np.zeros((camera.height, camera.width), np.float32) if depth is None else depth
             self._depths.append(np.where(image <= maximum_depth, image, 0)[first::step, first::step].astype(np.float32))
 
-    def agreement(self, row: int, others: Collection[int]) -> float:
-        """Return the median share of a frame's depth that agrees with that of others; 1 where nothing can be said."""
+    def agreements(self, row: int, others: Collection[int]) -> list[float]:
+        """Return the shares of a frame's depth that agree with that of the others which see most of the same."""
         near = self._nearest(row, np.array([other for other in others if other != row], dtype=int))
         shares = []
         for other in near.tolist():
@@ -75,7 +87,7 @@ class _Views:
             if shared >= LEAST_SHARED and seen + floating >= LEAST_PIXELS:
                 shares.append((shared, seen / (seen + floating)))
         shares.sort(reverse=True)
-        return float(np.median([share for _, share in shares[:COMPARED]])) if len(shares) >= LEAST_COMPARED else 1.0
+        return [share for _, share in shares[:COMPARED]]
 
     def _points(self, row: int, step: int) -> np.ndarray:
         """Return points (N, 3) of every so many-th pixel of a frame, in its camera [m]."""
