@@ -273,7 +273,7 @@ def _judge_camera(
     motion = motion_report(poses, material.times, looks, choice.runs) if poses is not None else None
     findings += calibration_findings(calibration, source_camera.camera, name)
     if depth is not None:
-        findings += depth_findings(depth, units, name)
+        findings += depth_findings(depth, units, name, has_poses=poses is not None)
     if stereo is not None:
         findings += stereo_findings(stereo, name)
     if poses is not None:

@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.stages.ingest.clocks import FASTEST, NO_RATE
 from scenewright.stages.ingest.preflight.report import Finding, Gaps, StreamReport, exact, significant
 from scenewright.stages.ingest.source import Entry, LogSource, StreamInfo
+from scenewright.stages.kit.formats.stamps import USUAL_STEP
 
 GAP_FACTOR = 3.0
 """Intervals over so many medians are gaps."""
@@ -129,9 +130,16 @@ def stream_findings(streams: Iterable[StreamReport], notes: Iterable[str] = ()) 
     for stream in streams:
         if stream.role in ("calibration", "transforms", "other", "unreadable"):
             continue
-        if stream.role in ("color", "depth", "right") and (stream.rate or 0.0) > FASTEST:
+        is_of_images, rate = stream.role in ("color", "depth", "right"), stream.rate or 0.0
+        if is_of_images and stream.count > 2 and 0 < rate < 1 / USUAL_STEP:
+            message = (
+                f"{stream.name}: pictures are {1 / rate:.3g} s apart: are the stamps of another unit than seconds?"
+            )
+            advice = "write them in seconds, where they are"
+            findings.append(Finding(severity="doubtful", check="streams", message=message, fix=advice))
+        if is_of_images and rate > FASTEST:
             if not told:
-                message = f"{stream.name}: stamps make {stream.rate:,.0f} pictures a second, {NO_RATE}"
+                message = f"{stream.name}: stamps make {rate:,.0f} pictures a second, {NO_RATE}"
                 findings.append(Finding(severity="doubtful", check="streams", message=message))
         elif stream.gaps.count and (
             stream.gaps.longest > LONG_GAP or stream.gaps.count > MANY_GAPS * max(stream.count - 1, 1) + 1

@@ -9,11 +9,11 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.formats.frames import FrameReader
 
 from tests.advice.rows import Tried
-from tests.unit.ingest.folder_writers import write_numbered_tum
-from tests.unit.ingest.tiny_room import CAMERA
+from tests.unit.ingest.folder_writers import write_image_folder, write_numbered_tum
+from tests.unit.ingest.tiny_room import CAMERA, frames
 
 CLOCKS, UNITS = "stages/ingest/clocks.py", "stages/ingest/folders/depth_units.py"
-TUM = "stages/ingest/layouts/tum/reader.py"
+DEPTH, TUM = "stages/ingest/preflight/depth.py", "stages/ingest/layouts/tum/reader.py"
 INGEST = "ingest --log log --out out"
 FRAMES = 4
 
@@ -24,6 +24,11 @@ def without_clock(folder: Path) -> None:
 
 def in_millimetres(folder: Path) -> None:
     write_numbered_tum(folder / "log", [index / 30 for index in range(FRAMES)], pairs=True, units=500.0)
+
+
+def five_times_millimetres(folder: Path) -> None:
+    recorded = [(color, depth * np.float32(5), pose) for color, depth, pose in frames(FRAMES)]
+    write_image_folder(folder / "log", [(c, np.rint(d * 200) / 200, p) for c, d, p in recorded], poses=False)
 
 
 def without_calibration(folder: Path) -> None:
@@ -46,6 +51,15 @@ ROWS = [
     *(
         Tried(UNITS, "--depth-scale", INGEST, f"{INGEST} --depth-scale {units}", 0, given=in_millimetres)
         for units in (1000, 5000)
+    ),
+    Tried(
+        DEPTH,
+        "where that is so",
+        "inspect log",
+        "inspect log --depth-scale 5000",
+        0,
+        shows="unit plausible",
+        given=five_times_millimetres,
     ),
     Tried(
         TUM,

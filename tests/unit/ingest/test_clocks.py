@@ -125,13 +125,23 @@ def test_inspect_says_what_is_taken_until_the_rate_is_given(
     assert report.streams[0].reversals == 0
 
 
+@pytest.mark.parametrize(("step", "doubts"), [(1 / 30, 0), (2.0, 0), (33.3, 2)])
+def test_inspect_asks_whether_stamps_are_of_another_unit(tmp_path: Path, step: float, doubts: int) -> None:
+    """Milliseconds from 0 on are seconds as far as a reader can tell."""
+    log = write_numbered_tum(tmp_path / "log", [index * step for index in range(4)], pairs=True)
+    findings = inspect_log(log, ingest_parameters(()), 6, SilentProgress()).report.findings
+    assert sum("33.3 s apart: are the stamps of another unit" in finding.message for finding in findings) == doubts
+
+
 # --- depth units that only the layout states --------------------------------------------------------------------
 
 
 def rescaled(log: Path, factor: Callable[[np.ndarray], np.ndarray]) -> Path:
     """Write each depth image of a folder anew."""
     for path in sorted((log / "depth").iterdir()):
-        path.write_bytes(png(factor(cv2.imread(str(path), cv2.IMREAD_UNCHANGED).astype(float)).astype(np.uint16)))
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        assert image is not None
+        path.write_bytes(png(factor(image.astype(float)).astype(np.uint16)))
     return log
 
 
@@ -166,6 +176,20 @@ def test_values_that_all_hold_the_factor_are_of_the_layout_however_near(tmp_path
     rescaled(log, lambda depth: np.rint(depth * near) * 5)
     median, said = median_of(log)
     assert median == pytest.approx(0.18, rel=0.02) and not said
+
+
+@pytest.mark.parametrize(("factor", "poses", "doubted"), [(5, False, True), (1, False, False), (5, True, False)])
+def test_millimetres_times_five_that_are_read_as_millimetres(
+    tmp_path: Path, factor: int, poses: bool, doubted: bool
+) -> None:
+    """With poses to compare with, these say it."""
+    log = write_image_folder(tmp_path / "log", frames(COUNT), poses=poses)
+    rescaled(log, lambda depth: depth * factor)
+    findings = inspect_log(log, ingest_parameters(()), 12, SilentProgress()).report.findings
+    assert any("multiple of 5" in each.message and "--depth-scale 5000" in each.fix for each in findings) is doubted
+    settings = ("depth_scale=5000",) if factor == 5 else ()
+    after = inspect_log(log, ingest_parameters(settings), 12, SilentProgress()).report.findings
+    assert not any("multiple of 5" in finding.message for finding in after)
 
 
 # --- a recorded log without a clock, in millimetres ---------------------------------------------------------------
