@@ -32,7 +32,7 @@ from benchmarks.board.records import line_text
 from benchmarks.board.rooms import measure_public
 setting = setting_of(Path(sys.argv[1]), sys.argv[2], keep=False)
 setting.generator.prepare()
-(line,) = measure_public(setting, int(sys.argv[3]), (sys.argv[4],))
+(line,) = measure_public(setting, sys.argv[3], (sys.argv[4],))
 Path(sys.argv[5]).write_text(line_text(line), encoding="utf-8")
 """
 """What a judge is asked: folder, method, seed, rung, and the file to write. `make board` has the same doors."""
@@ -66,7 +66,7 @@ def measured_again(line: Line, out: Path) -> Line:
     written = out / "again.jsonl"
     written.parent.mkdir(parents=True, exist_ok=True)
     written.unlink(missing_ok=True)
-    words = [str(out), line.commit, str(line.trial.seed), CHEAPEST, str(written)]
+    words = [str(out), line.commit, line.trial.seed, CHEAPEST, str(written)]
     environment = {**os.environ, "PYTHONPATH": str(judge)}
     done = subprocess.run([sys.executable, "-P", "-c", ONE_TRIAL, *words], env=environment, cwd=judge, check=False)
     if done.returncode:
