@@ -78,21 +78,21 @@ def estimated_dishes(heights: HeightMap, seed: int = 0, limits: Limits = DEFAULT
     random = np.random.default_rng([seed, 74])
     inside = heights.workspace()
     measured = inside & heights.valid
-    result: list[Detection] = []
+    found: list[tuple[float, Detection]] = []
     covered = np.zeros(inside.shape, dtype=np.uint8)
     # What is joined low down, by what hides between things, comes apart higher up: levels from the top down, and what
-    # is a dish at one is left out of the lower ones.
+    # is surely a dish at one is left out of the lower ones.
     for level in LEVELS:
         high = (measured & (heights.smooth > max(level, ROUGH * heights.roughness)) & (covered == 0)).astype(np.uint8)
         for window, of_piece in _pieces(high, heights):
-            dish = _dish(heights, window, of_piece, limits, random)
+            share, dish = _dish(heights, window, of_piece, limits, random)
             if dish is not None:
-                result.append(dish)
-                assert dish.size is not None
-                u, v = heights.pixel(dish.position[0], dish.position[1], dish.lip)
-                reach = (dish.size.rim_radius + AROUND) * float(heights.scale(dish.lip))
-                cv2.circle(covered, (int(u), int(v)), int(reach), 1, -1)
-    result = _apart(result)
+                found.append((share, dish))
+                if share > HALF:
+                    _cover(covered, heights, dish)
+    result = _apart(found)
+    for dish in result:
+        _cover(covered, heights, dish)
     low = max(LEAST_HEIGHT, ROUGH * heights.roughness)
     unexplained = (((measured & (heights.smooth > low)) | (heights.tall & inside)) & (covered == 0)).astype(np.uint8)
     for window, of_piece in _pieces(unexplained, heights):
@@ -105,15 +105,24 @@ def estimated_dishes(heights: HeightMap, seed: int = 0, limits: Limits = DEFAULT
     return tuple(result)
 
 
-def _apart(dishes: list[Detection]) -> list[Detection]:
-    """Return dishes less those whose middle is within one that is surer."""
+def _reach(dish: Detection) -> float:
+    """Return how far from a dish's middle is what belongs to it [m]."""
+    return AROUND + (dish.size.rim_radius if dish.size is not None else 0.0)
+
+
+def _cover(covered: np.ndarray, heights: HeightMap, dish: Detection) -> None:
+    """Mark (h, w) uint8 what belongs to a dish."""
+    u, v = heights.pixel(dish.position[0], dish.position[1], dish.lip)
+    cv2.circle(covered, (int(u), int(v)), int(_reach(dish) * float(heights.scale(dish.lip))), 1, -1)
+
+
+def _apart(found: list[tuple[float, Detection]]) -> list[Detection]:
+    """Return dishes less those whose middle is within one of which more is seen; `found`: how much, and the dish."""
     distinct: list[Detection] = []
-    for dish in sorted(dishes, key=lambda dish: -dish.confidence):
-        (x, y, _), apart = dish.position, True
-        for earlier in distinct:
-            reach = earlier.size.rim_radius if earlier.size is not None else 0.0
-            apart &= bool(np.hypot(x - earlier.position[0], y - earlier.position[1]) > reach)
-        if apart:
+    for _, dish in sorted(found, key=lambda one: -one[0]):
+        if all(
+            np.hypot(*np.subtract(dish.position, other.position)[:2]) > _reach(other) - AROUND for other in distinct
+        ):
             distinct.append(dish)
     return distinct
 
@@ -134,14 +143,14 @@ def _pieces(mask: np.ndarray, heights: HeightMap) -> list[tuple[tuple[slice, sli
 
 def _dish(
     heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, limits: Limits, random: np.random.Generator
-) -> Detection | None:
-    """Return the dish whose upper edge a piece over `level` [m] holds, or None.
+) -> tuple[float, Detection | None]:
+    """Return the dish whose upper edge a piece over `level` [m] holds, or None, and the share of its round that shows.
 
     The edge is what is highest, or, where something stands in the dish, what is highest without that. Of several edges
     that are a dish's the one counts whose circle is seen best and has most of the edge in it.
     """
     smooth, known = heights.smooth[window], heights.valid[window] & own
-    best, most = None, 0.0
+    best, share, most = None, 0.0, 0.0
     rest = known
     for _ in range(TOPS):
         if np.count_nonzero(rest) < 20:
@@ -152,9 +161,9 @@ def _dish(
         if circle is not None and circle[3] * circle[4] > most:
             dish = _dish_of(heights, window, known & ~rest, greatest, circle, limits)
             if dish is not None:
-                best, most = dish, circle[3] * circle[4]
+                best, share, most = dish, circle[3], circle[3] * circle[4]
         rest = rest & (smooth <= greatest - STEP)
-    return best
+    return share, best
 
 
 def _dish_of(

@@ -26,8 +26,14 @@ def round_thing(x0: float, y0: float, radius: float, height: float, wall: float 
     return draw
 
 
+def half_of(thing: Drawn) -> Drawn:
+    """Return what of a thing lies left of 8 mm before its middle, and its outline."""
+    return lambda x, y: np.where((x < -0.008) | (np.hypot(x, y) > 0.036), thing(x, y), np.nan)
+
+
 def heights_of(*things: Drawn, beyond: float = 1.0) -> HeightMap:
-    """Return a map of things, the later ones over the earlier; beyond x [m] the table ends."""
+    """Return a map of things, the later ones over the earlier; beyond x [m] the table ends. What is drawn at height z
+    is nearer to the middle by a share of z / ABOVE: the camera sees it so."""
     v, u = np.mgrid[0:ROWS, 0:COLUMNS]
     x, y = (u - COLUMNS / 2) / FOCAL * ABOVE, -(v - ROWS / 2) / FOCAL * ABOVE
     heights = np.where(x > beyond, -0.02, 0.0)
@@ -72,6 +78,14 @@ def test_an_empty_bowl_is_planned_for() -> None:
     assert bowl.kind == "bowl" and HOLDS not in bowl.unsure and bowl.confidence == pytest.approx(0.9)
 
 
+def test_bowls_that_touch_are_two_and_a_lug_on_a_rim_is_no_cup() -> None:
+    other = round_thing(-0.10, -0.02, 0.075, 0.080, wall=0.008)
+    lug = round_thing(0.13, -0.02, 0.012, 0.084)
+    dishes = [one for one in estimated_dishes(heights_of(other, BOWL, lug)) if one.kind is not None]
+    assert [one.kind for one in dishes] == ["bowl", "bowl"]
+    assert sorted(one.position[0] for one in dishes) == pytest.approx([-0.09, 0.045], abs=0.003)
+
+
 @pytest.mark.parametrize(
     ("things", "beyond"),
     [
@@ -79,8 +93,9 @@ def test_an_empty_bowl_is_planned_for() -> None:
         ([round_thing(0.0, 0.0, 0.045, 0.19), round_thing(0.0, 0.0, 0.038, 0.22)], 1.0),
         ([round_thing(0.0, 0.0, 0.045, 0.025, wall=0.012, floor=0.0)], 1.0),
         ([round_thing(0.10, 0.0, 0.030, 0.10), round_thing(0.10, 0.0, 0.030, 0.115, wall=0.003, floor=0.10)], 1.0),
+        ([half_of(round_thing(0.0, 0.0, 0.040, 0.07))], -0.008),
     ],
-    ids=["can", "taller than heights go", "narrow and flat", "can with a raised edge"],
+    ids=["can", "taller than heights go", "narrow and flat", "can with a raised edge", "half over the table's edge"],
 )
 def test_what_is_round_and_no_dish_is_unknown(things: list[Drawn], beyond: float) -> None:
     detections = estimated_dishes(heights_of(*things, beyond=beyond))
