@@ -44,6 +44,9 @@ def describe(index: int, fused: FusedFrame) -> FrameSegments:
                 is_thing=segment.is_thing,
                 score=round(segment.score, 4),
                 area=segment.area,
+                witnesses=tuple(
+                    witness.model_copy(update={"score": round(witness.score, 4)}) for witness in segment.witnesses
+                ),
             )
             for segment in fused.segments
         ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scenewright.schemas.segments import Witness
 
 
 @dataclass(frozen=True)
@@ -14,6 +15,8 @@ class PanopticMask:
     class_id: int
     is_thing: bool
     score: float = 1.0
+    witnesses: tuple[Witness, ...] = ()
+    """Which networks said what of it, where there are several."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.engine.model_cache import with_usual_models
 from scenewright.stages.segment import registry
 from scenewright.stages.segment.backends.detector.agreement import SURE, Thing, witnessed
-from scenewright.stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
+from scenewright.stages.segment.networks.semantic import SemanticSegmenter, open_segmenter
 from scenewright.stages.segment.parameters import STAGE, SegmentParameters
 
 from tests import real_data
