@@ -64,7 +64,7 @@ class InstanceSegmenter:
                 score_threshold=threshold,
                 suppression_overlap=self._overlap,
             )
-            runs.append(Run((x0, y0, x1, y1), fitted.scale_x * fitted.scale_y))
+            runs.append(Run((x0, y0, x1, y1), fitted.scale_x * fitted.scale_y, number == 0))
             for thing in things:
                 if thing.number in self.labels.labels:
                     mask = np.zeros(shape, dtype=bool)

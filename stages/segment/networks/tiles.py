@@ -14,8 +14,9 @@ SUM_OF_SIDES = 1.2
 """Sides of the tiles along a side of the frame, together: two tiles have .6 of it each."""
 INNER_MARGIN = 0.015
 """A mask that comes this close to a side of a tile within the frame is cut off by it [share of the tile's side]."""
-SEEN_AREA = 32 * 32
-"""Least area of a thing in a network's input that a run is taken to see [pixels]: what COCO calls small is less."""
+SMALL_AREA, LARGE_AREA = 32 * 32, 96 * 96
+"""Areas in a network's input [pixels] between which COCO calls a thing medium. What is smaller no run is taken to see;
+what is larger the whole frame is for: on a tile, as a blurred part of it, networks are often silent about it."""
 
 Window = tuple[int, int, int, int]
 """x0, y0, x1, y1 [pixels] of a part of the image."""
@@ -35,11 +36,13 @@ def grid_windows(width: int, height: int, count: int) -> list[Window]:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a network: the window it looked at, and how many input pixels an image pixel had there."""
+    """One run of a network: the window it looked at, and how large an image pixel was there."""
 
     window: Window
     pixels_of_input: float
     """Area in the input of one pixel of the image."""
+    is_whole: bool
+    """Whether the window is the image."""
 
     def holds(self, boxed: BoxedMask, shape: tuple[int, int]) -> bool:
         """Whether no side of the window that lies within the image of `shape` (H, W) cuts a mask off."""
@@ -54,8 +57,9 @@ class Run:
         )
 
     def sees(self, boxed: BoxedMask, shape: tuple[int, int]) -> bool:
-        """Whether a thing with this mask is whole and large enough for this run."""
-        return boxed.area * self.pixels_of_input >= SEEN_AREA and self.holds(boxed, shape)
+        """Whether this run's silence about a thing with this mask says something."""
+        area = boxed.area * self.pixels_of_input
+        return area >= SMALL_AREA and (self.is_whole or area < LARGE_AREA) and self.holds(boxed, shape)
 
 
 def one_answer(
