@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from scenewright.stages.segment.choice import Backend
 
 
+Layer = tuple[BoxedMask, PanopticMask]
+
+
 class SeveralBackends:
     """Backends that judge every frame, as one."""
 
@@ -68,23 +71,18 @@ def numbered(frame: PanopticFrame, first: int) -> PanopticFrame:
 def agreed(frames: Sequence[PanopticFrame], *, unnamed: int) -> PanopticFrame:
     """Return one frame of the masks of several networks, each of which says who gave it (`numbered`).
 
-    Masks whose IoU is over .5 are one, their mean. All of a stuff class is one. Of things of one class of which one
+    Masks of things whose IoU is over .5 are one, their mean, and so are masks of stuff: a wall that somebody sees
+    everywhere takes no thing away. All of a stuff class is one. Of things of one class of which one
     lies in the other the weaker goes. Stuff lies below things, large things below small ones; a thing that keeps less
     than half is dropped. Class and score are the leading sum over the witnesses, at most 1; `unnamed` leads where
     nobody has a name.
     """
     masks = [(frame.ids == number, mask) for frame in frames for number, mask in sorted(frame.masks.items())]
     masks = [(pixels, mask) for pixels, mask in masks if pixels.any()]
-    boxed, scores = [BoxedMask(pixels) for pixels, _ in masks], [mask.score for _, mask in masks]
-    things: list[tuple[BoxedMask, PanopticMask]] = []
-    stuff: dict[int, list[tuple[BoxedMask, PanopticMask]]] = defaultdict(list)
-    for group in groups_of(boxed, scores):
-        led = leading([masks[k][1] for k in sorted(group)], unnamed)
-        mean = mean_mask([boxed[k] for k in group], [scores[k] for k in group])
-        if led.is_thing:
-            things.append((mean, led))
-        else:
-            stuff[led.class_id].append((mean, led))
+    things = _one_each([(pixels, mask) for pixels, mask in masks if mask.is_thing], unnamed)
+    stuff: dict[int, list[Layer]] = defaultdict(list)
+    for one, led in _one_each([(pixels, mask) for pixels, mask in masks if not mask.is_thing], unnamed):
+        stuff[led.class_id].append((one, led))
     below = [
         (BoxedMask(np.any([one.mask for one, _ in parts], axis=0)), leading([mask for _, mask in parts], unnamed))
         for parts in stuff.values()
@@ -95,6 +93,17 @@ def agreed(frames: Sequence[PanopticFrame], *, unnamed: int) -> PanopticFrame:
     below.sort(key=lambda layer: layer[1].score)
     above = sorted((things[k] for k in kept), key=lambda layer: -layer[0].area)
     return _painted([*below, *above], frames[0].ids.shape)
+
+
+def _one_each(masks: Sequence[tuple[np.ndarray, PanopticMask]], unnamed: int) -> list[Layer]:
+    boxed, scores = [BoxedMask(pixels) for pixels, _ in masks], [mask.score for _, mask in masks]
+    return [
+        (
+            mean_mask([boxed[k] for k in group], [scores[k] for k in group]),
+            leading([masks[k][1] for k in sorted(group)], unnamed),
+        )
+        for group in groups_of(boxed, scores)
+    ]
 
 
 def leading(masks: Sequence[PanopticMask], unnamed: int) -> PanopticMask:
@@ -109,7 +118,7 @@ def leading(masks: Sequence[PanopticMask], unnamed: int) -> PanopticMask:
     return PanopticMask(best, is_thing, min(1.0, sums[best]), witnesses)
 
 
-def _painted(layers: Sequence[tuple[BoxedMask, PanopticMask]], shape: tuple[int, ...]) -> PanopticFrame:
+def _painted(layers: Sequence[Layer], shape: tuple[int, ...]) -> PanopticFrame:
     ids = np.zeros(shape, dtype=np.int32)
     for number, (boxed, _) in enumerate(layers, start=1):
         ids[boxed.mask] = number

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
@@ -20,6 +21,7 @@ from scenewright.stages.segment.networks.semantic import SemanticSegmenter, fill
 from scenewright.stages.segment.networks.sidecar import Sidecar, read_sidecar
 from scenewright.stages.segment.networks.tiles import Run, grid_windows, one_answer
 from scenewright.stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.registry import all_backends
 
 HEARD_IN_TILES = 0.5
 """With tiles, detections down to this share of the score threshold count towards the mean of all runs."""
@@ -156,7 +158,7 @@ def open_pictures(name: str, request: BackendRequest) -> PictureBackend:
     semantic = open_segmenter(request.semantic_weights, labels, request.device) if request.semantic_weights else None
     instances = None
     if request.weights is not None:
-        network = open_network(request.weights, _sidecar_of(request), request.device)
+        network = open_network(_own_file(name, request.weights), _sidecar_of(request), request.device)
         if network.sidecar.layout == "semantic" and semantic is None:
             semantic = SemanticSegmenter(network, labels)
         else:
@@ -164,6 +166,17 @@ def open_pictures(name: str, request: BackendRequest) -> PictureBackend:
     if (parameters.tiles or 0) > 1 and (instances is None or instances.network.sidecar.layout == "panoptic"):
         raise UsageError("--tiles is for networks that give instances", hint="leave --tiles out")
     return PictureBackend(name, instances, semantic, vocabulary, minimum_pixels=parameters.small_object_pixels)
+
+
+def _own_file(name: str, weights: Path) -> Path:
+    """Return the file. Raises BadInput when its name ends as those of another backend do."""
+    if weights.suffix != f".{name}":
+        others = [one.name for one in all_backends() if weights.suffix in one.endings]
+        raise BadInput(
+            f"{weights.name}: --backend {name} takes .{name} files",
+            hint=f"give --backend {' or '.join(others)}" if others else f"export it as .{name}",
+        )
+    return weights
 
 
 def _sidecar_of(request: BackendRequest) -> Sidecar | None:

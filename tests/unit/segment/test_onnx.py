@@ -11,10 +11,10 @@ import pytest
 from scenewright.schemas.errors import BadInput, MissingDependency
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
 from scenewright.stages.segment.networks.decoding import _paste_mask
 from scenewright.stages.segment.networks.fitting import fit
 from scenewright.stages.segment.networks.sidecar import Sidecar, find_layout, read_sidecar
-from scenewright.stages.segment.choice import BackendRequest, choose_backend
 from scenewright.stages.segment.parameters import SegmentParameters
 
 onnx = pytest.importorskip("onnx")
