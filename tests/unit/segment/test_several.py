@@ -87,13 +87,10 @@ def test_a_wall_everywhere_takes_no_thing_away() -> None:
 
 
 def test_what_keeps_less_than_half_hides_nothing() -> None:
-    inner = (slice(4, 16), slice(4, 26))
-    told = together(
-        frame_of(("wall", 0.5, *EVERYWHERE)),
-        frame_of(("table", 0.5, slice(3, 17), slice(0, 30))),
-        frame_of(("cup", 0.4, *inner)),
-    )
-    assert told == [("wall", 0.5, 600 - 264, [0]), ("cup", 0.4, 264, [2])]
+    cups = (("cup", 0.4, slice(4, 16), slice(0, 13)), ("cup", 0.4, slice(4, 16), slice(16, 29)))
+    table = ("table", 0.5, slice(3, 17), slice(None))
+    told = together(frame_of(("wall", 0.5, *EVERYWHERE)), frame_of(table), frame_of(*cups))
+    assert told == [("wall", 0.5, 600 - 312, [0]), ("cup", 0.4, 156, [2]), ("cup", 0.4, 156, [2])]
 
 
 def test_witnesses_come_through_the_fusion_into_the_record_and_stay_out_where_there_is_one() -> None:
