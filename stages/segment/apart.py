@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import logging
 import multiprocessing
 import os
 import signal
@@ -102,7 +103,9 @@ class _Opened:
 
 
 def _open(request: BackendRequest, streams: tuple[str, ...], parent: int) -> None:
-    """Open log and backend in a worker, which ends with its parent and uses one thread."""
+    """Open log and backend in a worker, which ends with its parent, uses one thread, and does not say again what its
+    parent said when it opened them."""
+    logging.getLogger("scenewright").setLevel(logging.ERROR)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears it and ends the workers
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(SET_PARENT_DEATH_SIGNAL, int(signal.SIGKILL), 0, 0, 0)

@@ -134,7 +134,7 @@ def _requests(
     files = sorted(weights.iterdir()) if in_folder and weights is not None else [weights] if weights else []
     runnable = {file for file in files if file.suffix in endings}
     if in_folder and request.sidecar is not None:
-        raise UsageError("--sidecar is for one network", hint="lay NAME.toml beside NAME.tflite in the folder")
+        raise UsageError("--sidecar is for one network", hint=f"lay NAME.toml beside NAME{endings[0]} in the folder")
     if in_folder and not runnable:
         raise BadInput(f"{weights}: holds no network", hint=f"its files end with {', '.join(endings)}")
     all_by_ending = all(declared.endings or not declared.weights for declared in chosen)

@@ -30,8 +30,6 @@ class OnnxNetwork:
     def __init__(self, path: Path, sidecar: Sidecar | None, device: str) -> None:
         self.path = Path(path)
         runtime = _runtime()
-        if not self.path.is_file():
-            raise BadInput(f"{path}: no ONNX file", hint="give an .onnx file with --weights")
         providers = ["CPUExecutionProvider"]
         if device == "cuda" and "CUDAExecutionProvider" in runtime.get_available_providers():
             providers.insert(0, "CUDAExecutionProvider")

@@ -123,8 +123,6 @@ class TfliteNetwork:
 
     def _opened(self, runtime: Any, sidecar: Sidecar | None) -> Any:
         hint = f"give a .tflite file that holds a network. Or {BY_FOLDER}"
-        if not self.path.is_file():
-            raise BadInput(f"{self.path}: no TensorFlow Lite file", hint=hint)
         try:
             interpreter = runtime.Interpreter(str(self.path), num_threads=1)
             inputs = interpreter.get_input_details()

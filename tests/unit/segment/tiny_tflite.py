@@ -106,9 +106,7 @@ def opened(
 ) -> TfliteNetwork:
     """A network with given outputs, without a file."""
     run_by(monkeypatch, Interpreter(outputs, **options))
-    monkeypatch.setattr(Path, "is_file", lambda path: True)
-    network = TfliteNetwork(Path("net.tflite"), sidecar)
-    return network
+    return TfliteNetwork(Path("net.tflite"), sidecar)
 
 
 def yolo(*, shares: bool = True, last: bool = True, side: int = 64) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.errors import BadInput
 from scenewright.stages.segment.coco import COCO_NAMES
 from scenewright.stages.segment.networks.fitting import PAD_VALUE
 from scenewright.stages.segment.networks.tiles import INNER_MARGIN, Window, grid_windows
@@ -76,18 +76,13 @@ def tile_windows(width: int, height: int, side: int) -> list[Window]:
 
 
 class Detector:
-    """A YOLOX network. Raises MissingDependency when the file is absent, BadInput when it is no such network."""
+    """A YOLOX network. Raises BadInput when the file is no such network."""
 
     def __init__(
         self, weights: Path, *, score_threshold: float, suppression_overlap: float, tile_side: int, tiles: int = 0
     ) -> None:
         """`tile_side` [pixels]: of tiles at full resolution, 0 = none; `tiles`: how many a side there are otherwise."""
         weights = Path(weights)
-        if not weights.is_file():
-            raise MissingDependency(
-                f"detector weights {weights} are not there",
-                hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
-            )
         self.score_threshold = score_threshold
         self.suppression_overlap = suppression_overlap
         self.tile_side, self.tiles = tile_side, tiles
