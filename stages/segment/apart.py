@@ -20,8 +20,9 @@ from scenewright.schemas.errors import MachineFailure
 from scenewright.schemas.segments import FrameSegments
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.formats.masks import encode_panoptic_png
-from scenewright.stages.segment.choice import Backend, BackendRequest, choose_backend
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
 from scenewright.stages.segment.one_frame import describe, segment_frame
+from scenewright.stages.segment.panoptic import Backend
 
 LEAST_FRAMES_EACH = 60
 """Least frames of a process: with fewer it is not worth its start, which takes as long as some ten to twenty

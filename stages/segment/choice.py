@@ -6,15 +6,13 @@ import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import Sequence
-from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.segment.geometric import GeometricFrame
-from scenewright.stages.segment.panoptic import PanopticFrame
+from scenewright.stages.segment.panoptic import Backend
 from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.registry import AUTO, BackendDeclaration, all_backends, automatic, backends_for
 from scenewright.stages.segment.several import SeveralBackends
@@ -25,20 +23,6 @@ STREAM_WORDS = {"color": "colour", "labels": "ground-truth labels"}
 Own = TypeVar("Own", bound=Parameters)
 
 logger = logging.getLogger("scenewright")
-
-
-class Backend(Protocol):
-    """Names panoptic masks in a frame."""
-
-    name: str
-    label: str
-    """Printed beside every figure that rests on these masks."""
-    streams: tuple[str, ...]
-    """Streams of the sequence it looks at."""
-
-    def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
-        """Return the masks of one frame."""
-        ...
 
 
 @dataclass(frozen=True)

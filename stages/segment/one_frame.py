@@ -6,9 +6,9 @@ import numpy as np
 from scenewright.schemas.segments import FrameSegment, FrameSegments
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
 from scenewright.stages.segment import fusion_ours, fusion_thesis, fusion_voxblox
-from scenewright.stages.segment.choice import Backend
 from scenewright.stages.segment.fusion import FusedFrame, FusionRule
 from scenewright.stages.segment.geometric import segment_depth
+from scenewright.stages.segment.panoptic import Backend
 from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
@@ -13,12 +12,8 @@ from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.kit.formats.frames import Frame
 from scenewright.stages.segment.geometric import GeometricFrame
 from scenewright.stages.segment.naming import KEPT_SHARE
-from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.panoptic import Backend, PanopticFrame, PanopticMask
 from scenewright.stages.segment.same_things import BoxedMask, groups_of, mean_mask, not_nested
-
-if TYPE_CHECKING:
-    from scenewright.stages.segment.choice import Backend
-
 
 Layer = tuple[BoxedMask, PanopticMask]
 

@@ -9,8 +9,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.kit.formats.zip_files import find_entry, zip_errors
+
 LONGEST = 100_000
 """Longest value [characters, bytes]."""
+MOST_TEXTS = 10
+"""Entries of an archive that are looked at."""
 
 
 def literal(text: str) -> Any:
@@ -47,16 +53,14 @@ def appended(path: Path) -> Mapping[str, Any]:
     file (one name a line). Empty where there is none that can be read."""
     found: dict[str, Any] = {}
     try:
-        with zipfile.ZipFile(path) as archive:
-            for entry in archive.infolist():
-                if entry.file_size > LONGEST:
-                    continue
-                text = archive.read(entry).decode("utf-8", errors="replace")
+        with opened(path) as file, zip_errors(path, ""), zipfile.ZipFile(file) as archive:
+            for name in archive.namelist()[:MOST_TEXTS]:
+                text = archive.read(find_entry(archive, name, LONGEST)).decode("utf-8", errors="replace")
                 value = literal(text)
                 if isinstance(value, dict):
                     found.update({k: v for k, v in value.items() if isinstance(k, str)})
-                elif entry.filename.endswith(".txt"):
+                elif name.endswith(".txt"):
                     found.setdefault("names", [line.strip() for line in text.splitlines()])
-    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError, NotImplementedError):
-        return {}
+    except BadInput:  # a file without an archive is a network like any other
+        return found
     return found
