@@ -104,6 +104,13 @@ class CommonParameters(Parameters):
         except ValueError as error:
             raise PydanticCustomError("backend", "{reason}", {"reason": str(error)}) from None
 
+    @field_validator("tiles")
+    @classmethod
+    def _check_tiles(cls, tiles: int | None) -> int | None:
+        if tiles == 1:
+            raise PydanticCustomError("tiles", "one tile is the frame itself; 0 for none, or 2 to 4 a side")
+        return tiles
+
 
 if TYPE_CHECKING:
     SegmentParameters = CommonParameters

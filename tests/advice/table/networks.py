@@ -379,6 +379,15 @@ ROWS = [
         )
     ),
     Tried(
+        YOLOX,
+        "or --backend onnx for one that gives masks",
+        f"{SEGMENT} --weights yolo.onnx",
+        f"{BY_ONNX} --weights yolo.onnx",
+        code=3,
+        given=yolo,
+        right=cup_and_chair,
+    ),
+    Tried(
         f"{NETWORKS}/tflite_network.py",
         "pip install ai-edge-litert",
         f"{DETECTING} --weights yolox.onnx --semantic-weights deeplab.tflite",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scenewright.stages.segment.networks.decoding import Found
 from scenewright.stages.segment.networks.tiles import Run, grid_windows, one_answer
+from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.same_things import BoxedMask, groups_of, mean_mask, not_nested
 
 SHAPE = (480, 640)
@@ -85,3 +87,10 @@ def test_grouping_does_not_hang_on_the_order_of_equal_scores() -> None:
 def test_the_mean_mask_has_half_of_the_scores(scores: tuple[float, float], left: int, right: int) -> None:
     mean = mean_mask([BoxedMask(rectangle(x, 10, 60, 60)) for x in (10, 20)], scores)
     assert mean.box == (10, 70, left, right)
+
+
+def test_one_tile_is_refused_as_is_a_switch() -> None:
+    for value in (1, True, 5, -1):
+        with pytest.raises(ValidationError, match="tiles"):
+            SegmentParameters(tiles=value)
+    assert [SegmentParameters(tiles=value).tiles for value in (None, 0, 2)] == [None, 0, 2]

@@ -86,7 +86,9 @@ class Detector:
         self.score_threshold = score_threshold
         self.suppression_overlap = suppression_overlap
         self.tile_side, self.tiles = tile_side, tiles
-        hint = "give an ONNX export of a YOLOX model (COCO-80) with --weights"
+        hint = (
+            "give an ONNX export of a YOLOX model (COCO-80) with --weights, or --backend onnx for one that gives masks"
+        )
         try:
             self._network = cv2.dnn.readNetFromONNX(str(weights))
         except (cv2.error, MemoryError) as error:
