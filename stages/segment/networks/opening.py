@@ -20,12 +20,15 @@ class Network(Protocol):
     sidecar: Sidecar
     is_guessed: bool
     """Whether nobody said what goes in and what comes out."""
-    size: tuple[int, int] | None
-    """Width and height that it takes [pixels]; None: any."""
     shapes: dict[str, tuple[int, ...]]
     """Role -> shape of what it gives for one image."""
     classes: int | None
     """Number of classes where their numbers come out and the file tells of how many."""
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height that it takes [pixels]; None: any."""
+        ...
 
     def names(self) -> dict[int, str]:
         """Return the names of its classes that the file holds, else nothing."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.engine.known_models import identify, known_models
 from scenewright.stages.engine.model_cache import with_usual_models
 from scenewright.stages.kit.labels import load_label_set
 from scenewright.stages.segment import registry
@@ -16,6 +17,7 @@ from scenewright.stages.segment.backends.detector.agreement import SURE, Thing, 
 from scenewright.stages.segment.networks.semantic import SemanticSegmenter
 from scenewright.stages.segment.parameters import STAGE, SegmentParameters
 
+from tests.real_data import real_data
 from tests.unit.segment import tiny_tflite
 
 VOCABULARY = load_vocabulary()
@@ -112,3 +114,19 @@ def test_auto_goes_by_the_kind_of_weights() -> None:
     assert registry.automatic(None).name == registry.automatic(Path("own.safetensors")).name == "network"
     assert registry.automatic(Path("yolox.onnx")).name == "detector"
     assert registry.automatic(Path("yolo.tflite")).name == "tflite"
+
+
+def test_auto_takes_permissive_networks_alone() -> None:
+    automatic, licences = SegmentParameters(), {model.name: model.licence for model in known_models()}
+    taken = {registry.usual_detector(automatic, {}), registry.usual_witness(automatic, {"weights": Path("net.onnx")})}
+    assert {licences[name] for name in taken if name} == {"Apache-2.0"}
+    assert {name for name, licence in licences.items() if licence.startswith("AGPL")} == {
+        "yolov8n_seg_640",
+        "yolov8n_seg_320",
+    }
+
+
+@pytest.mark.parametrize("name", ["deeplab_ade20k", "yolov8n_seg_640", "yolov8n_seg_320"])
+def test_the_published_segmenters_are_known(name: str) -> None:
+    file = next(model.file for model in known_models() if model.name == name)
+    assert identify(real_data("segmenters") / file).name == name
