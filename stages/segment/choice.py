@@ -106,14 +106,16 @@ def _requests(
     """Yield what each backend is asked for: of a folder of weights one request for each file that it can run, with the
     sidecar that lies beside it; of one file, that file where it can. Semantic weights go to the first that takes them.
 
-    Raises UsageError for two that go by one ending, BadInput for weights that nobody can run.
+    A network of the folder that none of them runs is said. Raises UsageError for two that go by one ending, BadInput
+    for weights that nobody can run.
     """
     weights, semantic = request.weights, request.semantic_weights
     by_ending = [declared for declared in chosen if declared.endings]
     endings = [ending for declared in by_ending for ending in declared.endings]
     if weights is not None and len(set(endings)) < len(endings):
-        names = " and ".join(declared.name for declared in by_ending if declared.endings[0] in endings)
-        raise UsageError(f"{names} take files of one ending: {endings[0]}", hint="name one of them")
+        ending = next(ending for ending in endings if endings.count(ending) > 1)
+        names = " and ".join(declared.name for declared in by_ending if ending in declared.endings)
+        raise UsageError(f"{names} take files of one ending: {ending}", hint="name one of them")
     in_folder = weights is not None and weights.is_dir() and bool(by_ending)
     files = sorted(weights.iterdir()) if in_folder and weights is not None else [weights] if weights else []
     runnable = {file for file in files if file.suffix in endings}
@@ -121,6 +123,10 @@ def _requests(
         raise UsageError("--sidecar is for one network", hint=f"lay NAME.toml beside NAME{endings[0]} in the folder")
     if in_folder and not runnable:
         raise BadInput(f"{weights}: holds no network", hint=f"its files end with {', '.join(endings)}")
+    known = {ending for declared in all_backends() for ending in declared.endings}
+    for file in files if in_folder else ():
+        if file.suffix in known and file not in runnable:
+            logger.warning("%s: no backend that was asked for runs it", file.name)
     all_by_ending = all(declared.endings or not declared.weights for declared in chosen)
     if len(chosen) > 1 and by_ending and all_by_ending and files and not runnable:
         raise BadInput(

@@ -130,10 +130,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_ten_networks_of_two_sizes_and_one_that_fails(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    written(folder / "other.onnx")
     with caplog.at_level(logging.WARNING):
         made, frame = judged(folder)
     said = [record.message for record in caplog.records if record.levelno == logging.WARNING]
-    assert len(said) == 1 and "torn.tflite" in said[0] and "\n" not in said[0]
+    assert said[0] == "other.onnx: no backend that was asked for runs it"
+    assert len(said) == 2 and "torn.tflite" in said[1] and "\n" not in said[1]
     assert len(made.networks) == 9 and made.name == "tflite"
     by_name = {VOCABULARY.by_id(mask.class_id).name: mask for mask in frame.masks.values()}
     assert sorted(by_name) == ["chair", "cup", "wall"] and networks(by_name["wall"]) == [8]
@@ -168,6 +170,8 @@ def test_weights_go_to_the_backend_that_can_run_them(folder: Path) -> None:
         judged(folder / "weights.bin", "tflite+onnx")
     with pytest.raises(UsageError, match=r"detector and onnx take files of one ending: \.onnx"):
         judged(folder / "net.onnx", "detector+onnx")
+    with pytest.raises(UsageError, match=r"detector and onnx take files of one ending: \.onnx"):
+        judged(folder / "net.onnx", "network+detector+onnx")
     with pytest.raises(UsageError, match="--semantic-weights is for --backend detector, tflite, onnx"):
         judged(None, "geometric", semantic_weights=folder / "rooms.tflite")
     with pytest.raises(UsageError, match="--tiles is for --backend detector, tflite, onnx"):
