@@ -124,9 +124,9 @@ def _requests(
     if in_folder and not runnable:
         raise BadInput(f"{weights}: holds no network", hint=f"its files end with {', '.join(endings)}")
     known = {ending for declared in all_backends() for ending in declared.endings}
-    for file in files if in_folder else ():
-        if file.suffix in known and file not in runnable:
-            logger.warning("%s: no backend that was asked for runs it", file.name)
+    for other in files if in_folder else ():
+        if other.suffix in known and other not in runnable:
+            logger.warning("%s: no backend that was asked for runs it", other.name)
     all_by_ending = all(declared.endings or not declared.weights for declared in chosen)
     if len(chosen) > 1 and by_ending and all_by_ending and files and not runnable:
         raise BadInput(
