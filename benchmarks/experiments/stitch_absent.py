@@ -86,7 +86,7 @@ def _learned(view: StereoView) -> NeedleObservation:
     segmenter = Segmenter.load()
     assert view.left.image is not None and view.right.image is not None
     masks = learned_masks(segmenter.masks(view.left.image), segmenter.masks(view.right.image))
-    return masks.observation(view.rig, None)
+    return masks.observation(view.rig, None, (view.left.image, view.right.image))
 
 
 def is_cluttered(case: str, seed: int) -> bool:
