@@ -61,7 +61,8 @@ class RealPair:
 
 
 def needleless_pairs(data: Path, work: Path) -> dict[str, Callable[[], RealPair]]:
-    """Return name -> what reads a pair of the folder of data, as far as they are there."""
+    """Return name -> what reads a pair of the folder of data, as far as they are there; the endoscope's recording is
+    read into `work`."""
     pairs: dict[str, Callable[[], RealPair]] = {}
     if (data / "surgt_stereo").is_dir():
         sequence = opened(Sequence, made("ingest", work / "recorded", "--log", data / "surgt_stereo"))
