@@ -6,6 +6,9 @@
 Prints the constants of stages/suture/needle/presence.py for views with pictures and for masks alone, and the errors by
 leaving out blocks of seeds. The outline is a needle where there is one and the best guess is right; a wrong outline of
 a needle is none. Of masks alone both kinds weigh the same; with pictures one that is none weighs as COST that are one.
+
+The stored weights of PICTURED are of 56 outlines in views with a needle, 18 of them with blood painted over the needle
+itself, and of 216 in 60 views of drapes at RADII: fewer than the run above has.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 from scenewright.stages.kit.stage import Parameters
-from scenewright.stages.suture.needle.presence import FEATURES, PICTURED, capped
+from scenewright.stages.suture.needle.presence import FEATURES, PICTURED, RIMS, capped
 from scipy.optimize import minimize
 
 from benchmarks.keeping import kept_records
@@ -39,8 +42,11 @@ def samples(run: Path, pictured: bool) -> tuple[np.ndarray, np.ndarray, np.ndarr
     records = kept_records("stitch_absent", run).items()
     found = [(trial, record) for trial, record in records if len(record.presence) >= len(PICTURED if pictured else [0])]
     features = np.array([record.presence if pictured else record.presence[: len(FEATURES)] for _, record in found])
+    if pictured:
+        features = capped(features)
+        features[:, RIMS] = 0.0  # its limit is all that it says
     return (
-        capped(features) if pictured else features,
+        features,
         np.array([float(record.found) for _, record in found]),
         np.array([int(trial.seed) for trial, _ in found]),
         np.array([trial.case for trial, _ in found]),
@@ -49,7 +55,7 @@ def samples(run: Path, pictured: bool) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def fitted(features: np.ndarray, answers: np.ndarray, pictured: bool) -> tuple[np.ndarray, float]:
     """Return weights (F,) and bias of a logistic function, with a ridge on standardised features."""
-    mean, spread = features.mean(axis=0), features.std(axis=0)
+    mean, spread = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-9)
     scaled = (features - mean) / spread
     cost = COST if pictured else 1.0
     shares = np.where(answers > 0, 0.5 / answers.mean(), cost * 0.5 / (1 - answers.mean()))
