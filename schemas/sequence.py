@@ -114,6 +114,10 @@ class FrameSources(Model):
         )
 
 
+OF_TOPICS = ("mcap", "rosbag1", "rosbag2")
+"""Formats of logs whose images have topics."""
+
+
 class Sequence(Artifact):
     """`frames.mcap` (stages/kit/formats/frames.py reads and writes it), `sequence.json`, `trajectory.tum`."""
 

@@ -19,7 +19,8 @@ class FrameEstimate(Model):
     status: Literal["key", "tracked", "interpolated", "unposed"]
     """Key frames stand in the pose graph; tracked ones hang on one; interpolated ones lie between two neighbours."""
     fault: str = ""
-    """Why it has no pose (`no_depth`, `not_joined`, `not_registered`), or `lost`: tracking began anew here."""
+    """Why it has no pose (`no_depth`, `not_joined`, `not_registered`, `contradicted`), or `lost`: tracking began anew
+    here."""
     confidence: float = 0.0
     """How well it agrees with what it was aligned with, 0 to 1."""
     uncertainty: float | None = None

@@ -10,7 +10,7 @@ import numpy as np
 from scenewright.schemas.disparity import RowReport
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
-from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.sequence import OF_TOPICS, Sequence
 from scenewright.stages.disparity.parameters import DisparityParameters
 from scenewright.stages.disparity.rectification import RowCheck, check_rows, matched_features
 from scenewright.stages.disparity.semi_global import gray_of
@@ -80,7 +80,9 @@ def check_eyes(
         raise BadInput(
             f"{sequence.root}: left and right of {name!r} are swapped: {100 * rows.negative_share:.0f} % of "
             f"{rows.matches} matched features lie further right in the right picture",
-            hint="exchange the two eyes (--color-topic and --right-topic, or the folders left/ and right/)",
+            hint="ingest the log again with the topics of --color-topic and --right-topic exchanged"
+            if sequence.info.source_format in OF_TOPICS
+            else "put the pictures of the left eye in the place of those of the right one, and ingest the log again",
         )
     if rows.checked and abs(rows.median_disparity) < NO_PARALLAX:
         logger.warning(

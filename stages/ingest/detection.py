@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from scenewright.schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.sequence import OF_TOPICS
 from scenewright.stages.ingest.eye_order import settled_eyes
 from scenewright.stages.ingest.foreign import refuse_foreign_file, refuse_foreign_folder, refuse_lone_recording
 from scenewright.stages.ingest.parameters import IngestParameters
@@ -16,6 +17,8 @@ from scenewright.stages.ingest.source import LogSource
 
 OF_ANY_IMAGES = "images"
 """The layout that matches any folder with images, and so those of other tools."""
+
+TOPICS = ("color_topic", "depth_topic", "right_topic", "pose_topic")
 
 
 class LogFormat(NamedTuple):
@@ -47,6 +50,7 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
         if rule is not None and guessed and layout.name == OF_ANY_IMAGES:
             refuse_foreign_folder(path)
         if rule is not None:
+            _check_topics(layout, parameters, path)
             source = reader.open_source(path, parameters, rule)
             try:
                 return settled_eyes(source, str(path))
@@ -62,6 +66,13 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
         f"{path}: is not a log in a format that is known ({names}); it is {kind}",
         hint="docs/LOGS.md describes the layouts",
     )
+
+
+def _check_topics(layout: LogLayout, parameters: IngestParameters, path: Path) -> None:
+    given = [name for name in TOPICS if getattr(parameters, name) is not None]
+    if given and layout.name not in OF_TOPICS:
+        option = f"--{given[0].replace('_', '-')}"
+        raise UsageError(f"{path}: {option} is for logs with topics, not for {layout.name}", hint="leave it out")
 
 
 def _listing(path: Path) -> str:

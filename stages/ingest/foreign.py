@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import opened
-from scenewright.stages.ingest.folders.calibration_files import calibration_file
+from scenewright.stages.ingest.folders.calibration_search import calibration_file
 from scenewright.stages.ingest.folders.files import read_json
 from scenewright.stages.ingest.folders.pose_files import pose_file
 
@@ -16,6 +16,7 @@ HEAD = 4_000_000
 """Bytes of a file in which the words of a tool are looked for."""
 SHOWN = 5
 """Most files that a message names."""
+TABLES = (".json", ".csv", ".yaml", ".yml", ".xml", ".ini", ".toml", ".cfg")
 THEN = ", then ingest OUT"
 UNPACK = "unpack it into a folder and give that folder"
 MESH = "it is a mesh or points, no recording: scenewright fuse --from-mesh takes a PLY"
@@ -27,12 +28,12 @@ class Foreign:
 
     name: str
     way: str
-    """What to do; `THIS` stands for the recording."""
+    """What to do; `{}` stands for the recording."""
 
 
 AZURE_KINECT = Foreign(
     "an Azure Kinect recording",
-    f"take its images out with Open3D: python azure_kinect_mkv_reader.py --input THIS --output OUT{THEN}",
+    f"take its images out with Open3D: python azure_kinect_mkv_reader.py --input {{}} --output OUT{THEN}",
 )
 VIDEO = Foreign("a video", "put it into a folder of its own with a calibration file (docs/LOGS.md), and give that")
 RECORD3D = Foreign(
@@ -41,8 +42,8 @@ RECORD3D = Foreign(
 )
 RTABMAP = Foreign(
     "an RTAB-Map database",
-    "write its images with rtabmap-export --images THIS and its poses with rtabmap-export --poses_camera "
-    "--poses_format 10 THIS; give ingest the folder, and the poses as --trajectory",
+    "write its images with rtabmap-export --images {} and its poses with rtabmap-export --poses_camera "
+    "--poses_format 10 {}; give ingest the folder, and the poses as --trajectory",
 )
 BY_ENDING = {
     ".mkv": VIDEO,
@@ -52,7 +53,7 @@ BY_ENDING = {
         (".svo", ".svo2"),
         Foreign(
             "a ZED recording",
-            "write left pictures and depth with the ZED SDK: python export_svo.py --mode 4 --input_svo_file THIS "
+            "write left pictures and depth with the ZED SDK: python export_svo.py --mode 4 --input_svo_file {} "
             "--output_path_dir OUT, then ingest OUT with its --fx --fy --cx --cy",
         ),
     ),
@@ -65,14 +66,14 @@ BY_ENDING = {
     ),
     ".usdz": Foreign("a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh"),
     ".vrs": Foreign(
-        "a Project Aria recording", f"ns-process-data aria --vrs-file THIS --output-dir OUT (nerfstudio){THEN}"
+        "a Project Aria recording", f"ns-process-data aria --vrs-file {{}} --output-dir OUT (nerfstudio){THEN}"
     ),
     ".rrd": Foreign("a Rerun recording", "record the same streams as MCAP (docs/LOGS.md)"),
     **dict.fromkeys(
         (".h5", ".hdf5", ".parquet"),
         Foreign("a table of arrays", "write its pictures as a folder of images (docs/LOGS.md) and give that folder"),
     ),
-    ".tum": Foreign("a trajectory, no recording", "give its log, and it beside: ingest --log FOLDER --trajectory THIS"),
+    ".tum": Foreign("a trajectory, no recording", "give its log, and it beside: ingest --log FOLDER --trajectory {}"),
     **dict.fromkeys((".zip", ".tar", ".gz", ".tgz", ".7z", ".rar", ".xz"), Foreign("an archive", UNPACK)),
     **dict.fromkeys((".ply", ".obj", ".glb", ".gltf", ".stl", ".pcd", ".las", ".e57"), Foreign("a scan", MESH)),
 }
@@ -108,13 +109,13 @@ def refuse_lone_recording(root: Path) -> None:
 
 
 def unread_tables(root: Path, read: tuple[str, ...]) -> str:
-    """Return the JSON and CSV files in a folder, without those `read`: they may say what is missing."""
-    names = sorted(p.name for p in root.iterdir() if p.suffix.lower() in (".json", ".csv") and p.name not in read)
+    """Return the files of tables and settings in a folder, without those `read`: they may say what is missing."""
+    names = sorted(p.name for p in root.iterdir() if p.suffix.lower() in TABLES and p.name not in read)
     return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} files)" if len(names) > SHOWN else "")
 
 
 def _refuse(path: Path, found: Foreign) -> None:
-    raise BadInput(f"{path}: is {found.name}, which is not read as it is", hint=found.way.replace("THIS", str(path)))
+    raise BadInput(f"{path}: is {found.name}, which is not read as it is", hint=found.way.replace("{}", str(path)))
 
 
 def _head(path: Path) -> bytes:
@@ -157,18 +158,18 @@ FOLDERS: tuple[tuple[Foreign, Callable[[Path], bool]], ...] = (
     (
         Foreign(
             "a Stray Scanner recording",
-            "make a ROS bag of it: python create_rosbag.py THIS --out OUT.bag (StrayVisualizer), then ingest OUT.bag",
+            "make a ROS bag of it: python create_rosbag.py {} --out OUT.bag (StrayVisualizer), then ingest OUT.bag",
         ),
         _is_stray_scanner,
     ),
     (
-        Foreign("a Record3D recording", f"ns-process-data record3d --data THIS --output-dir OUT (nerfstudio){THEN}"),
+        Foreign("a Record3D recording", f"ns-process-data record3d --data {{}} --output-dir OUT (nerfstudio){THEN}"),
         _is_record3d,
     ),
     (
         Foreign(
             "a Polycam raw export",
-            f"ns-process-data polycam --data THIS --output-dir OUT --use-depth (nerfstudio){THEN}",
+            f"ns-process-data polycam --data {{}} --output-dir OUT --use-depth (nerfstudio){THEN}",
         ),
         _is_polycam,
     ),

@@ -14,6 +14,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile, StreamName
 from scenewright.stages.ingest.detection import open_log
 from scenewright.stages.ingest.images import depth_roughness
+from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.origins import named_sources
 from scenewright.stages.ingest.own_poses import with_own_poses
 from scenewright.stages.ingest.parameters import IngestParameters
@@ -288,7 +289,8 @@ def _finish(
         summary["damage"] = len(source.damage)
     if not written.times:
         worst = ", ".join(f"{reason} {count}" for reason, count in drops.most_common()) or "no frames in the log"
-        summary["reason"] = f"no usable frame: {worst}"
+        advice = "; ".join(ADVICE[reason] for reason, _ in drops.most_common() if reason in ADVICE)
+        summary["reason"] = f"no usable frame: {worst}" + (f" ({advice})" if advice else "")
         context.logger.warning("%s", summary["reason"])
     return Sequence(context.output, outcome="ok" if written.times else "empty", summary=summary)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
@@ -13,6 +13,7 @@ from scenewright.schemas.trajectory import FrameEstimate, LoopClosure, PosesFile
 from scenewright.stages.kit.formats.frames import FrameReader, require_depth
 from scenewright.stages.kit.formats.trajectories import write_tum
 from scenewright.stages.kit.stage import Context
+from scenewright.stages.poses.contradiction import contradicted
 from scenewright.stages.poses.drift import drift_of, loop_closures, path_length
 from scenewright.stages.poses.estimation import estimate
 from scenewright.stages.poses.frame_poses import FramePose, frame_poses
@@ -22,6 +23,9 @@ from scenewright.stages.poses.world import choose_world, without_poses
 MOST_CONTRADICTED, FEWEST_LOOPS = 0.15, 10
 """A path is not to be trusted that denies more than this share of its loops, of so many at least. Of four good paths
 none to a tenth was denied, of three that were off by a decimetre and more 16 to 52 % (docs/POSES.md)."""
+
+CONTRADICTED = "contradicted"
+"""Fault of a frame that the depth of the others contradicts where the path had put it."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,7 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
         check_streams(reader, sequence, parameters)
         check_world(reader, frames, sequence, parameters)
         result = METHODS[parameters.method].estimate(reader, frames, camera_name, parameters, context)
+        result = _without_contradicted(result, reader, camera_name, parameters, context)
         return _finish(reader, camera_name, result, parameters, context)
 
 
@@ -128,6 +133,20 @@ METHODS = {
 }
 
 
+def _without_contradicted(
+    result: Result, reader: FrameReader, camera_name: str, parameters: PosesParameters, context: Context
+) -> Result:
+    """Return the result without the poses that the depth of the other frames contradicts."""
+    with context.progress.step("contradictions"):
+        wrong = contradicted(
+            reader, reader.cameras[camera_name], result.poses, parameters.minimum_agreement, parameters.maximum_depth
+        )
+    poses = [
+        FramePose(pose.frame, None, "unposed", CONTRADICTED) if pose.frame in wrong else pose for pose in result.poses
+    ]
+    return replace(result, poses=poses)
+
+
 def _finish(
     reader: FrameReader, camera_name: str, result: Result, parameters: PosesParameters, context: Context
 ) -> Trajectory:
@@ -177,7 +196,7 @@ def outcome_of(info: PosesFile) -> str:
     unposed = sum(frame.status == "unposed" for frame in info.frames)
     if unposed == len(info.frames):
         return "empty"
-    if contradicted_share(info.loops) > MOST_CONTRADICTED:
+    if is_contradictory(info):
         return "contradictory"
     return "tracking_lost" if unposed else "ok"
 
@@ -186,6 +205,17 @@ def contradicted_share(loops: Iterable[LoopClosure]) -> float:
     """Return the share of the loops that the path denies: both were aligned surface on surface, one of them wrongly."""
     denied = [loop.weight < 0.5 for loop in loops]
     return sum(denied) / max(len(denied), FEWEST_LOOPS)
+
+
+def wrong_frames(info: PosesFile) -> int:
+    """Return how many frames the depth of the others contradicted where the path had put them."""
+    return sum(frame.fault == CONTRADICTED for frame in info.frames)
+
+
+def is_contradictory(info: PosesFile) -> bool:
+    """Whether the path denies too many of its loops, or of its frames."""
+    too_many = wrong_frames(info) > MOST_CONTRADICTED * len(info.frames)
+    return too_many or contradicted_share(info.loops) > MOST_CONTRADICTED
 
 
 def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, object]:
@@ -208,11 +238,13 @@ def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, obj
             f"({', '.join(f'{reason} {count}' for reason, count in sorted(reasons.items()))}): {where}"
         )
         context.logger.warning("%s", summary["reason"])
-    if contradicted_share(info.loops) > MOST_CONTRADICTED:
+    if is_contradictory(info):
         denied = sum(loop.weight < 0.5 for loop in info.loops)
+        what = f"{denied} of {len(info.loops)} places that look the same"
+        if contradicted_share(info.loops) <= MOST_CONTRADICTED:
+            what = f"the depth of {wrong_frames(info)} of {len(info.frames)} frames"
         summary["reason"] = (
-            f"the path denies {denied} of {len(info.loops)} places that look the same: it may be off by decimetres; "
-            "record more pictures a second, or turn more slowly"
+            f"the path denies {what}: it may be off by decimetres; record more pictures a second, or turn more slowly"
         )
         context.logger.warning("%s", summary["reason"])
     return summary

@@ -7,11 +7,13 @@ import json
 import os
 import shutil
 import tempfile
+import threading
 from functools import cache
 from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 import trimesh
 from scenewright.cli.main import run
 from scenewright.stages.cutting.recording.panels import HEIGHT, WIDTH
@@ -20,6 +22,8 @@ from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.tableware.world.overhead import overhead_camera
 
 from tests.panoptic_maps import floor_mesh, write_map
+from tests.strangers.logs import write_images
+from tests.strangers.pictures import RED_AND_BLUE, SHOTS, TRUE
 from tests.unit.cad.models import fridge as model_of_a_fridge
 from tests.unit.cad.models import write_library
 from tests.unit.cad.test_cad_stage import mesh_of
@@ -30,6 +34,7 @@ from tests.unit.edit.maps import dense, room_map
 from tests.unit.housekeeping.tiny_run import make_tiny_run
 from tests.unit.poses.textured_room import CAMERA, render, round_walk
 from tests.unit.poses.textured_room import write_sequence as write_textured
+from tests.unit.segment.test_service import FakeServer, good_reply
 from tests.unit.segment.test_stage import write_sequence
 from tests.unit.viewing.artifacts import seal
 
@@ -72,6 +77,51 @@ def masks() -> str:
     made = folder() / "masks"
     assert run(["segment", f"--sequence={room()}/sequence", "--backend=ground-truth", f"--out={made}/segments"]) == 0
     return str(made)
+
+
+@cache
+def pan() -> str:
+    """Return a folder with the sequence of a camera that turns (tests/strangers/pictures.py), ingested of logs whose
+    pictures are numbered from 1: `whole`, and `gap` in which a picture of the log was lost."""
+    made = folder() / "pan"
+    for name, numbers in (("whole", (1, 2, 3, 4, 5, 6)), ("gap", (1, 2, 3, 4, 5, 7))):
+        log = write_images(made / f"{name}_log", SHOTS, names=[f"{number:06d}" for number in numbers].__getitem__)
+        assert run(["ingest", f"--log={log}", f"--out={made}/{name}", "--gravity=none"]) == 0
+    return str(made)
+
+
+@cache
+def flags() -> str:
+    """Return a sequence of one picture that is red on the left and blue on the right."""
+    log = write_images(folder() / "flags_log", RED_AND_BLUE)
+    assert run(["ingest", f"--log={log}", f"--out={folder()}/flags", "--gravity=none"]) == 0
+    return str(folder() / "flags")
+
+
+@cache
+def models() -> str:
+    """Return a folder with tiny models of transformers, `mask2former`, `grounding_dino` and `sam`; skip without."""
+    pytest.importorskip("transformers")
+    pytest.importorskip("torch").manual_seed(0)
+    from tests.unit.segment import tiny_models
+
+    for name in ("mask2former", "grounding_dino", "sam"):
+        getattr(tiny_models, name)(folder() / "models" / name)
+    return str(folder() / "models")
+
+
+@cache
+def server() -> FakeServer:
+    """Return a segmentation service that finds a chair in the upper half of every picture."""
+    reply = json.dumps(good_reply(TRUE[0].shape)).encode()
+    made = FakeServer(lambda number: (200, {}, reply))
+    threading.Thread(target=made.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
+    return made
+
+
+def service() -> str:
+    """Return the address of that service."""
+    return "http://{}:{}".format(*server().server_address[:2])
 
 
 @cache
@@ -176,5 +226,8 @@ def seen() -> str:
     return str(folder() / "seen")
 
 
-INPUTS = {make.__name__: make for make in (golden, room, masks, table, cut, suture, walks, pair, fridge, tiny, seen)}
+INPUTS = {
+    make.__name__: make
+    for make in (golden, room, masks, pan, flags, models, service, table, cut, suture, walks, pair, fridge, tiny, seen)
+}
 """What stands for `{name}` in a row's commands."""

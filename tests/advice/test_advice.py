@@ -70,6 +70,7 @@ def said(text: str, line: str) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "row", [pytest.param(row, id=f"{row.path} {row.says}") for row in ROWS if isinstance(row, Tried)]
 )

@@ -23,6 +23,18 @@ THINGS = {name: number for number, name in NAMES.items() if name != "wall"}
 VOCABULARY = load_vocabulary()
 
 
+def _red_and_blue() -> np.ndarray:
+    height, width = TRUE[0].shape
+    picture = np.zeros((height, width, 3), np.uint8)
+    picture[: height * 3 // 4, : width // 2, 0] = 255
+    picture[: height * 3 // 4, width // 2 :, 2] = 255
+    return picture
+
+
+RED_AND_BLUE = [(_red_and_blue(), depth, pose) for _, depth, pose in SHOTS[:1]]
+"""A picture that is red on the left and blue on the right, black below: what the tiny networks find."""
+
+
 def numbers(name: str) -> set[int]:
     """Return the class numbers that a word may become."""
     return {entry.id for entry in VOCABULARY.classes if entry.name == name}
@@ -44,6 +56,14 @@ def overlaps(segments: Path, frames: list[int] | None = None, order: list[int] |
             both[name] += int((mask & wanted).sum())
             either[name] += int((mask | wanted).sum())
     return {name: both[name] / either[name] for name in THINGS if either[name]}
+
+
+def classes_at(segments: Path, red: str = "cup", blue: str = "chair") -> tuple[float, float]:
+    """Return the shares of the red part that have one class and of the blue part that have the other."""
+    height, width = TRUE[0].shape
+    found = class_image(Segments(segments), 0)
+    left, right = found[8 : height // 2, 8 : width // 2 - 8], found[8 : height // 2, width // 2 + 8 : -8]
+    return float(np.isin(left, list(numbers(red))).mean()), float(np.isin(right, list(numbers(blue))).mean())
 
 
 def segment(sequence: Path, masks: Path, out: Path, *options: str | Path) -> Said:

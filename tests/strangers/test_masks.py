@@ -19,9 +19,11 @@ from tests.strangers.logs import write_bag, write_images, write_nerfstudio, writ
 from tests.strangers.pictures import (
     COUNT,
     NAMES,
+    RED_AND_BLUE,
     SHOTS,
     THINGS,
     TRUE,
+    classes_at,
     outline,
     overlaps,
     right_or_clear,
@@ -61,6 +63,21 @@ def test_masks_as_they_should_be(plain: Path, tmp_path: Path) -> None:
     shifted = id_pictures(tmp_path / "next", [f"{k:06d}.png" for k in range(COUNT - 1)], TRUE[1:])
     assert segment(plain, shifted, tmp_path / "shifted").code == 0
     assert min(overlaps(tmp_path / "shifted", frames=list(range(COUNT - 1))).values()) < 0.4
+
+
+@pytest.fixture(scope="module")
+def without_walls(plain: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
+    """How well things lie where they are when their masks are read right and nothing is masked beside them.
+
+    The cabinet has 0.69 here and 0.98 at 640 x 480: of so small a picture few depth segments end at its foot, and what
+    a mask has of a segment that is mostly unmasked wall is lost to it (docs/MAPPING.md, "label of a segment").
+    """
+    root = tmp_path_factory.mktemp("things")
+    masks = id_pictures(root / "masks", [f"{k:06d}.png" for k in range(COUNT)], [image * (image > 1) for image in TRUE])
+    assert segment(plain, masks, root / "segments").code == 0
+    found = overlaps(root / "segments")
+    assert min(found.values()) > 0.6
+    return found
 
 
 # ---- 4: names --------------------------------------------------------------------------------------------------------
@@ -275,16 +292,18 @@ def test_yolo_polygons(plain: Path, tmp_path: Path) -> None:
     right_or_clear(plain, root, tmp_path, r"YOLO|\.txt|polygon|formats")
 
 
-def test_the_ignore_label(plain: Path, tmp_path: Path) -> None:
+def test_the_ignore_label(plain: Path, without_walls: dict[str, float], tmp_path: Path) -> None:
     """255 is "ignore" in semantic PNGs (open-mmlab/mmsegmentation #2613, CAMMA-public/Endoscapes #5): no thing is
-    made of it, or 255 is named."""
+    made of it, and 255 is named."""
     images = []
     for image in TRUE:
         ignored = image.copy()
         ignored[image == 1] = 255
         images.append(ignored)
     masks = id_pictures(tmp_path / "masks", [f"{k:06d}.png" for k in range(COUNT)], images)
-    right_or_clear(plain, masks, tmp_path, "255")
+    said = segment(plain, masks, tmp_path / "segments")
+    assert said.code == 0 and said.names("255"), said.text
+    assert overlaps(tmp_path / "segments") == without_walls
 
 
 def test_cityscapes_instance_ids(plain: Path, tmp_path: Path) -> None:
@@ -314,14 +333,16 @@ def test_one_bit_masks(plain: Path, tmp_path: Path) -> None:
     assert overlaps(tmp_path / "segments")["cup"] > 0.7, said.text
 
 
-def test_black_and_white_masks_a_folder_a_class(plain: Path, tmp_path: Path) -> None:
+def test_black_and_white_masks_a_folder_a_class(plain: Path, without_walls: dict[str, float], tmp_path: Path) -> None:
     """cup/000000.png, table/000000.png ... in 0 and 255 (HumanSignal/label-studio #7346 exports PNGs a label):
     read, or refused by the folders, not by "keep one of them"."""
     root = tmp_path / "masks"
     for name, number in THINGS.items():
         for k, image in enumerate(TRUE):
             write_ids(root / name / f"{k:06d}.png", np.where(image == number, 255, 0).astype(np.uint8))
-    right_or_clear(plain, root, tmp_path, "folder|class")
+    said = segment(plain, root, tmp_path / "segments")
+    assert said.code == 0, said.text
+    assert overlaps(tmp_path / "segments") == without_walls
 
 
 def test_masks_as_jpeg(plain: Path, tmp_path: Path) -> None:
@@ -369,25 +390,8 @@ CUP, CHAIR = 41, 56
 
 
 def shown_red_and_blue(tmp_path: Path) -> Path:
-    """A sequence whose every picture is red on the left and blue on the right, black below: what the tiny networks
-    find."""
-    picture = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    picture[: HEIGHT * 3 // 4, : WIDTH // 2, 0] = 255
-    picture[: HEIGHT * 3 // 4, WIDTH // 2 :, 2] = 255
-    recorded = [(picture, depth, pose) for _, depth, pose in SHOTS[:2]]
-    return sequence_of(write_images(tmp_path / "log", recorded), tmp_path / "sequence")
-
-
-def classes_at(segments: Path, frame: int = 0) -> tuple[float, float]:
-    """Return the shares of the red part that is `cup` and of the blue part that is `chair`."""
-    from scenewright.schemas.segments import Segments
-
-    from tests.strangers.pictures import numbers
-    from tests.unit.segment.test_stage import class_image
-
-    found = class_image(Segments(segments), frame)
-    red, blue = found[8 : HEIGHT // 2, 8 : WIDTH // 2 - 8], found[8 : HEIGHT // 2, WIDTH // 2 + 8 : -8]
-    return float(np.isin(red, list(numbers("cup"))).mean()), float(np.isin(blue, list(numbers("chair"))).mean())
+    """A sequence of what the tiny networks find."""
+    return sequence_of(write_images(tmp_path / "log", RED_AND_BLUE), tmp_path / "sequence")
 
 
 def network_is_right_or_clear(weights: Path, tmp_path: Path, backend: str, *words: str, void: str = "") -> None:

@@ -11,6 +11,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -470,26 +471,29 @@ def test_gltf_instances(tmp_path: Path, required: bool) -> None:
 @pytest.mark.parametrize("extension", ["KHR_texture_transform", "EXT_texture_webp"])
 def test_gltf_extensions_that_change_colours_alone(tmp_path: Path, extension: str) -> None:
     """A required extension of textures (RobotLocomotion/drake #23183, gltf-rs/gltf #431, f3d-app/f3d #2473): the
-    size is right and the extension is named, or it is refused by its name."""
+    size and the colour are right. The picture is green on the left and red on the right; the mesh shows the left, and
+    the transform moves it by half of the picture."""
     points, faces = block((-0.3, 0.0, -0.2), (0.3, 0.72, 0.2))
-    uv = (np.random.default_rng(0).random((len(points), 2))).astype("<f4")
-    picture = np.frombuffer(png(np.full((8, 8, 3), (200, 40, 40), np.uint8)), np.uint8)
+    uv = np.full((len(points), 2), (0.3, 0.5), "<f4")
+    pixels = np.zeros((8, 8, 3), np.uint8)
+    pixels[:, :4], pixels[:, 4:] = (40, 200, 40), (200, 40, 40)
+    kind = "webp" if extension == "EXT_texture_webp" else "png"
+    picture = np.frombuffer(cv2.imencode(f".{kind}", pixels[..., ::-1])[1].tobytes(), np.uint8)
     document, data = simple(points, faces, uv, picture)
     document["accessors"].append({"bufferView": 2, "componentType": 5126, "count": len(uv), "type": "VEC2"})
     document["meshes"][0]["primitives"][0] |= {"attributes": {"POSITION": 0, "TEXCOORD_0": 2}, "material": 0}
-    document |= {"images": [{"bufferView": 3, "mimeType": "image/png"}], "textures": [{"source": 0}]}
+    document |= {"images": [{"bufferView": 3, "mimeType": f"image/{kind}"}], "textures": [{"source": 0}]}
     texture: dict[str, Any] = {"index": 0}
     if extension == "KHR_texture_transform":
-        texture["extensions"] = {extension: {"offset": [0.5, 0.0], "scale": [0.5, 1.0]}}
-    if extension == "EXT_texture_webp":
+        texture["extensions"] = {extension: {"offset": [0.5, 0.0]}}
+    else:
         document["textures"] = [{"extensions": {extension: {"source": 0}}}]
     document["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": texture}}]
     document |= {"extensionsUsed": [extension], "extensionsRequired": [extension]}
     glb(tmp_path / "in" / "table.glb", document, data)
     added = add(tmp_path / "in", tmp_path / "out")
-    if added.models:
-        is_size(added.only, 0.6, 0.4, 0.72)
-    assert added.names(extension), added.text
+    is_size(added.only, 0.6, 0.4, 0.72)
+    assert colors_of(tmp_path / "out") == {"g" if kind == "webp" else "r"}, added.text
 
 
 def test_gltf_compressed_with_a_fallback(tmp_path: Path) -> None:

@@ -264,17 +264,19 @@ def camera_from_options(size: tuple[int, int] | None, parameters: IngestParamete
 
 
 def depth_form(
-    parameters: IngestParameters, default: float, depths: Iterable[Path | None] = ()
+    parameters: IngestParameters, default: float, depths: Iterable[Path | None] = (), stated: float | None = None
 ) -> tuple[DepthForm, str]:
     """Return how depth is stored, and a note that says where the unit comes from.
 
-    `default` units per metre are those of the layout for whole numbers. The `depths` of a layout that says nothing of
-    floating point are looked at: such depth is in metres by habit, unless its median is farther than a sequence can
-    hold.
+    `default` units per metre are those of the layout for whole numbers, `stated` those of the calibration file. The
+    `depths` of a layout that says nothing of floating point are looked at: such depth is in metres by habit, unless its
+    median is farther than a sequence can hold.
     """
     if parameters.depth_scale is not None:
         unit = f"depth unit given by option: 1/{parameters.depth_scale:g} m"
         return DepthForm(parameters.depth_scale, parameters.depth_bits), unit
+    if stated is not None:
+        return DepthForm(stated, parameters.depth_bits), f"depth unit stated by the calibration: 1/{stated:g} m"
     first = next((image for path in depths if path is not None and (image := _readable_depth(path)) is not None), None)
     if first is not None and first.dtype.kind == "f":
         valid = first[np.isfinite(first) & (first > 0)]

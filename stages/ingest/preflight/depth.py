@@ -18,6 +18,8 @@ SATURATED = 0.2
 """Share of valid pixels at the largest value that suggests a cut-off."""
 COARSE_VALUES = 256
 """Depth with fewer values in every frame was 8-bit once."""
+MULTIPLE = 5
+"""What TUM's 1/5000 m makes of millimetres, which keep it in every value."""
 HISTOGRAM_BINS = 48
 """Bars of the depth histogram; by eye."""
 
@@ -69,11 +71,15 @@ def units_per_metre(notes: Iterable[str], depth_scale: float | None) -> float:
     (millimetres, which every other reader takes)."""
     if depth_scale is not None:
         return depth_scale
-    noted = [match for note in notes if (match := re.match(r"depth unit assumed: 1/([0-9.e+]+) m", note))]
+    noted = [
+        match
+        for note in notes
+        if (match := re.match(r"depth unit (?:assumed|stated by the calibration): 1/([0-9.e+]+) m", note))
+    ]
     return float(noted[0][1]) if noted else 1000.0
 
 
-def depth_findings(report: DepthReport, units: float, camera: str) -> list[Finding]:
+def depth_findings(report: DepthReport, units: float, camera: str, *, has_poses: bool = True) -> list[Finding]:
     """Return what is odd about the depth itself; `units` per metre is how it was read.
 
     Whether it agrees with the poses is said with the poses.
@@ -91,6 +97,13 @@ def depth_findings(report: DepthReport, units: float, camera: str) -> list[Findi
             "wasted",
             f"depth unit: the median depth is {report.median:.3g} m{no_unit}",
             f"ingest with {', or '.join(words)}" if words else "find out the unit of the depth images: --depth-scale",
+        )
+    elif not has_poses and units == 1000 and report.step == MULTIPLE / 1000 and report.distinct_values >= COARSE_VALUES:
+        add(
+            "doubtful",
+            f"every value of the depth is a multiple of {MULTIPLE}, as of millimetres that were stored in 1/5000 m; "
+            f"the median is {report.median:.3g} m, or {report.median / MULTIPLE:.3g} m",
+            f"ingest with --depth-scale {MULTIPLE * 1000}, where that is so",
         )
     if report.valid_share < LITTLE_VALID:
         add("doubtful", f"only {100 * report.valid_share:.1f} % of the depth pixels are valid")

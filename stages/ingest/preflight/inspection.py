@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ from scenewright.schemas.manifest import MANIFEST_NAME
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.detection import log_format, open_log
 from scenewright.stages.ingest.foreign import refuse_foreign_folder, refuse_lone_recording
+from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
 from scenewright.stages.ingest.preflight.bits import bits_finding
@@ -64,16 +66,8 @@ LEAST_FRAMES = 12
 HEAVY_LOSS, LOSS = 0.5, 0.1
 """Shares of the frames that are lost from which a log is wasted, and doubtful."""
 NO_POSES = PoseReport(verdict="none", method="none", detail="the frames have no poses")
-ADVICE = {
-    "no_depth_within_tolerance": "compare the clocks of colour and depth; ingest has --maximum-time-difference",
-    "missing_pose": "ingest has --maximum-transform-gap, --pose-topic and --world-frame",
-    "size_mismatch": "colour and depth of a frame must have one shape",
-    "depth_not_16_bit": "pictures of depth for people are no depth: record 16-bit or float images",
-    "no_valid_depth": "is the depth unit right (--depth-scale)?",
-    "missing_color": "colour and depth files must pair",
-    "missing_depth": "colour and depth files must pair",
-}
-"""Reason for which frames are lost -> what to do."""
+TAKEN = re.compile(r"WARNING: (.* taken .*) \((--.*)\)")
+"""A warning of a reader that takes one thing for another, and the option that decides."""
 SEVERITIES = ("wasted", "doubtful", "note")
 
 
@@ -184,9 +178,10 @@ def inspect_source(
     has_poses = any(report.poses.verdict != "none" for report in reports)
     findings = [
         *_frame_findings(frames, source),
+        *warning_findings(source),
         *_content_findings(reports, source),
         *findings,
-        *stream_findings(streams),
+        *stream_findings(streams, source.notes),
         *gravity_findings(gravity, has_poses),
     ]
     if len(source.cameras) == 1:
@@ -269,7 +264,7 @@ def _judge_camera(
     motion = motion_report(poses, material.times, looks, choice.runs) if poses is not None else None
     findings += calibration_findings(calibration, source_camera.camera, name)
     if depth is not None:
-        findings += depth_findings(depth, units, name)
+        findings += depth_findings(depth, units, name, has_poses=poses is not None)
     if stereo is not None:
         findings += stereo_findings(stereo, name)
     if poses is not None:
@@ -418,6 +413,12 @@ def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
         further = f" (and {len(source.damage) - 1} more)" if len(source.damage) > 1 else ""
         add("doubtful", f"the log is damaged: {source.damage[0]}{further}", "what is whole is used")
     return findings
+
+
+def warning_findings(source: LogSource) -> list[Finding]:
+    """Return the reader's warnings about times and depth: what it took in the place of what the log seems to say."""
+    found = (TAKEN.fullmatch(note) for note in source.notes)
+    return [Finding(severity="doubtful", check="reading", message=match[1], fix=match[2]) for match in found if match]
 
 
 def _matrices(source: LogSource) -> np.ndarray:

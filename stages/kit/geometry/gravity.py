@@ -8,7 +8,7 @@ would cut a slanted slice out of a floor that lies outside of it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.kit.geometry.cells import cell_keys
@@ -40,6 +40,8 @@ PLAIN_SHARE = 0.1
 """Share of the points with which a plane square to the log's z is level where nothing agrees with the cameras' up."""
 BELOW_SHARE = 0.05
 """Share of points farther than 10 cm below a plane over which it is a table, not the floor."""
+NEARLY_LEVEL = math.radians(10.0)
+"""A log whose axis is so near to up was meant to be level."""
 LEAST_TURN = 0.17
 """Cameras whose x axes leave their common line by less (root mean square cosine, 10 degrees) did not turn about."""
 AXES = {
@@ -66,6 +68,10 @@ class FloorFit:
     """Share of the points further than 10 cm below."""
     axis: str | None = None
     """Axis of the log's world that the normal is, where a level plane said so."""
+    on_side: bool = False
+    """Whether it is the floor of cameras that lie on their side."""
+    rival: str | None = None
+    """What may be up instead, as the cameras may lie on their side: an axis of the log's world, or some plane."""
 
     @property
     def is_lowest(self) -> bool:
@@ -78,18 +84,38 @@ def camera_up(world_from_camera: np.ndarray) -> np.ndarray | None:
 
     Cameras that turned about and were held level have x axes that are square to up, wherever they looked (total least
     squares, the method `vertical` of nerfstudio); else it is the mean of -y, which leans with cameras that look down.
+    Where that cancels out, cameras that turned about on their side have y axes that are square to up.
     """
     mean = -world_from_camera[:, :3, 1].mean(axis=0)
-    _, spread, directions = np.linalg.svd(world_from_camera[:, :3, 0], full_matrices=True)
-    spread = np.append(spread, np.zeros(3))[:3] / math.sqrt(len(world_from_camera))
-    if spread[1] > LEAST_TURN and spread[2] < spread[1] / 3:
-        side = float(directions[2] @ mean)
+    forward = world_from_camera[:, :3, 2].mean(axis=0)
+    turned, pole = _turned_about(world_from_camera[:, :3, 0])
+    if math.isfinite(turned):
+        side = float(pole @ mean)
         if abs(side) < LEAST_TURN:  # they look straight down, or every way
-            side = -float(directions[2] @ world_from_camera[:, :3, 2].mean(axis=0))
+            side = -float(pole @ forward)
         if abs(side) >= LEAST_TURN:
-            return directions[2] * math.copysign(1.0, side)
+            return pole * math.copysign(1.0, side)
     length = float(np.linalg.norm(mean))
-    return mean / length if length > 0.2 else None
+    if length > 0.2:
+        return mean / length
+    turned, pole = _turned_about(world_from_camera[:, :3, 1])
+    return -pole * math.copysign(1.0, float(pole @ forward)) if math.isfinite(turned) else None
+
+
+def on_their_side(world_from_camera: np.ndarray) -> bool | None:
+    """Whether cameras (N, 4, 4) turned about on their side, as phones held upright, and not level; None where they
+    turned too little to tell."""
+    level, side = (_turned_about(world_from_camera[:, :3, axis])[0] for axis in (0, 1))
+    return side < level if math.isfinite(min(level, side)) else None
+
+
+def _turned_about(axes: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return how far unit axes (N, 3) lie off a plane in which they turned, as a share of the turn, and the normal of
+    that plane; infinite where they did not."""
+    _, spread, directions = np.linalg.svd(axes, full_matrices=True)
+    spread = np.append(spread, np.zeros(3))[:3] / math.sqrt(max(len(axes), 1))
+    turned = spread[1] > LEAST_TURN and spread[2] < spread[1] / 3
+    return float(spread[2] / spread[1]) if turned else math.inf, directions[2]
 
 
 def grid_samples(points: np.ndarray, normals: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -117,8 +143,12 @@ def find_floor(
     axes = {} if _is_world_of_a_camera(poses) else {name: np.array(axis) for name, axis in AXES.items()}
     if axes and not planes:
         planes = _plain_planes(points, normals, axes["z"], poses[:, :3, 0], random)
-    if not planes:
-        return None
+    upright = _lowest_level(points, planes, up, axes) if planes else None
+    return _of_cameras_on_their_side(upright, points, normals, poses, axes, random)
+
+
+def _lowest_level(points: np.ndarray, planes: list[PlaneFit], up: np.ndarray, axes: dict[str, np.ndarray]) -> FloorFit:
+    """Return the lowest of the planes that are square to what most support is for."""
     cosine = math.cos(PARALLEL_ANGLE)
     support = [sum(len(q.inliers) for q in planes if q.normal @ p.normal > cosine) for p in planes]
     # Of a plane that the cameras' up leans from, less is believed.
@@ -138,6 +168,44 @@ def find_floor(
     below = [float((plane_distances(points, plane.normal, plane.offset) < -0.1).mean()) for plane in level]
     lowest = int(np.argmin(below))
     return _floor_fit(points, level[lowest], below[lowest], name)
+
+
+def _of_cameras_on_their_side(
+    upright: FloorFit | None,
+    points: np.ndarray,
+    normals: np.ndarray,
+    poses: np.ndarray,
+    axes: dict[str, np.ndarray],
+    random: np.random.Generator,
+) -> FloorFit | None:
+    """Return the floor that cameras (M, 4, 4) see which may lie on their side; `upright` is what it is if they do not.
+
+    A wall is as level to them as a floor is to others. Axes of the log's world that are up by custom decide: a large
+    plane square to y or z is no accident, where `upright` leans from both. Else `upright` stands, and says of cameras
+    that turned about on their side that another plane may be the floor.
+    """
+    on_side = on_their_side(poses) if len(poses) else False
+    usual = {name: axis for name, axis in axes.items() if name.strip("-") != "x"}
+    accords = upright is not None and any(upright.normal @ axis > math.cos(NEARLY_LEVEL) for axis in usual.values())
+    if on_side is False or (accords and not on_side):
+        return upright
+    found = [
+        _floor_fit(points, plane, 0.0, name)
+        for name, axis in usual.items()
+        for plane in _plain_planes(points, normals, axis, poses[:, :3, 1], random)
+    ]
+    if found and not accords:  # a ceiling is as level as a floor
+        floor = max(found, key=lambda fit: (not str(fit.axis).startswith("-"), fit.inlier_count))
+        axis = str(floor.axis)
+        opposite = axis[1:] if axis.startswith("-") else f"-{axis}"
+        faced = opposite == axis[1:] or any(fit.axis == opposite for fit in found)
+        return replace(floor, on_side=True, rival=opposite if faced else None)
+    if found and upright is not None:
+        other = max(found, key=lambda fit: fit.inlier_count)
+        return upright if other.axis == upright.axis else replace(upright, rival=other.axis)
+    if not on_side or upright is None or upright.axis is not None:
+        return upright
+    return replace(upright, rival="another plane")
 
 
 def _floor_fit(points: np.ndarray, plane: PlaneFit, below: float, axis: str | None) -> FloorFit:
@@ -170,8 +238,8 @@ def _is_world_of_a_camera(poses: np.ndarray) -> bool:
 def _plain_planes(
     points: np.ndarray, normals: np.ndarray, axis: np.ndarray, across: np.ndarray, random: np.random.Generator
 ) -> list[PlaneFit]:
-    """Return large planes square to an axis (3,) that x axes (M, 3) of cameras lie in: the cameras look straight down,
-    or hang upside down."""
+    """Return large planes square to an axis (3,) that x axes (M, 3) of cameras lie in, or y axes: the cameras look
+    straight down, hang upside down, or lie on their side."""
     return [
         plane
         for plane in _planes(points, normals, normals @ axis > math.cos(2 * PARALLEL_ANGLE), random)

@@ -15,11 +15,13 @@ from scenewright.stages.kit.geometry.gravity import (
     AXES,
     MAXIMUM_LEAN,
     MAXIMUM_TILT,
+    NEARLY_LEVEL,
     POOR_FIT,
     FloorFit,
     camera_up,
     find_floor,
     grid_samples,
+    on_their_side,
     upright_from_direction,
     upright_from_floor,
     wall_yaw,
@@ -30,8 +32,6 @@ GRID = 0.05
 """Edge of the cells of which one point each is looked at [m]."""
 REASON = re.compile("; (doubtful|note): (.*)$")
 """How a detail ends that says why up may be wrong, and how grave that is."""
-NEARLY_LEVEL = math.radians(10.0)
-"""A log whose axis is so near to up was meant to be level."""
 CLOUD = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 
@@ -79,6 +79,8 @@ def make_upright(
         return _gravity("imu", upright, detail)
     why = "asked for" if method == "camera-up" else "no floor was seen"
     detail = f"how the cameras were held ({why}), lowest percentile of the points at z = 0; {turned}"
+    if method == "auto" and on_their_side(poses):
+        detail += "; doubtful: the cameras may lie on their side"
     return _gravity("mean_camera_up", upright, detail)
 
 
@@ -107,6 +109,11 @@ def _doubt(floor: FloorFit, lean: float, source: str) -> str:
     if floor.axis is None and away[name] < NEARLY_LEVEL and floor.residual > POOR_FIT:
         angle = math.degrees(away[name])
         return f"; doubtful: the plane fits poorly and turns the log's {name}, which may be up, by {angle:.1f} deg"
+    if floor.rival:
+        rival = f"the log's {floor.rival}" if floor.rival in AXES else floor.rival
+        return f"; doubtful: the cameras may lie on their side, and {rival} be up"
+    if floor.on_side:
+        return "; note: the cameras lie on their side"
     if lean > (MAXIMUM_TILT if floor.axis is None else MAXIMUM_LEAN):
         return (
             f"; note: the floor leans by {math.degrees(lean):.0f} deg from {source}, as where cameras look down on it"

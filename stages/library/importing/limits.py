@@ -93,6 +93,11 @@ def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:
     return cleaned(" ".join(text.split()))
 
 
+def one_color(what: str, name: str) -> str:
+    """Return the finding for a picture that a description puts on shapes, and that is not looked at."""
+    return f"{what} {name!r:.60} is not read: what it covers has one colour"
+
+
 def few_findings(findings: Sequence[str]) -> tuple[str, ...]:
     """Return the findings without repetitions, at most MOST_FINDINGS of them and how many more there are."""
     distinct = tuple(dict.fromkeys(findings))

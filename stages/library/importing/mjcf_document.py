@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -62,6 +62,8 @@ class Placed:
     document: MjcfDocument
     parent_from_frame: np.ndarray
     child_class: str
+    prefix: str = ""
+    """What `<attach>` puts before the names of bodies and joints."""
 
     @property
     def tag(self) -> str:
@@ -78,7 +80,8 @@ class Placed:
 
     def inner(self) -> list[Placed]:
         """Return the elements in this body. Raises BadInput."""
-        return list(self.document.placed(self.element, self.element.get("childclass", self.child_class)))
+        placed = self.document.placed(self.element, self.element.get("childclass", self.child_class))
+        return [replace(part, prefix=self.prefix + part.prefix) for part in placed]
 
     def unknown(self) -> list[str]:
         """Return a line for each kind of element in this body that is not known."""
@@ -175,14 +178,15 @@ class MjcfDocument:
 
     def _of_attached(self, element: ElementTree.Element, pose: np.ndarray, where: str) -> Iterator[Placed]:
         other, body = self._attached_document(element.get("model", ""), where), element.get("body")
+        prefix = element.get("prefix", "")
         self._count_repeated()
         for world in other.root.findall("worldbody"):
             if body is None:
-                yield from other.placed(world, MAIN, pose)
+                yield from (replace(part, prefix=prefix + part.prefix) for part in other.placed(world, MAIN, pose))
                 continue
             found = next((e for e in world.iter("body") if e.get("name") == body), None)
             if found is not None:
-                yield Placed(found, other, pose, MAIN)
+                yield Placed(found, other, pose, MAIN, prefix)
                 return
         if body is not None:
             raise BadInput(f"{where}: {other.path.name} has no body {body!r:.60}")

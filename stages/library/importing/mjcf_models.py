@@ -140,7 +140,7 @@ class _Reader:
         if depth > DEEPEST_BODIES:
             raise BadInput(f"{self.path}: bodies are nested too deeply")
         body, inner = placed.element, placed.inner()
-        name = self._unique(body.get("name", "body"))
+        name = self._unique(placed.prefix + body.get("name", "body"))
         where = f"{self.path}: body {name!r:.60}"
         tree.names.update(e.get("name", "") for e in (body, *(part.element for part in inner)) if e.get("name"))
         if depth == 0 or placed.document is not tree.document:
@@ -206,7 +206,7 @@ class _Reader:
             return fixed
         anchor = numbers(attributes.get("pos", "0 0 0"), 3, f"{where}: joint pos")
         return SourceJoint(
-            name=attributes.get("name", f"{name}_joint"),
+            name=part.prefix + attributes["name"] if "name" in attributes else f"{name}_joint",
             kind=kind,
             parent=parent,
             child=name,

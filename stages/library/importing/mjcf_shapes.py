@@ -8,7 +8,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.geometry.solids import Solid, box, cylinder, hull
 from scenewright.stages.kit.geometry.transforms import transform_from
-from scenewright.stages.library.importing.limits import MOST_TRIANGLES, MOST_VERTICES, Allowance
+from scenewright.stages.library.importing.limits import MOST_TRIANGLES, MOST_VERTICES, Allowance, one_color
 from scenewright.stages.library.importing.mesh_reading import read_mesh_file
 from scenewright.stages.library.importing.mjcf_document import MAIN, Attributes, MjcfDocument, Placed
 from scenewright.stages.library.importing.mjcf_poses import turn_of, unit_vector, z_towards
@@ -47,7 +47,7 @@ def collides(attributes: Attributes) -> bool:
 def geom_surfaces(geom: Placed, attributes: Attributes, by: Gathered, where: str) -> list[Surface]:
     """Return the surfaces of a geom in its body's frame. Raises BadInput, beginning with `where`."""
     name = attributes.get("name", "")
-    color = _color(geom.document, attributes, where)
+    color = _color(geom.document, attributes, where, by.findings)
     if "mesh" in attributes:
         return _mesh(geom, attributes, color, by, where)
     kind = attributes.get("type", "sphere")
@@ -66,14 +66,18 @@ def geom_surfaces(geom: Placed, attributes: Attributes, by: Gathered, where: str
     return by.take([solid_surface(solid, color, name).moved(pose)])
 
 
-def _color(document: MjcfDocument, attributes: Attributes, where: str) -> tuple[float, float, float] | None:
+def _color(
+    document: MjcfDocument, attributes: Attributes, where: str, findings: list[str]
+) -> tuple[float, float, float] | None:
     text = attributes.get("rgba")
-    if text is None and "material" in attributes:
-        material = document.assets["material"].get(attributes["material"])
-        if material is not None:
-            text = document.attributes(material, MAIN).get("rgba", "1 1 1 1")
-            if material.get("texture") and material.get("rgba") in (None, "1 1 1 1"):
-                text = "0.7 0.7 0.7 1"  # a picture on it that is not looked at
+    material = document.assets["material"].get(attributes.get("material", ""))
+    if material is not None:
+        plain = document.attributes(material, MAIN).get("rgba", "1 1 1 1")
+        if material.get("texture") or material.find("layer") is not None:
+            findings.append(one_color("texture of material", attributes["material"]))
+            if plain == "1 1 1 1":
+                plain = "0.7 0.7 0.7 1"  # a picture on it that is not looked at
+        text = plain if text is None else text
     if text is None:
         return None
     red, green, blue, _ = numbers(text, 4, f"{where}: rgba")
@@ -84,6 +88,9 @@ def _mesh(
     geom: Placed, attributes: Attributes, color: tuple[float, float, float] | None, by: Gathered, where: str
 ) -> list[Surface]:
     document, name, label = geom.document, attributes["mesh"], attributes.get("name", "")
+    kind = attributes.get("type", "sphere")
+    if kind not in ("mesh", "sdf"):
+        by.findings.append(f"a {kind:.20} is fitted to mesh {name!r:.40} (type, mesh): the mesh itself is taken")
     element = document.assets["mesh"].get(name)
     if element is None:
         raise BadInput(f"{where}: mesh {name!r:.60} is not declared")

@@ -1,7 +1,7 @@
 """SDF (Gazebo): models with links, poses, meshes, boxes, cylinders, spheres and joints.
 
 After the SDF specification 1.0 to 1.12. A joint's axis is in the joint's frame, before version 1.5 in that of its
-model, unless `use_parent_model_frame` or `expressed_in` says otherwise. No plugin runs.
+model, unless `use_parent_model_frame` (1.5 and 1.6) or `expressed_in` says otherwise. No plugin runs.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from scenewright.stages.library.importing.limits import (
     MOST_TRIANGLES_OF_A_FILE,
     Allowance,
     few_findings,
+    one_color,
     refuse_many,
 )
 from scenewright.stages.library.importing.primitives import ball, capsule
@@ -56,6 +57,10 @@ UNLIMITED = 1e3
 """Limits beyond this many radians or metres mean none (SDF's default is 1e16)."""
 AXES_IN_JOINT_FRAMES = (1, 5)
 """The first version in which an axis is in its joint's frame."""
+LOOKS = {"material script": "material/script/name", "texture": "material/pbr/metal/albedo_map"}
+"""What of a material holds more than a colour, and where it is named."""
+NO_PARENT_MODEL_FRAME = (1, 7)
+"""The first version without `use_parent_model_frame`."""
 KNOWN: Table = {
     "model": frozenset(
         {*("link", "joint", "frame", "model", "include", "pose", "static")}
@@ -175,6 +180,9 @@ class _Reader:
             raise BadInput(f"{where}: no geometry")
         pose = self._pose_in_link(element, link)
         color = None
+        for kind, looks in LOOKS.items():
+            for look in element.iterfind(looks):
+                self.findings.append(one_color(kind, (look.text or "").strip()))
         if diffuse := element.findtext("material/diffuse"):
             red, green, blue, _ = numbers(diffuse, 4, f"{where}: diffuse")
             color = (float(red), float(green), float(blue))
@@ -272,6 +280,12 @@ class _Reader:
         xyz = axis.find("xyz")
         name = "" if xyz is None else xyz.get("expressed_in", "")
         in_model = (axis.findtext("use_parent_model_frame") or "").strip() in ("1", "true")
+        if in_model and joint.scope.version >= NO_PARENT_MODEL_FRAME:
+            in_model = False
+            self.findings.append(
+                f"joint {joint.name!r:.40}: use_parent_model_frame means nothing since SDF 1.7: its axis is in its own"
+                " frame"
+            )
         if not name and not in_model and joint.scope.version >= AXES_IN_JOINT_FRAMES:
             return self.tree.pose(joint)
         frame = self.tree.named(name or "__model__", joint.scope, f"{joint.where}: axis")

@@ -13,7 +13,7 @@ from scenewright.stages.kit.formats.urdf_file import COUNTED, KNOWN_URDF, joint_
 from scenewright.stages.kit.geometry.solids import Solid, box, cylinder
 from scenewright.stages.kit.geometry.transforms import transform_from
 from scenewright.stages.library.importing.description_meshes import Naming, mesh_surfaces
-from scenewright.stages.library.importing.limits import MOST_LINKS, Allowance, few_findings, refuse_many
+from scenewright.stages.library.importing.limits import MOST_LINKS, Allowance, few_findings, one_color, refuse_many
 from scenewright.stages.library.importing.primitives import ball, capsule
 from scenewright.stages.library.importing.source_folder import SourceFolder, numbers
 from scenewright.stages.library.importing.source_model import (
@@ -91,12 +91,16 @@ class _Reader:
         self.units: set[float] = set()
         self.allowance = Allowance(str(path))
         self.materials: dict[str, tuple[float, float, float]] = {}
+        self.textured: set[str] = set()
+        """Names of materials with a texture."""
 
     def model(self) -> SourceModel:
         robot = self.folder.read_xml(self.path)
         if robot.tag != "robot":
             raise BadInput(f"{self.path}: root element is <{robot.tag}>, expected <robot>")
         for material in robot.findall("material"):
+            if material.find("texture") is not None:
+                self.textured.add(material.get("name", ""))
             color = material.find("color")
             if color is not None:
                 rgba = numbers(color.get("rgba"), 4, f"{self.path}: rgba")
@@ -144,6 +148,8 @@ class _Reader:
         material = element.find("material")
         if material is None:
             return None
+        if material.find("texture") is not None or material.get("name", "") in self.textured:
+            self.findings.append(one_color("texture of material", material.get("name", "")))
         color = material.find("color")
         if color is None:
             return self.materials.get(material.get("name", ""))

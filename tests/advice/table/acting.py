@@ -101,7 +101,7 @@ def given_torn_memory(folder: Path) -> None:
 
 
 TEACH = "predicates teach --out l --dry-run"
-EVALUATE = "predicates evaluate --out e --tasks 1 --states 10 "
+EVALUATE = "predicates evaluate --out e --each 1 --states 10 "
 ROWS = [
     Tried(AGENT, "--task is empty", "agent run --task ' ' --out a --dry-run", RUN),
     agent("--scene and --truth go together", "--scene {golden}/interactive_scene", SCENE),

@@ -307,7 +307,7 @@ ROWS = [
         "migrate sequence --out sequence",
         "migrate sequence --out new && inspect new --frames 0",
         given=lambda folder: shutil.copytree(GOLDEN / "v1" / "sequence", folder / "sequence"),
-        shows="sequence version 2",
+        shows="sequence version 3",
     ),
     Tried(
         ENGINE + "reading.py",
@@ -316,7 +316,7 @@ ROWS = [
         "migrate sequence --out sequence-v2 && inspect sequence-v2 --frames 0",
         code=3,
         given=lambda folder: shutil.copytree(GOLDEN / "v1" / "sequence", folder / "sequence"),
-        shows="sequence version 2",
+        shows="sequence version 3",
     ),
     Tried(
         ENGINE + "pipelines.py",

@@ -73,12 +73,14 @@ def foreign(*topics: str) -> Callable[[], object]:
 
 
 def wall() -> object:
-    """Look for a floor where only a wall was seen."""
+    """Look for a floor where only a slanted wall was seen."""
     import numpy as np
     from scenewright.stages.kit.geometry.upright_world import make_upright
 
     points = np.stack(np.meshgrid(np.arange(0, 2, 0.02), [1.0], np.arange(0, 2, 0.02)), axis=-1).reshape(-1, 3)
-    normals = np.tile([0.0, -1.0, 0.0], (len(points), 1))
+    normal = np.array([-0.6, -0.6, 0.53]) / np.linalg.norm([0.6, 0.6, 0.53])
+    points[:, 1] = (normal[1] - points[:, [0, 2]] @ normal[[0, 2]]) / normal[1]
+    normals = np.tile(normal, (len(points), 1))
     pose = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 1], [0, 0, 0, 1]])
     return make_upright("floor", "z", None, pose[None], lambda: (points, normals), np.random.default_rng(0))
 

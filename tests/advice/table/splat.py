@@ -18,7 +18,7 @@ from tests.unit.viewing.artifacts import seal
 BUILD_STAGE, QUERY_STAGE = "stages/splat/build_stage.py", "stages/splat/query_stage.py"
 BUILD = "splat build --steps 1 --steps-per-second 0.1 --width 64 --most-gaussians 100 --out out --sequence"
 LABEL = "splat label --panoptic-map {fridge}/map --sequence {walks}/two --out words"
-ASK = "splat query --out out --accept absent"
+ASK = "splat query --out out --accept absent --accept unknown"
 
 
 def flat_pictures(folder: Path) -> None:

@@ -10,7 +10,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Gravity
 from scenewright.stages.ingest.preflight.report import GravityReport
 from scenewright.stages.ingest.preflight.upright import gravity_findings
-from scenewright.stages.kit.geometry.gravity import camera_up
+from scenewright.stages.kit.geometry.gravity import camera_up, on_their_side
 from scenewright.stages.kit.geometry.surface_samples import surface_samples
 from scenewright.stages.kit.geometry.transforms import transform_from
 from scenewright.stages.kit.geometry.upright_world import make_upright
@@ -145,3 +145,46 @@ def test_a_poor_plane_that_turns_a_log_a_little_is_doubted() -> None:
     report = GravityReport(method=gravity.method, detail=gravity.detail)
     finding = gravity_findings(report, True)[0]
     assert finding.severity == "doubtful" and "the log's z, which may be up, by 5.0 deg" in finding.message
+
+
+SIDEWAYS = [Rotation.from_euler("z", degrees, degrees=True).as_matrix() for degrees in (90, -90)]
+
+
+def on_side(poses: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Return the poses (N, 4, 4) of the same cameras, turned about their line of sight: a phone held upright."""
+    return poses @ transform_from(turn, np.zeros(3))
+
+
+def turned_by(degrees: float) -> np.ndarray:
+    return transform_from(Rotation.from_euler("z", degrees, degrees=True).as_matrix(), np.zeros(3))
+
+
+@pytest.mark.parametrize("log_from_world", [turned_by(23), Y_UP @ turned_by(23)], ids=["z is up", "y is up"])
+@pytest.mark.parametrize("turn", SIDEWAYS, ids=["left", "right"])
+@pytest.mark.parametrize("walk", ["pans", "turns", "orbits"])
+def test_cameras_on_their_side_in_a_log_that_is_upright(
+    walk: str, turn: np.ndarray, log_from_world: np.ndarray
+) -> None:
+    poses = on_side(poses_of(walk, 25, 0), turn)
+    assert on_their_side(poses)
+    gravity = upright_of(poses, log_from_world)
+    assert tilt_of(gravity, log_from_world) < 1 and "doubtful" not in gravity.detail
+
+
+def test_cameras_on_their_side_that_hardly_turn() -> None:
+    poses, log_from_world = on_side(poses_of("stands", 25, 0), SIDEWAYS[0]), Y_UP @ turned_by(23)
+    assert on_their_side(poses) is None
+    assert tilt_of(upright_of(poses, log_from_world), log_from_world) < 1
+
+
+@pytest.mark.parametrize("log_from_world", [np.eye(4), Y_UP, TILTED], ids=["along the walls", "y is up", "tilted"])
+def test_a_wall_that_may_be_the_floor_of_cameras_on_their_side_is_doubted(log_from_world: np.ndarray) -> None:
+    gravity = upright_of(on_side(poses_of("pans", 25, 0), SIDEWAYS[0]), log_from_world)
+    assert tilt_of(gravity, log_from_world) < 1 or "doubtful: the cameras may lie on their side" in gravity.detail
+
+
+@pytest.mark.parametrize("walk", ["pans", "turns", "orbits"])
+@pytest.mark.parametrize("pitch", [0, 25, 45, 60])
+def test_cameras_that_are_held_level_are_not_on_their_side(walk: str, pitch: int) -> None:
+    assert not on_their_side(poses_of(walk, pitch, 0))
+    assert "side" not in upright_of(poses_of(walk, pitch, 0), Y_UP).detail

@@ -167,6 +167,17 @@ TOLD = {
         body("", '<tendon><fixed name="t"><joint joint="hinge" coef="1"/></fixed></tendon>'),
         "1 of <tendon> (fixed) left out: what they couple moves freely",
     ),
+    "texture": (
+        body(
+            '<geom type="box" size="0.1 0.1 0.1" material="oak"/>',
+            '<asset><texture name="t" builtin="checker"/><material name="oak" texture="t"/></asset>',
+        ),
+        "texture of material 'oak' is not read: what it covers has one colour",
+    ),
+    "fitted to a mesh": (
+        body('<geom type="box" mesh="m"/>', '<asset><mesh name="m" vertex="0 0 0 0.1 0 0 0 0.1 0 0 0 0.1"/></asset>'),
+        "a box is fitted to mesh 'm' (type, mesh): the mesh itself is taken",
+    ),
     "height field": (body('<geom type="hfield" hfield="h"/>'), "geoms of type 'hfield' are left out"),
 }
 

@@ -56,6 +56,11 @@ CASES = {
         f"{hinge(axis='<xyz>0 0 1</xyz><use_parent_model_frame>1</use_parent_model_frame>')}",
         "1.6",
     ),
+    "axis in the model, since 1.7": (
+        f"{BODY}{door(LYING, LYING_LEAF)}"
+        f"{hinge(axis='<xyz>0 -1 0</xyz><use_parent_model_frame>1</use_parent_model_frame>')}",
+        "1.7",
+    ),
     "axis in another link": f"{BODY}{door(LYING, LYING_LEAF)}{hinge(axis='<xyz expressed_in=~body~>0 0 1</xyz>')}",
     "no version": (f"{BODY}{door(LYING, LYING_LEAF)}{hinge(axis='<xyz>0 -1 0</xyz>')}", ""),
     "link in its joint, as gz sdf -p writes": f"{BODY}{door('<pose relative_to=~hinge~>0 0 0 0 0 0</pose>')}"
@@ -135,6 +140,20 @@ TOLD = {
     "mimic": (
         PLAIN.replace(LIMIT, f'{LIMIT}<mimic joint="other"><multiplier>1</multiplier></mimic>'),
         "joint 'hinge' follows joint 'other' (mimic): here both move freely",
+    ),
+    "script": (
+        PLAIN.replace("</visual>", "<material><script><name>Gazebo/Wood</name></script></material></visual>", 1),
+        "material script 'Gazebo/Wood' is not read: what it covers has one colour",
+    ),
+    "texture": (
+        PLAIN.replace(
+            "</visual>", "<material><pbr><metal><albedo_map>a.png</albedo_map></metal></pbr></material></visual>", 1
+        ),
+        "texture 'a.png' is not read: what it covers has one colour",
+    ),
+    "use_parent_model_frame of 1.7": (
+        PLAIN.replace(LIMIT, f"<use_parent_model_frame>true</use_parent_model_frame>{LIMIT}"),
+        "joint 'hinge': use_parent_model_frame means nothing since SDF 1.7: its axis is in its own frame",
     ),
     "ball": (PLAIN.replace("revolute", "ball"), "joint 'hinge' is of type 'ball': held fast"),
     "not in the folder": (

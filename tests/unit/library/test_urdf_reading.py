@@ -52,6 +52,10 @@ def read(folder: Path, text: str) -> SourceModel:
             ("<axis", '<mimic joint="other"/><axis'),
             "joint 'hinge' follows joint 'other' (mimic): here both move freely",
         ),
+        (
+            ("</visual>", '<material name="oak"><texture filename="oak.png"/></material></visual>'),
+            "texture of material 'oak' is not read: what it covers has one colour",
+        ),
         (("revolute", "planar"), "joint 'hinge' is of type 'planar': held fast"),
     ],
 )

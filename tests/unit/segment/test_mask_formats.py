@@ -61,7 +61,7 @@ def check_things(folder: Path, form: str, names: dict[str, str] | None = None) -
     """Frame 2 has the table and the cup, frame 3 is there and has nothing."""
     name, source = opened(folder)
     assert name == form
-    places, _ = match_pictures(source.pictures, TIMES, 0.02, folder)
+    places = match_pictures(source.pictures, TIMES, 0.02, folder).places
     assert sorted(places) == [2, 3]
     frames = [source.read(places[k], SHAPE, SETTINGS) for k in (2, 3)]
     found = by_class(frames[0], source)
@@ -291,7 +291,7 @@ def test_the_folders_of_segment_anything(tmp_path: Path, names: tuple[str, str])
     amg(tmp_path, names[0], list(STACK), [1.02, 0.9])
     amg(tmp_path, names[1], [], [])
     form, source = opened(tmp_path)
-    places, _ = match_pictures(source.pictures, TIMES, 0.02, tmp_path)
+    places = match_pictures(source.pictures, TIMES, 0.02, tmp_path).places
     assert form == "mask PNGs" and sorted(places) == [2, 3]
     frame = source.read(places[2], SHAPE, SETTINGS)
     assert all(np.array_equal(frame.ids == k, true) for k, true in enumerate(STACK, start=1))
@@ -311,7 +311,7 @@ def test_other_folders_of_single_masks(tmp_path: Path, file: str) -> None:
         other.parent.mkdir(exist_ok=True)
         cv2.imwrite(str(other), mask.astype(np.uint8))
     form, source = opened(tmp_path)
-    places, _ = match_pictures(source.pictures, TIMES, 0.02, tmp_path)
+    places = match_pictures(source.pictures, TIMES, 0.02, tmp_path).places
     assert form == "mask PNGs" and sorted(places) == [2, 3]
     frame = source.read(places[2], SHAPE, SETTINGS)
     assert len(frame.masks) == 2 and np.array_equal(frame.ids > 0, STACK.any(axis=0))
@@ -371,7 +371,7 @@ def test_two_of_one_frame_say_what_was_seen(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"'images/000002.png' and 'masks/000002.png'"):
         match_pictures(source.pictures, TIMES, 0.02, other)
     _, source = opened(other / "masks")  # as the message says
-    assert match_pictures(source.pictures, TIMES, 0.02, other)[0] == {2: 0}
+    assert match_pictures(source.pictures, TIMES, 0.02, other).places == {2: 0}
 
 
 def test_several_masks_of_a_picture_lie_in_a_folder_of_its_name(tmp_path: Path) -> None:
@@ -387,7 +387,7 @@ def test_several_masks_of_a_picture_lie_in_a_folder_of_its_name(tmp_path: Path) 
         (tmp_path / frame).mkdir(exist_ok=True)
         file.rename(tmp_path / frame / f"{number}.png")
     _, source = opened(tmp_path)
-    places, _ = match_pictures(source.pictures, TIMES, 0.02, tmp_path)
+    places = match_pictures(source.pictures, TIMES, 0.02, tmp_path).places
     assert sorted(places) == [2, 3] and len(source.read(places[2], SHAPE, SETTINGS).masks) == 2
 
 

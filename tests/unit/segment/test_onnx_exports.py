@@ -44,6 +44,34 @@ def end_to_end(path: Path, count: int = 300, coefficients: int = 2, **options: A
     return save(path, nodes, outputs, constants, size, options.pop("metadata", NAMES), **options)
 
 
+def with_objectness(path: Path, metadata: dict[str, str], classes: int = 2) -> Path:
+    """Rows of box, objectness, classes, coefficients: a cup and a chair, and one sure of a class but of no thing."""
+    rows = np.zeros((1, 252, 5 + classes + 2), dtype=np.float32)
+    rows[0, 0, [0, 1, 2, 3, 4, 5]], rows[0, 0, -2:] = [16, 24, 32, 48, 0.9, 1], [8, -8]
+    rows[0, 1, [0, 1, 2, 3, 4, 6]], rows[0, 1, -2:] = [48, 24, 32, 24, 0.9, 0.8], [-8, 8]
+    rows[0, 2, [0, 1, 2, 3, 4, 5]], rows[0, 2, -2:] = [32, 24, 64, 48, 0.01, 1], [8, 8]
+    nodes, constants = joined(given("output0", rows), colored("output1", [[2, 0, 0, -1], [0, 0, 2, -1]]))
+    outputs = {"output0": list(rows.shape), "output1": [1, 2, "h", "w"]}
+    return save(path, nodes, outputs, constants, (64, 64), metadata)
+
+
+def test_yolo_with_objectness(tmp_path: Path) -> None:
+    made, frame = found_by(with_objectness(tmp_path / "v5.onnx", NAMES))
+    assert made.label == "onnx v5 (yolo-objectness, scenewright)"
+    check_cup_and_chair(frame)
+    assert sorted(round(mask.score, 3) for mask in frame.masks.values()) == [0.72, 0.9]
+
+
+def test_yolo_with_objectness_without_names_follows_the_advice(tmp_path: Path) -> None:
+    weights = with_objectness(tmp_path / "v5.onnx", {})
+    with pytest.raises(BadInput, match="nothing says what its 2 classes are") as caught:
+        found_by(weights)
+    sidecar = tmp_path / "net.toml"
+    lines = (caught.value.hint or "").split(" with ")[1].replace('"chair", ...', '"cup", "chair"')
+    sidecar.write_text(lines.replace(", labels", "\nlabels").replace(", outputs", "\noutputs"))
+    check_cup_and_chair(found_by(weights, sidecar=sidecar)[1])
+
+
 def test_yolo_end_to_end(tmp_path: Path) -> None:
     made, frame = found_by(end_to_end(tmp_path / "e2e.onnx"))
     assert made.label == "onnx e2e (yolo-end-to-end, scenewright)"
@@ -194,15 +222,19 @@ def test_classes_that_are_only_guessed_are_said(tmp_path: Path, caplog: pytest.L
 
 
 def test_layouts_by_their_shapes() -> None:
-    for shapes, layout in (
-        ({"a": (1, 300, 38), "b": (1, 32, 160, 160)}, "yolo-end-to-end"),
-        ({"a": (1, 20, 38), "b": (1, 32, 160, 160)}, "yolo-end-to-end"),
-        ({"a": (1, 39, 8400), "b": (1, 32, 160, 160)}, "yolo-seg"),
-        ({"a": (1, 100, 134), "b": (1, 100, 96, 96)}, "panoptic"),
-        ({"logits": (1, 100, 251), "pred_boxes": (1, 100, 4), "pred_masks": (1, 100, 200, 267)}, "panoptic"),
-        ({"dets": (1, 200, 4), "labels": (1, 200, 91), "masks": (1, 200, 108, 108)}, "query-instances"),
+    for shapes, layout, classes in (
+        ({"a": (1, 300, 38), "b": (1, 32, 160, 160)}, "yolo-end-to-end", 1),
+        ({"a": (1, 3000, 38), "b": (1, 32, 160, 160)}, "yolo-end-to-end", 80),
+        ({"a": (1, 25200, 38), "b": (1, 32, 160, 160)}, "yolo-objectness", 1),
+        ({"a": (1, 25200, 117), "b": (1, 32, 160, 160)}, "yolo-objectness", 0),
+        ({"a": (1, 84, 117), "b": (1, 32, 160, 160)}, "yolo-objectness", 80),
+        ({"a": (1, 20, 38), "b": (1, 32, 160, 160)}, "yolo-end-to-end", 0),
+        ({"a": (1, 39, 8400), "b": (1, 32, 160, 160)}, "yolo-seg", 0),
+        ({"a": (1, 100, 134), "b": (1, 100, 96, 96)}, "panoptic", 0),
+        ({"logits": (1, 100, 251), "pred_boxes": (1, 100, 4), "pred_masks": (1, 100, 200, 267)}, "panoptic", 0),
+        ({"dets": (1, 200, 4), "labels": (1, 200, 91), "masks": (1, 200, 108, 108)}, "query-instances", 0),
     ):
-        sidecar = find_layout(shapes)
+        sidecar = find_layout(shapes, classes)
         assert sidecar is not None and sidecar.layout == layout
         assert misfit(layout, {role: shapes[name] for role, name in sidecar.outputs.items()}) == ""
     shapes = {"predictions": (1, 39, 8400), "prototypes": (1, 32, 160, 160)}

@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.scene_parts import Camera
-from scenewright.stages.ingest.folders.calibration_files import NAMES as CALIBRATION_NAMES
-from scenewright.stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
+from scenewright.stages.ingest.clocks import in_file_order, order_note, stamps_problem
+from scenewright.stages.ingest.folders.calibration_files import FolderCalibration
+from scenewright.stages.ingest.folders.calibration_search import NAMES as CALIBRATION_NAMES
+from scenewright.stages.ingest.folders.calibration_search import calibration_of, find_calibration, refuse_several
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
@@ -28,7 +30,7 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
+from scenewright.stages.ingest.folders.pose_files import Pose, columns_of, pose_file, read_pose_list
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes
 from scenewright.stages.ingest.foreign import unread_tables
 from scenewright.stages.ingest.images import DepthForm, decode_as_calibrated, depth_millimetres, usable_color
@@ -62,7 +64,7 @@ def matches(root: Path) -> str | None:
     words = has_images(root)
     if words is None:
         return None
-    file = calibration_file(root)
+    file = calibration_of(root)
     return f"folder with {words}" + (f" and {file.name}" if file else "") + ": plain images"
 
 
@@ -91,7 +93,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     calibration = _calibration(root, images, parameters)
     size = _size(images, video, has_depth, (calibration.left.width, calibration.left.height))
     eyes = _eyes(calibration, size, any(images.rights), root, parameters.baseline)
-    form, unit_note = depth_form(parameters, 1000.0, () if images.depth_is_disparity else images.depths)
+    units = calibration.depth_units
+    form, unit_note = depth_form(parameters, 1000.0, () if images.depth_is_disparity else images.depths, units)
     if images.depth_is_disparity:
         unit_note = "depth computed from the disparity: Z = fx * baseline / (disparity + doffs)"
     times, time_note = _times(root, names, video, parameters)
@@ -143,6 +146,7 @@ def _calibration(root: Path, images: FolderImages, parameters: IngestParameters)
         return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option", *unread))
     calibration = find_calibration(root, images.camera_number)
     if calibration is None:
+        refuse_several(root)
         beside = unread_tables(root, CALIBRATION_NAMES)
         why = f"{root}: there is no calibration file" + (f" (not read: {beside})" if beside else "")
         camera_from_options(None, parameters, why)
@@ -321,13 +325,17 @@ def _times(
         if len(rows) != len(names):
             raise BadInput(f"{path}: {len(rows)} times for {len(names)} images", hint="one line an image, in order")
         column = exact_stamps([text for _, text in rows], [where for where, _ in rows])
+        stamps = np.array([stamp for stamp in column.stamps if stamp is not None], np.int64)
+        poses = pose_file(root)
+        are_looked_up = poses is not None and poses.is_file() and columns_of(poses) == 8
+        problem = None if are_looked_up else stamps_problem(stamps.tolist(), names)
+        if problem is not None:
+            return in_file_order(len(names), parameters.frame_rate), order_note(f"{path.name}: {problem}", parameters)
         words = column.note or "seconds"
-        return np.array([stamp for stamp in column.stamps if stamp is not None], np.int64), (
-            f"times from {path.name}, {words.removeprefix('stamps in ')}"
-        )
-    stamps = stamps_of(names)
-    if stamps is not None:
-        return stamps, "times from the file names"
+        return stamps, f"times from {path.name}, {words.removeprefix('stamps in ')}"
+    named = stamps_of(names)
+    if named is not None:
+        return named, "times from the file names"
     rate = video.rate if video is not None and 0 < video.rate < 1e5 else parameters.frame_rate
     where = "of the video" if rate != parameters.frame_rate else "assumed"
     stamps = np.rint(np.arange(len(names)) * 1e9 / rate).astype(np.int64)
@@ -364,7 +372,7 @@ def _poses(
 def _streams(
     images: FolderImages, names: tuple[str, ...], times: np.ndarray, time_note: str, posed: int
 ) -> tuple[StreamInfo, ...]:
-    recorded = not time_note.startswith("times assumed")
+    recorded = time_note.startswith(("times from", "times of"))
     if images.video is not None:
         return (StreamInfo(images.video.name, "color", "video", times if recorded else times[:0], len(names)),)
     streams = []

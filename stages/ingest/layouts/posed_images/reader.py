@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.ingest.folders.calibration_files import calibration_file
+from scenewright.stages.ingest.folders.calibration_search import calibration_of
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
@@ -40,7 +40,7 @@ def matches(root: Path) -> str | None:
     poses = next((name for name in POSES if (root / name).is_file()), None)
     if poses is None or not (root / "depth").is_dir():
         return None
-    if calibration_file(root) is not None or columns_of(root / poses) in (8, 12, 13, 16, 17):
+    if calibration_of(root) is not None or columns_of(root / poses) in (8, 12, 13, 16, 17):
         return None
     return f"folder with {f'{color.name}/, ' if color else ''}depth/ and {poses}: posed images"
 

@@ -9,12 +9,16 @@ by option does that.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.association import mutual_nearest
+from scenewright.stages.ingest.clocks import in_file_order, order_note, stamps_problem
+from scenewright.stages.ingest.folders.calibration_files import read_calibration
+from scenewright.stages.ingest.folders.calibration_search import calibration_of, refuse_several
+from scenewright.stages.ingest.folders.depth_units import settled_units
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
@@ -29,9 +33,14 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes, read_stamped_poses, scaled
-from scenewright.stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
+from scenewright.stages.ingest.folders.undistortion import (
+    RecordedCamera,
+    lens_of,
+    overridden_recording,
+    recorded_camera,
+)
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, Role, SourceCamera
 from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.formats.trajectories import read_text
 
@@ -50,6 +59,8 @@ FREIBURG_NAME = re.compile(r"(?:freiburg|(?<![a-z])fr)([123])(?!\d)")
 ICL_NUIM = (481.2, 480.0, 319.5, 239.5)
 """Intrinsics fx, fy, cx, cy [px] of ICL-NUIM for 640 x 480, as the data set states them."""
 ICL_NUIM_NAME = re.compile(r"icl[-_ ]?nuim|(?:living_?room|office)_?traj\d|(?<![a-z])(?:lr|of)_?kt\d")
+D435_FOCAL, KINECT_FOCAL = 615 / 480, 525 / 480
+"""Focal length of the colour cameras that most such folders are of, in heights of the picture."""
 MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
 """Mirrors y, before and after a pose: ICL-NUIM's camera has its y axis the other way round."""
 
@@ -59,7 +70,7 @@ class _Stamped:
     """The images that a list names."""
 
     stamps: np.ndarray
-    """(N,) int64 [ns], ascending."""
+    """(N,) int64 [ns], in file order."""
     paths: tuple[Path, ...]
     note: str = ""
     """What the stamps were taken for, for people."""
@@ -85,15 +96,18 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unit = 1 / parameters.frame_rate if icl_nuim else 1.0
     colors, depths = _images(root, unit)
     refuse_exr((path.name for path in depths.paths), str(root))
+    listed: list[tuple[str, Role, _Stamped]] = [("rgb", "color", colors), ("depth", "depth", depths)]
     poses = _poses(root, unit)
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
-    recorded, notes = _camera(root, size, parameters, icl_nuim)
+    recorded, stated, notes = _camera(root, size, parameters, icl_nuim)
     recorded, notes_of_options = overridden_recording(recorded, parameters)
-    stored, unit_note = depth_form(parameters, UNITS_PER_METRE, depths.paths)
+    freiburg = FREIBURG_NAME.search(root.resolve().name.lower()) is not None
+    known = poses is not None or stated is not None or icl_nuim or freiburg
+    units, doubt = (UNITS_PER_METRE, "") if known else settled_units(UNITS_PER_METRE, depths.paths, parameters)
+    stored, unit_note = depth_form(parameters, units, depths.paths, stated)
     form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), stored)
-    tolerance = round(parameters.maximum_time_difference * 1e9)
+    colors, depths, partners, no_clock = _paired(root, colors, depths, parameters, poses is not None)
     main_list = colors if colors.paths else depths
-    partners = mutual_nearest(main_list.stamps, depths.stamps, tolerance)
     entries = []
     for stamp, path, partner in zip(main_list.stamps, main_list.paths, partners, strict=True):
         missing = bool(depths.paths) and partner < 0
@@ -105,7 +119,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             pose = MIRROR @ pose @ MIRROR
         problem = "no_depth_within_tolerance" if missing else None
         files = FrameFiles(path if colors.paths else None, depth)
-        own_stamp = None if icl_nuim else int(stamp)
+        own_stamp = None if icl_nuim or no_clock is not None else int(stamp)
         entries.append(
             Entry(
                 str(path.relative_to(root)),
@@ -124,15 +138,15 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         *notes,
         *notes_of_options,
         *((unit_note,) if depths.paths else ()),
-        *dict.fromkeys(f"images: {images.note}" for images in (colors, depths) if images.note),
+        *((doubt,) if doubt else ()),
+        *((order_note(no_clock, parameters),) if no_clock is not None else ()),
+        *dict.fromkeys(f"images: {images.note}" for _, _, images in listed if images.note and no_clock is None),
         *(poses.notes if poses else ()),
         *covered,
         *((f"{unpaired} depth images are paired with no colour image",) if unpaired else ()),
         *(_icl_notes(parameters) if icl_nuim else ()),
     )
-    streams = [stream("rgb", "color", colors.paths, colors.stamps)] if colors.paths else []
-    if depths.paths:
-        streams.append(stream("depth", "depth", depths.paths, depths.stamps))
+    streams = [stream(name, role, images.paths, images.stamps) for name, role, images in listed if images.paths]
     if poses:
         streams.append(text_stream("groundtruth.txt", "pose", len(poses.stamps), poses.stamps))
     camera = SourceCamera("camera", recorded.camera)
@@ -145,7 +159,7 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
     path = next((root / name for name in ASSOCIATIONS if (root / name).is_file()), None)
     if path is None or (root / COLOR_LIST).is_file():
         colors, depths = (
-            _read_list(root, name, unit) if (root / name).is_file() else _sort_by_time([], [])
+            _read_list(root, name, unit) if (root / name).is_file() else _Stamped(np.zeros(0, np.int64), ())
             for name in (COLOR_LIST, DEPTH_LIST)
         )
         return colors, depths
@@ -174,7 +188,9 @@ def _stamped(root: Path, rows: list[tuple[str, str, str]], unit: float) -> _Stam
     """Return the images of rows (place, stamp, name)."""
     column = exact_stamps([stamp for _, stamp, _ in rows], [where for where, _, _ in rows])
     stamps = [scaled(stamp, unit) for stamp in column.stamps if stamp is not None]
-    return _sort_by_time(stamps, [named_file(root, name, where) for where, _, name in rows], column.note)
+    return _Stamped(
+        np.array(stamps, np.int64), tuple(named_file(root, name, where) for where, _, name in rows), column.note
+    )
 
 
 def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
@@ -187,9 +203,36 @@ def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
     ]
 
 
-def _sort_by_time(stamps: list[int], paths: list[Path], note: str = "") -> _Stamped:
-    order = sorted(range(len(stamps)), key=lambda index: stamps[index])
-    return _Stamped(np.array([stamps[i] for i in order], np.int64), tuple(paths[i] for i in order), note)
+def _paired(
+    root: Path, colors: _Stamped, depths: _Stamped, parameters: IngestParameters, has_poses: bool
+) -> tuple[_Stamped, _Stamped, np.ndarray, str | None]:
+    """Return colour and depth in time order, for each image of the main list (N,) the index of its depth or -1, and why
+    their stamps are no clock's.
+
+    Such stamps say nothing: images are then paired by their order in the file. Poses with stamps are looked up by
+    them, right or wrong. Raises BadInput when lists of two lengths are to be paired by order.
+    """
+    problems = (stamps_problem(each.stamps.tolist(), [path.name for path in each.paths]) for each in (colors, depths))
+    problem = None if has_poses else next((found for found in problems if found is not None), None)
+    if problem is None:
+        colors, depths = _by_time(colors), _by_time(depths)
+        tolerance = round(parameters.maximum_time_difference * 1e9)
+        main_list = colors if colors.paths else depths
+        return colors, depths, mutual_nearest(main_list.stamps, depths.stamps, tolerance), None
+    counts = len(colors.paths), len(depths.paths)
+    if all(counts) and counts[0] != counts[1]:
+        raise BadInput(
+            f"{root}: {problem}, and {counts[0]} pictures and {counts[1]} depth images have no common order",
+            hint=f"put {ASSOCIATIONS[1]} in the place of {COLOR_LIST}: a line `number picture number depth` a frame",
+        )
+    stamps = in_file_order(max(counts), parameters.frame_rate)
+    colors, depths = (replace(each, stamps=stamps[: len(each.paths)]) for each in (colors, depths))
+    return colors, depths, np.arange(max(counts)) if counts[1] else np.full(counts[0], -1), problem
+
+
+def _by_time(images: _Stamped) -> _Stamped:
+    order = np.argsort(images.stamps, kind="stable")
+    return replace(images, stamps=images.stamps[order], paths=tuple(images.paths[i] for i in order))
 
 
 def _poses(root: Path, unit: float) -> StampedPoses | None:
@@ -213,15 +256,23 @@ def _icl_notes(parameters: IngestParameters) -> tuple[str, ...]:
 
 def _camera(
     root: Path, size: tuple[int, int] | None, parameters: IngestParameters, icl_nuim: bool
-) -> tuple[RecordedCamera, tuple[str, ...]]:
-    """Return the colour camera: from a file, else the data set's own by the folder's name, else from options."""
-    path = next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
+) -> tuple[RecordedCamera, float | None, tuple[str, ...]]:
+    """Return the colour camera, from a file, else the data set's own by the folder's name, else from options; and the
+    stored depth per metre where the file states it."""
+    given = all_intrinsics_given(parameters)  # what files say of the camera does not count then
+    path = None if given else next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
     if path is not None:
-        return _read_calibration(path, size), (f"intrinsics read from {path.name}",)
+        return _read_calibration(path, size), None, (f"intrinsics read from {path.name}",)
+    path = None if given else calibration_of(root)
+    if path is not None:
+        calibration = read_calibration(path)
+        return recorded_camera(calibration.left, size, str(path)), calibration.depth_units, calibration.notes
     standard = size in (None, (640, 480))
     if icl_nuim and standard:
-        return RecordedCamera(pinhole(ICL_NUIM, size, str(root))), (
-            "intrinsics assumed: ICL-NUIM, 481.2 480 319.5 239.5",
+        return (
+            RecordedCamera(pinhole(ICL_NUIM, size, str(root))),
+            None,
+            ("intrinsics assumed: ICL-NUIM, 481.2 480 319.5 239.5",),
         )
     match = FREIBURG_NAME.search(root.resolve().name.lower())
     if match and standard:
@@ -229,14 +280,27 @@ def _camera(
         listed = " ".join(f"{value:g}" for value in numbers)
         recorded = RecordedCamera(pinhole(numbers, size, str(root)), lens_of(coefficients, str(root)))
         undone = ", lens distortion undone in colour and depth" if coefficients else ""
-        return recorded, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
-    if all_intrinsics_given(parameters):
-        return RecordedCamera(camera_from_options(size, parameters, str(root))), ()
+        return recorded, None, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
+    if given:
+        return RecordedCamera(camera_from_options(size, parameters, str(root))), None, ()
+    refuse_several(root)
     shape = f"images are {size[0]}x{size[1]}" if size else "no image can be decoded"
     raise BadInput(
         f"{root}: intrinsics are not known: there is no {CALIBRATIONS[0]}, and the folder's name and images ({shape}) "
         "are not those of freiburg1, 2 or 3",
-        hint="give --fx --fy --cx --cy",
+        hint=f"give --fx --fy --cx --cy{_usual_intrinsics(size)}",
+    )
+
+
+def _usual_intrinsics(size: tuple[int, int] | None) -> str:
+    """Return what to try where the camera can't be asked."""
+    if size is None:
+        return ""
+    width, height = size
+    return (
+        " as the camera's driver states them; where nobody knows them, those of a RealSense D435 are about "
+        f"--fx {D435_FOCAL * height:.4g} --fy {D435_FOCAL * height:.4g} --cx {width / 2:g} --cy {height / 2:g}, "
+        f"of a Kinect --fx {KINECT_FOCAL * height:.4g} --fy {KINECT_FOCAL * height:.4g}"
     )
 
 

@@ -124,7 +124,8 @@ class MasksBackend:
             if mask.category not in self._source.categories and mask.category not in self._labels:
                 raise BadInput(
                     f"{self._root}: nothing says what category {mask.category} is",
-                    hint="list it among the categories, in classes.json, or with its id in --labels FILE.toml",
+                    hint="list it among the categories or in classes.json, or all of them with their ids in "
+                    "--labels FILE.toml",
                 )
             if mask.category in self._labels:
                 segments.append((number, NamedSegment(self._labels[mask.category], mask.score)))

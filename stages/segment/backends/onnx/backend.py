@@ -12,7 +12,7 @@ from scenewright.stages.kit.formats.frames import Frame
 from scenewright.stages.kit.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
 from scenewright.stages.segment.backends.onnx import decoding
 from scenewright.stages.segment.backends.onnx.network import HINT, Network
-from scenewright.stages.segment.backends.onnx.sidecar import read_sidecar
+from scenewright.stages.segment.backends.onnx.sidecar import OBJECTNESS, read_sidecar
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
 from scenewright.stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
@@ -22,6 +22,8 @@ COCO_IDS = 91
 """Classes of a network that gives out COCO's own ids, which have gaps."""
 SETS_BY_SIZE = {80: "coco-80", COCO_IDS: "coco-80", 133: "coco-panoptic", 150: "ade20k"}
 """Number of classes -> label set of published networks, in its order."""
+RAW_YOLO = {"yolo-seg": decoding.yolo_seg, "yolo-objectness": decoding.yolo_objectness}
+"""Layout -> what reads it: boxes that are not suppressed yet."""
 
 logger = logging.getLogger("scenewright")
 
@@ -80,8 +82,8 @@ class OnnxBackend:
                 if number in self._labels.labels
             }
             return name_segments(ids, named_segments, self._vocabulary, minimum_pixels=least)
-        if self._network.sidecar.layout == "yolo-seg":
-            things = decoding.yolo_seg(
+        if self._network.sidecar.layout in RAW_YOLO:
+            things = RAW_YOLO[self._network.sidecar.layout](
                 outputs["predictions"],
                 outputs["prototypes"],
                 fitted,
@@ -156,6 +158,8 @@ def class_count(network: Network) -> int | None:
         return network.shapes["classes"][2]
     if network.sidecar.layout == "yolo-seg":
         return network.shapes["predictions"][1] - 4 - network.shapes["prototypes"][1]
+    if network.sidecar.layout == "yolo-objectness":
+        return network.shapes["predictions"][2] - OBJECTNESS - network.shapes["prototypes"][1]
     return None
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from scenewright.stages.segment.backends.onnx.network import Fitted
-from scenewright.stages.segment.backends.onnx.sidecar import END_TO_END
+from scenewright.stages.segment.backends.onnx.sidecar import END_TO_END, OBJECTNESS
 from scenewright.stages.segment.suppression import suppress
 
 MOST_CANDIDATES = 300
@@ -56,6 +56,34 @@ def yolo_seg(
     chosen = order[unsuppressed]
     masks = _masks_of_coefficients(rows[chosen, -count:], prototypes, boxes[unsuppressed], fitted, shape)
     return [Found(mask, int(numbers[k]), _unit(best[k])) for mask, k in zip(masks, chosen, strict=True)]
+
+
+def yolo_objectness(
+    predictions: np.ndarray,
+    prototypes: np.ndarray,
+    fitted: Fitted,
+    shape: tuple[int, int],
+    *,
+    score_threshold: float,
+    suppression_overlap: float,
+) -> list[Found]:
+    """Return the instances of a YOLO segmentation network with objectness, as `yolo_seg` does.
+
+    `predictions` (1, N, 5 + C + M): centre x, y, width, height [input pixels], objectness 0..1, a score 0..1 per
+    class, M mask coefficients. A score is objectness times that of the class, as in YOLOv5.
+    """
+    boxes, sure, scores, coefficients = np.split(
+        predictions[0].astype(np.float32), [4, OBJECTNESS, predictions.shape[2] - prototypes.shape[1]], axis=1
+    )
+    rows = np.concatenate([boxes, sure * scores, coefficients], axis=1)
+    return yolo_seg(
+        rows.T[None],
+        prototypes,
+        fitted,
+        shape,
+        score_threshold=score_threshold,
+        suppression_overlap=suppression_overlap,
+    )
 
 
 def yolo_end_to_end(

@@ -90,7 +90,7 @@ class Network:
             name: array.shape
             for name, array in self._raw(fit(np.zeros((*DEFAULT_SIZE[::-1], 3), np.uint8), trial, self.size)).items()
         }
-        layout = sidecar or find_layout(shapes)
+        layout = sidecar or find_layout(shapes, len(self.names()))
         if layout is None:
             raise self._unknown(shapes)
         missing = [name for name in layout.outputs.values() if name not in shapes]

@@ -11,13 +11,19 @@ from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, first_problem
 from scenewright.schemas.outside import file_toml
 
-Layout = Literal["yolo-seg", "yolo-end-to-end", "instances", "query-instances", "panoptic"]
+Layout = Literal["yolo-seg", "yolo-objectness", "yolo-end-to-end", "instances", "query-instances", "panoptic"]
 LARGEST_FILE = 2**20
 """Most bytes of a sidecar."""
 END_TO_END = 6
 """Columns of an end-to-end prediction before its coefficients: corners of the box, score, class."""
+OBJECTNESS = 5
+"""Columns of a prediction with objectness before its classes: the box, and how sure it is that there is a thing."""
+MOST_END_TO_END = 1000
+"""Most rows that an end-to-end export is taken to give (its usual `max_det` is 300). With one class and objectness
+rows are as long, and there are thousands of them."""
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "yolo-seg": ("predictions", "prototypes"),
+    "yolo-objectness": ("predictions", "prototypes"),
     "yolo-end-to-end": ("predictions", "prototypes"),
     "instances": ("boxes", "labels", "scores", "masks"),
     "query-instances": ("classes", "masks"),
@@ -26,6 +32,7 @@ OUTPUTS: Mapping[str, tuple[str, ...]] = {
 """Layout -> roles of its outputs. `instances` needs no `scores` where boxes have them as a fifth column."""
 SHAPES: Mapping[str, str] = {
     "yolo-seg": "predictions (1, 4+C+M, N), prototypes (1, M, h, w)",
+    "yolo-objectness": "predictions (1, N, 5+C+M), prototypes (1, M, h, w)",
     "yolo-end-to-end": "predictions (1, N, 6+M), prototypes (1, M, h, w)",
     "instances": "boxes (N, 4 or 5), labels (N,), scores (N,), masks (N, [1,] h, w)",
     "query-instances": "classes (1, Q, C), masks (1, Q, h, w)",
@@ -74,6 +81,7 @@ IMAGENET_MEAN, IMAGENET_DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 
 INPUTS: Mapping[str, Mapping[str, Any]] = {
     "yolo-seg": {"resize": "letterbox"},
+    "yolo-objectness": {"resize": "letterbox"},
     "yolo-end-to-end": {"resize": "letterbox"},
     "query-instances": {"mean": IMAGENET_MEAN, "deviation": IMAGENET_DEVIATION},
     "panoptic": {"mean": IMAGENET_MEAN, "deviation": IMAGENET_DEVIATION},
@@ -102,12 +110,13 @@ def read_sidecar(path: Path) -> Sidecar:
     return sidecar
 
 
-def find_layout(shapes: Mapping[str, tuple[int, ...]]) -> Sidecar | None:
+def find_layout(shapes: Mapping[str, tuple[int, ...]], classes: int = 0) -> Sidecar | None:
     """Return how to use a network by the names and shapes of what it gave for one image; None when it is not known.
 
-    Known: YOLO segmentation, raw (boxes, class scores and mask coefficients beside prototypes) and end to end (boxes
-    with score, class and coefficients), Mask R-CNN of torchvision, Detectron2 and MMDeploy and RF-DETR by their names,
-    and queries with class logits and mask logits (Mask2Former, DETR and their kind).
+    `classes` is how many the file's metadata names, 0 for none. Known: YOLO segmentation, raw (boxes, class scores and
+    mask coefficients beside prototypes), with objectness (the same row by row, as YOLOv5 and YOLOv7 write it) and end
+    to end (boxes with score, class and coefficients), Mask R-CNN of torchvision, Detectron2 and MMDeploy and RF-DETR by
+    their names, and queries with class logits and mask logits (Mask2Former, DETR and their kind).
     """
     roles = {KNOWN_NAMES[name]: name for name in shapes if name in KNOWN_NAMES}
     if set(roles) == set(OUTPUTS["instances"]):
@@ -136,8 +145,11 @@ def find_layout(shapes: Mapping[str, tuple[int, ...]]) -> Sidecar | None:
     first, second = shapes[flat[0]], shapes[deep[0]]
     if first[1] == second[1]:
         return _known("panoptic", classes=flat[0], masks=deep[0])
-    if first[2] == second[1] + END_TO_END:
+    if first[2] == second[1] + END_TO_END and (first[1] <= MOST_END_TO_END or classes > 1):
         return _known("yolo-end-to-end", predictions=flat[0], prototypes=deep[0])
+    scores = first[2] - second[1] - OBJECTNESS
+    if scores > 0 and (scores == classes or (not classes and first[1] > first[2])):
+        return _known("yolo-objectness", predictions=flat[0], prototypes=deep[0])
     if first[1] > 4 + second[1] and first[2] > first[1]:
         return _known("yolo-seg", predictions=flat[0], prototypes=deep[0])
     return None
@@ -149,7 +161,11 @@ def _known(layout: Layout, **outputs: str) -> Sidecar:
 
 def misfit(layout: str, shapes: Mapping[str, tuple[int, ...]]) -> str:
     """Return what is wrong with the shapes of a layout's outputs, by role; empty: nothing that can be seen."""
-    if layout in ("yolo-seg", "yolo-end-to-end"):
+    if layout == "yolo-objectness":
+        first, second = shapes["predictions"], shapes["prototypes"]
+        if len(first) == 3 and len(second) == 4 and first[2] > second[1] + OBJECTNESS:
+            return ""
+    elif layout in ("yolo-seg", "yolo-end-to-end"):
         first, second = shapes["predictions"], shapes["prototypes"]
         if len(first) == 3 and len(second) == 4:
             end_to_end = first[2] == second[1] + END_TO_END

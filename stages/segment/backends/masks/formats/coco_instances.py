@@ -70,7 +70,7 @@ def open_source(listing: Listing) -> MaskSource | None:
         return flatten_encoded(encodings, masks, settings, shape, where, pictures[place].size)
 
     scored = any("score" in row for row in every_row)
-    return MaskSource(tuple(pictures), categories or read_classes(listing)[0], read, () if scored else ("scores",))
+    return MaskSource(tuple(pictures), read_classes(listing)[0] | categories, read, () if scored else ("scores",))
 
 
 def _by_image(rows: list[Any], pictures: dict[int, Picture], where: str) -> dict[int, list[Any]]:
