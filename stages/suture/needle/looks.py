@@ -1,7 +1,8 @@
 """What only a needle has in the pictures, along the outline that fits the masks best.
 
 Masks of a depth edge, of a fold or of a shadowed rim can have a needle's form. A wire differs from what lies on both of
-its sides in one way, at the width that a needle has where it would lie; an edge has one side that looks as it does.
+its sides all along, at the width that a needle has where it would lie; an edge, sharp or soft, has colours that lie
+between those of its sides.
 Steel is grey and mirrors what is about it, so that it gleams here and there. A wire ends; an edge or a thread goes on
 along the outline's tangents.
 """
@@ -15,7 +16,7 @@ import numpy as np
 from scenewright.stages.suture.needle.silhouette import WIRE_RADIUS, Arc, Outline, Sheet, arc_at, trace
 from scenewright.stages.suture.rig import NEEDLE_RADIUS, StereoRig
 
-NAMES = ("rims", "width", "colour", "gleam", "going_on")
+NAMES = ("ridge", "width", "colour", "gleam", "going_on")
 """What `looks_of` returns, in its order."""
 BESIDE = (1.5, 3.0)
 """How far beyond the wire's rim [px] its surroundings are looked at."""
@@ -33,6 +34,8 @@ BEYOND = np.array([0.10, 0.16, 0.22, 0.28])
 """How far beyond an end it is looked for whether the wire goes on, as a share of the needle's radius."""
 NOISE = 4.0
 """Differences of colour of so many grey levels are half noise; by eye."""
+FEWEST_RIDGE = 0.1
+"""Share of the pieces that may be less of a ridge than is told: glints and crossings hide it; by eye."""
 DARK = 24.0
 """Grey levels that are added before colours are compared: in the dark they are noise; by eye."""
 NOTHING = np.array([0.0, 1.0, 1.0, 0.0, 1.0])
@@ -44,26 +47,24 @@ def looks_of(
 ) -> np.ndarray:
     """Return NAMES (5,) of an outline in two pictures (H, W, 3) uint8 RGB.
 
-    `rims`: how alike the wire differs from both of its sides, -1 (an edge between them) to 1 (a wire before one
-    ground); `width`: by what factor it looks wider or thinner than a needle (the logarithm); `colour`: how far from
-    grey it is, 0 to 1; `gleam`: how much its brightness changes along it, 0 to 1; `going_on`: how much of its contrast
-    goes on beyond the end that ends less clearly, 0 to 1 (an end that thread or something else hides is none). Pieces
-    count that the mask shows and whose sides are clear of the needle's other half.
+    `ridge`: how far the wire's colour lies from every blend of its two sides' colours, against how far these lie from
+    each other, 0 (an edge between them) to 1 (a wire before one ground), of the pieces where it is least so; `width`:
+    by what factor it looks wider or thinner than a needle (the logarithm); `colour`: how far from grey it is, 0 to 1;
+    `gleam`: how much its brightness changes along it, 0 to 1; `going_on`: how much of its contrast goes on beyond the
+    end that ends less clearly, 0 to 1 (an end that thread or something else hides is none). Pieces count that
+    the mask shows and whose sides are clear of the needle's other half.
     """
     arc = arc_at(rig, outline.pose.camera_from_needle, outline.shift)
     seen = [_eye_looks(arc, *of_eye, eye) for eye, of_eye in enumerate(zip(sheets, pictures, strict=True))]
     both = np.concatenate([of_eye.colours for of_eye in seen])
     if len(both) == 0:
         return NOTHING
-    first, second = both[:, 0] - both[:, 1], both[:, 0] - both[:, 2]
-    sizes = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
-    rims = (first * second).sum() / (sizes.sum() + len(both) * NOISE**2)
-    strength = np.linalg.norm(0.5 * (first + second), axis=1)
+    strength = np.linalg.norm(both[:, 0] - both[:, 1:].mean(axis=1), axis=1)
     ends = [of_eye.beyond for of_eye in seen if of_eye.beyond is not None]
     going_on = float(np.mean(ends)) / (float(np.median(strength)) + NOISE) if ends else 0.0
     return np.array(
         [
-            rims,
+            np.quantile(_ridges(both), FEWEST_RIDGE),
             abs(float(np.median(np.concatenate([of_eye.widths for of_eye in seen]))) - USUAL_WIDTH),
             _colourfulness(both[:, 0]).mean(),
             np.mean([of_eye.gleam() for of_eye in seen if len(of_eye.colours)]),
@@ -86,6 +87,14 @@ class _EyeLooks:
         """Return how much the wire's brightness changes along it, 0 to 1."""
         low, high = np.quantile(self.colours[:, 0].mean(axis=1), (0.1, 0.9))
         return float(high - low) / 255.0
+
+
+def _ridges(colours: np.ndarray) -> np.ndarray:
+    """Return of each piece's colours (P, 3, 3), the wire's and its sides', how much of a ridge (P,) it is, 0 to 1."""
+    wire, step = colours[:, 0] - colours[:, 1], colours[:, 2] - colours[:, 1]
+    share = np.clip((wire * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-9), 0.0, 1.0)
+    away = np.linalg.norm(wire - share[:, None] * step, axis=1)
+    return np.asarray(away / (away + np.linalg.norm(step, axis=1) + NOISE))
 
 
 def _colourfulness(colours: np.ndarray) -> np.ndarray:

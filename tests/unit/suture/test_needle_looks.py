@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from scenewright.stages.suture.needle.estimate import estimate
 from scenewright.stages.suture.needle.exchanged import eyes_exchanged
+from scenewright.stages.suture.needle.looks import NAMES, looks_of
 from scenewright.stages.suture.needle.observation import NeedleObservation
 from scenewright.stages.suture.needle.radius_fit import estimate_without_radius
+from scenewright.stages.suture.needle.silhouette import Outline, sheet_of
+from scenewright.stages.suture.needle.windows import windows
 from scenewright.stages.suture.rig import TWO_CAMERAS
 
 from tests.unit.suture.needle_cases import observed, pose_at
@@ -33,8 +36,8 @@ def wire() -> tuple[np.ndarray, np.ndarray]:
     return finished(pictures)
 
 
-def edge() -> tuple[np.ndarray, np.ndarray]:
-    """Cloth on the inner side of the needle's line, tissue on its outer side, a shadow between them."""
+def edge(dark: float = 0.7, blur: float = 0.7) -> tuple[np.ndarray, np.ndarray]:
+    """Cloth on the inner side of the needle's line, tissue on its outer side, a shadow as `dark` between them."""
     pictures, rig = ground(), TWO_CAMERAS
     around = pose_at().points(np.linspace(-0.5, np.pi + 0.5, 90))
     for picture, line in zip(pictures, (rig.left(around), rig.right(around)), strict=True):
@@ -42,14 +45,31 @@ def edge() -> tuple[np.ndarray, np.ndarray]:
         cv2.fillPoly(inside, [np.round(line).astype(np.int32)], 1)
         picture[inside > 0] = CLOTH
         shadow = np.zeros(picture.shape[:2], np.float32)
-        cv2.polylines(shadow, [np.round(line).astype(np.int32)], False, 0.7, 3)
+        cv2.polylines(shadow, [np.round(line).astype(np.int32)], False, dark, 3)
         picture *= 1.0 - cv2.GaussianBlur(shadow, (0, 0), 1.0)[..., None]
-    return finished(pictures)
+    return finished(pictures, blur)
 
 
-def finished(pictures: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    left, right = (np.clip(cv2.GaussianBlur(p, (0, 0), 0.7), 0, 255).astype(np.uint8) for p in pictures)
+def finished(pictures: list[np.ndarray], blur: float = 0.7) -> tuple[np.ndarray, np.ndarray]:
+    left, right = (np.clip(cv2.GaussianBlur(p, (0, 0), blur), 0, 255).astype(np.uint8) for p in pictures)
     return left, right
+
+
+def looks(pictures: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
+    eyes = windows(SEEN)
+    outline = Outline(pose_at(), np.zeros(2), 0.0, np.eye(8))
+    values = looks_of(TWO_CAMERAS, (sheet_of(eyes[0]), sheet_of(eyes[1])), pictures, outline)
+    return dict(zip(NAMES, values.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("blur", [0.7, 2.0])
+def test_no_edge_is_a_ridge_however_soft(blur: float) -> None:
+    assert looks(edge(dark=0.0, blur=blur))["ridge"] < 0.1
+
+
+def test_a_wire_is_a_ridge_and_grey() -> None:
+    of_wire = looks(wire())
+    assert of_wire["ridge"] > 0.6 and of_wire["colour"] < 0.25
 
 
 def test_a_wire_is_a_needle() -> None:
