@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -60,6 +61,7 @@ class RealPair:
         return RealPair(left, right, StereoRig(*size, rig.focal * by, centre, rig.baseline))
 
 
+@cache
 def needleless_pairs(data: Path, work: Path) -> dict[str, Callable[[], RealPair]]:
     """Return name -> what reads a pair of the folder of data, as far as they are there; the endoscope's recording is
     read into `work`."""
