@@ -284,6 +284,10 @@ stitch-needle: setup ## The needle's pose: the thesis's estimator and ours on re
 stitch-absent: setup ## Is there a needle at all: rendered views with and without one, recorded tissue (QUICK=1; REAL_DATA=folder)
 	$(EXPERIMENT) stitch_absent --data $(REAL_DATA) --out $(OUTPUTS)/experiments/stitch-absent$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: stitch-unknown
+stitch-unknown: setup ## A needle of which less is known: no radius, a wrong one, its tip hidden (QUICK=1: four views)
+	$(EXPERIMENT) stitch_unknown --out $(OUTPUTS)/experiments/stitch-unknown$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: stitch-trials
 # A hundred reporting seeds an arm, about three CPU minutes; a stopped run goes on where it was.
 stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the thesis's arms and ours (QUICK=1: ten trials)

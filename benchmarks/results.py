@@ -176,10 +176,15 @@ def seeds_told(results: Results) -> str:
         kind = next(
             (kind for kind in ("tuning", "reporting") if set(names) <= set(getattr(results.experiment, kind))), ""
         )
-        told.append(
-            f"{len(names)}{f' for {kind}' if kind else ''} ({', '.join(names[:20])}{', ...' * (len(names) > 20)})"
-        )
+        told.append(f"{len(names)}{f' for {kind}' if kind else ''}{_told(names)}")
     return f"Seeds: {'; '.join(told)}."
+
+
+def _told(names: Sequence[str]) -> str:
+    """Return, in brackets, the first names of numbered or of few seeds: many names of other things say nothing."""
+    if all(name.isdecimal() for name in names) or len(names) <= 20:
+        return f" ({', '.join(names[:20])}{', ...' * (len(names) > 20)})"
+    return ""
 
 
 def _write(path: Path, values: Mapping[str, Any]) -> None:

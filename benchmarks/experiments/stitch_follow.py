@@ -39,7 +39,7 @@ from benchmarks.experiment import Bench, Experiment, Measure, Trial
 FRAMES = 8
 OWN, WHOLE = "own_masks", "whole"
 CALIBRATION_ERROR = 0.15
-TUNING, REPORTING = range(20, 40), range(3110, 3120)
+TUNING, REPORTING = range(20, 40), range(3120, 3130)
 
 
 @dataclass(frozen=True)

@@ -216,7 +216,7 @@ class Follower:
             record["whole"] = answer is None
             if answer is None:
                 eye_masks = masks or self._make(pair)
-                answer = estimate(eye_masks.observation(self._rig, None), self._seed, self._guess)
+                answer = estimate(eye_masks.observation(self._rig, None, pair.pictures), self._seed, self._guess)
         except BadInput as error:
             self._guess = None
             record |= UNKNOWN | {"abstained": str(error)}
@@ -238,7 +238,7 @@ class Follower:
             if any(side.stop - side.start < 2 * RIM for window in windows for side in window):
                 return None
             masks = masks_within(self._make, pair, windows)
-        answer = estimate(masks.observation(self._rig, None), self._seed, self._guess, near=True)
+        answer = estimate(masks.observation(self._rig, None, pair.pictures), self._seed, self._guess, near=True)
         if answer.abstained or answer.pose is None:
             return None
         if np.linalg.norm(answer.pose.centre - self._guess.centre) > AROUND:

@@ -51,9 +51,11 @@ class EyeMasks:
     thread: tuple[np.ndarray, np.ndarray]
     hidden: tuple[np.ndarray, np.ndarray] | tuple[None, None]
 
-    def observation(self, rig: StereoRig, disparity: np.ndarray | None) -> NeedleObservation:
-        """Return what an estimator of the needle is given."""
-        return NeedleObservation(rig, *self.needle, disparity, *self.thread, *self.hidden)
+    def observation(
+        self, rig: StereoRig, disparity: np.ndarray | None, pictures: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> NeedleObservation:
+        """Return what an estimator of the needle is given; `pictures` (H, W, 3) are those that the masks are of."""
+        return NeedleObservation(rig, *self.needle, disparity, *self.thread, *self.hidden, pictures)
 
 
 MaskMaker = Callable[[Pair], EyeMasks]

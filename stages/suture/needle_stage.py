@@ -22,7 +22,7 @@ from scenewright.stages.suture.needle.drawing import draw_eyes, estimate_text
 from scenewright.stages.suture.needle.estimators import ESTIMATORS
 from scenewright.stages.suture.needle.observation import NeedleEstimate
 from scenewright.stages.suture.needle.radius import as_if_usual, in_metres
-from scenewright.stages.suture.needle.radius_fit import Radius, fitted_radius, together, with_radius_unknown
+from scenewright.stages.suture.needle.radius_fit import Radius, estimate_without_radius, together, with_radius_unknown
 from scenewright.stages.suture.needle.records import as_estimate_record
 from scenewright.stages.suture.pairs import Pair, StereoPairs
 from scenewright.stages.suture.parameters import NeedleParameters
@@ -62,7 +62,7 @@ def run(
     statement = _statement(answers, fused)
     if parameters.fit_radius:
         statement += (
-            "; no radius could be fitted, the one that was told is used"
+            "; no radius could be fitted, as no frame shows a needle for sure: the one that was told is used"
             if fitted is None
             else f"; its radius is {1000 * fitted.metres:.2f} mm, known to {1000 * fitted.deviation:.2f} mm"
         )
@@ -97,11 +97,11 @@ class Looked:
 
 
 def _fit_radius(pairs: StereoPairs, make: MaskMaker, context: Context) -> Radius | None:
-    """Return the radius that the first frames say together; None where none of them says any."""
+    """Return the radius that the first frames say together; None where none of them shows a needle for sure."""
     first = islice(pairs, RADIUS_FRAMES)
     tracked = context.progress.track(first, total=min(RADIUS_FRAMES, len(pairs)), description="radius")
-    fitted = (fitted_radius(make(pair).observation(pairs.rig, None), context.seed) for pair in tracked)
-    radii = [radius for radius in fitted if radius is not None]
+    seen = (make(pair).observation(pairs.rig, None, pair.pictures) for pair in tracked)
+    radii = [radius for _, radius in (estimate_without_radius(one, context.seed) for one in seen) if radius is not None]
     return together(radii) if radii else None
 
 
@@ -172,7 +172,7 @@ def _estimates(
         disparity = None if maps is None else maps.of(pair)
         matched += disparity is not None
         eye_masks = make(pair)
-        observation = eye_masks.observation(rig, disparity)
+        observation = eye_masks.observation(rig, disparity, pair.pictures)
         answer = of_view(observation, context.seed, guess if looked.follows else None)
         guess = answer.pose if not answer.abstained else None
         estimate_in_metres = in_metres(answer, radius)

@@ -31,6 +31,11 @@ class Pair:
     left: np.ndarray
     right: np.ndarray
 
+    @property
+    def pictures(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Both pictures; None where their sizes alone were looked at."""
+        return (self.left, self.right) if self.left.shape[2] and self.right.shape[2] else None
+
 
 class StereoPairs:
     """Reads the pairs of the first camera of a sequence that has two eyes. Used as a context manager.

@@ -161,7 +161,9 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Mask
         found.append(masks)
         eyes.append(replace(eye, image=picture))
     spoiled = observe(replace(view, left=eyes[0], right=eyes[1]), CASES["rendered"].disparity_noise, seed)
-    given = {"spoiled": spoiled, "learned": learned_masks(*found).observation(TWO_CAMERAS, spoiled.disparity)}
+    pictures = read_eye(stem, EYES[0])[0], read_eye(stem, EYES[1])[0]
+    learned = learned_masks(*found).observation(TWO_CAMERAS, spoiled.disparity, pictures)
+    given = {"spoiled": spoiled, "learned": learned}
     for trial in trials:
         if trial.arm == NETWORK:
             yield trial, tuple(records)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scenewright.stages.suture.needle.estimator import Estimator
 from scenewright.stages.suture.needle.evidence import Evidence, evidence_of, left_over
+from scenewright.stages.suture.needle.exchanged import eyes_exchanged
 from scenewright.stages.suture.needle.filter import difference, either_way, fuse
 from scenewright.stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from scenewright.stages.suture.needle.presence import presence_features, presence_probability
@@ -90,7 +91,7 @@ def estimate(
     if min(counts) < FEWEST_PIXELS:
         side = "left" if counts[0] <= counts[1] else "right"
         return NeedleEstimate.none(f"The {side} eye sees {min(counts)} pixels of needle; {FEWEST_PIXELS} are needed.")
-    swapped = _eyes_swapped(observation.rig, masks)
+    swapped = eyes_exchanged(observation.rig, masks)
     if swapped:
         return NeedleEstimate.none(swapped)
     eyes = windows(observation)
@@ -98,7 +99,7 @@ def estimate(
     rivals = _hypotheses(observation, eyes, sheets, seed, guess, near)
     if not rivals:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    features = presence_features(observation.rig, sheets, rivals[0].outline)
+    features = presence_features(observation.rig, sheets, rivals[0].outline, observation.pictures)
     answer = _answer(rivals, presence_probability(features), np.random.default_rng(seed))
     answer = replace(answer, presence_features=tuple(features.tolist()))
     if not answer.abstained:
@@ -127,10 +128,15 @@ def _second_needle(
     if min(int(mask.sum()) for mask in rest) < SECOND_PIXELS:
         return ""
     alone = replace(observation, left_mask=rest[0], right_mask=rest[1], disparity=None)
-    second = next(iter(hypotheses(alone, seed)), None)
+    eyes = windows(alone)
+    sheets = (sheet_of(eyes[0]), sheet_of(eyes[1]))
+    second = next(iter(_hypotheses(alone, eyes, sheets, seed, None)), None)
     if second is None or second.evidence.seen.mean(axis=1).min() < SECOND_SEEN:
         return ""
     if second.evidence.left_over > 0.5 * sum(int(mask.sum()) for mask in rest):
+        return ""
+    features = presence_features(alone.rig, sheets, second.outline, alone.pictures)
+    if alone.pictures is not None and presence_probability(features) < LEAST_PRESENCE:
         return ""
     apart = 1000.0 * float(np.linalg.norm(second.pose.centre - first.pose.centre))
     return f"Two needles are seen, {apart:.0f} mm apart: which one is meant cannot be known."
@@ -216,19 +222,6 @@ def _mirror_in_depth(pose: NeedlePose) -> NeedlePose:
     matrix = np.eye(4)
     matrix[:3] = np.stack([x, y, np.cross(x, y), pose.centre], axis=1)
     return NeedlePose(matrix)
-
-
-def _eyes_swapped(rig: StereoRig, masks: tuple[np.ndarray, np.ndarray]) -> str:
-    """Return a sentence if the needle lies farther right in the right eye, which no point in front of both can."""
-    left, right = (np.flatnonzero(mask.any(axis=0)) for mask in masks)
-    ends = left[0] - right[0], left[-1] - right[-1]
-    if max(ends) < 0.5 * rig.focal * rig.baseline / FARTHEST:
-        return (
-            f"The needle lies {ends[0]:.0f} to {ends[1]:.0f} px farther left in the right eye than in the left; "
-            f"nearer than {FARTHEST} m it would be {rig.focal * rig.baseline / FARTHEST:.0f} px or more. "
-            "Are left and right exchanged?"
-        )
-    return ""
 
 
 def _disparity_points(observation: NeedleObservation, random: np.random.Generator) -> np.ndarray:

@@ -21,7 +21,8 @@ class NeedleObservation:
     """Masks (H, W) bool of both eyes, and whatever else is known.
 
     `disparity` (H, W) float32 [px], left eye, NaN unknown; `left_thread`, `right_thread` where thread is seen;
-    `left_hidden`, `right_hidden` where something (a driver) may hide the needle. All but the masks may be None.
+    `left_hidden`, `right_hidden` where something (a driver) may hide the needle; `pictures` (H, W, 3) uint8 RGB of both
+    eyes, by which a needle is told from an edge. All but the masks may be None.
     """
 
     rig: StereoRig
@@ -32,6 +33,7 @@ class NeedleObservation:
     right_thread: np.ndarray | None = None
     left_hidden: np.ndarray | None = None
     right_hidden: np.ndarray | None = None
+    pictures: tuple[np.ndarray, np.ndarray] | None = None
 
     def check(self) -> None:
         """Raise BadInput where the rig or the images' sizes cannot be."""
@@ -50,6 +52,8 @@ class NeedleObservation:
             "left mask of what hides": self.left_hidden,
             "right mask of what hides": self.right_hidden,
         }
+        if self.pictures is not None:
+            arrays |= {"left picture": self.pictures[0][..., 0], "right picture": self.pictures[1][..., 0]}
         for name, array in arrays.items():
             if array is not None and array.shape != size:
                 raise BadInput(

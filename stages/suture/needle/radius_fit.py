@@ -63,12 +63,13 @@ class Radius:
 
 def estimate_without_radius(observation: NeedleObservation, seed: int = 0) -> tuple[NeedleEstimate, Radius | None]:
     """Return the pose [m] of a needle of unknown radius, what the radius is in its covariance, and the radius; None
-    with an abstention for want of any outline. Raises BadInput as `estimate`."""
+    with an abstention: what is no needle for sure has no radius. Raises BadInput as `estimate`."""
     observation.check()
     radius = fitted_radius(observation, seed)
     if radius is None:
         return estimate(observation, seed), None
-    return estimate_with(observation, radius, seed), radius
+    answer = estimate_with(observation, radius, seed)
+    return answer, None if answer.abstained else radius
 
 
 def estimate_with(observation: NeedleObservation, radius: Radius, seed: int = 0) -> NeedleEstimate:

@@ -108,7 +108,11 @@ class LookingEyes:
         seed = LOOKS_OF_A_TRIAL * (self.seed + 1) + self.looks
         spoiled, random = spoiled_masks(view.left, view.right, seed)
         masks = spoiled if self._masks is None else self._masks
-        answer = self._estimate(masks.observation(view.rig, noisy_disparity(view, DISPARITY_NOISE, random)), 0, None)
+        pictures = None
+        if self._masks is not None and view.left.image is not None and view.right.image is not None:
+            pictures = view.left.image, view.right.image
+        disparity = noisy_disparity(view, DISPARITY_NOISE, random)
+        answer = self._estimate(masks.observation(view.rig, disparity, pictures), 0, None)
         record = judged(self.model.name, "trial", seed, view, answer)
         fate = "abstained" if not record.answered else "wrong"
         if record.within:

@@ -155,8 +155,9 @@ def test_a_needle_is_looked_for_where_it_was_and_everywhere_when_lost(tmp_path: 
 
     for number, pose in enumerate(poses):
         for eye, side in enumerate(("left", "right")):
-            mask = drawn_mask(TWO_CAMERAS, pose, eye).astype(np.uint8)
-            cv2.imwrite(str(tmp_path / f"{number}_{side}.png"), np.repeat(255 * mask[..., None], 3, axis=2))
+            mask = drawn_mask(TWO_CAMERAS, pose, eye)
+            gleaming = np.where(mask, 160 + 90 * np.sin(np.arange(mask.shape[1]) / 20.0), 0).astype(np.uint8)
+            cv2.imwrite(str(tmp_path / f"{number}_{side}.png"), np.repeat(gleaming[..., None], 3, axis=2))
     follower = Follower(TWO_CAMERAS, white_is_needle, NEEDLE_RADIUS, cuts=True)
     lines = [follower.line(files) for files in growing_pairs(tmp_path, latest=False, idle=0.0)]
     assert [line["whole"] for line in lines] == [True, False, True] and len(looked) == 4

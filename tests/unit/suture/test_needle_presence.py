@@ -10,9 +10,10 @@ from scenewright.stages.suture.masks import spoiled_masks
 from scenewright.stages.suture.needle.estimate import estimate
 from scenewright.stages.suture.needle.observation import NeedleObservation
 from scenewright.stages.suture.needle.presence import FEATURES, presence_probability
-from scenewright.stages.suture.rig import TWO_CAMERAS, NeedlePose
+from scenewright.stages.suture.rig import TWO_CAMERAS, NeedlePose, StereoRig
 from scenewright.stages.suture.world.clutter import cluttered, false_masks
-from scenewright.stages.suture.world.render import render
+from scenewright.stages.suture.world.draping import draped
+from scenewright.stages.suture.world.render import Eye, StereoView, render
 from scenewright.stages.suture.world.sampling import seen_scene
 from scenewright.stages.suture.world.tubes import NEEDLE
 
@@ -67,3 +68,25 @@ def test_clutter_stands_at_one_place_for_both_eyes() -> None:
     np.testing.assert_array_equal(messy.left.bodies, plain.left.bodies)
     with pytest.raises(ValueError, match="pictures"):
         cluttered(render(scene, pictures=False), np.random.default_rng(1))
+
+
+def flat_view(pictures: bool = True) -> StereoView:
+    """A small view of an even pad 120 mm away."""
+    rig = StereoRig(240, 180, 300.0, (119.5, 89.5), 0.006)
+    image = np.full((180, 240, 3), 120, np.uint8) if pictures else None
+    eye = Eye(image, np.zeros((180, 240), np.uint8), np.full((180, 240), 0.12, np.float32), np.zeros(121, bool))
+    return StereoView(rig, eye, eye, np.full((180, 240), np.nan, np.float32), pose_at(), "air", "wound")
+
+
+def test_drapes_lie_before_the_pad_in_both_eyes_and_are_the_same_each_time() -> None:
+    plain = flat_view()
+    views = [draped(plain, np.random.default_rng(seed)) for seed in (1, 1, 2)]
+    left, again, other = (view.left.image.astype(int) for view in views)
+    np.testing.assert_array_equal(left, again)
+    assert (np.abs(left - 120).max(axis=2) > 30).mean() > 0.01 and (left != other).any()
+    right, shift = views[0].right.image.astype(int), round(300.0 * 0.006 / 0.12)
+    moved = np.abs(left[:, shift:] - right[:, :-shift]).mean()
+    assert moved < np.abs(left - right).mean(), "what lies near the pad is as far to the left in the right eye"
+    np.testing.assert_array_equal(views[0].left.bodies, plain.left.bodies)
+    with pytest.raises(ValueError, match="pictures"):
+        draped(flat_view(pictures=False), np.random.default_rng(1))
