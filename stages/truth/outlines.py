@@ -68,8 +68,9 @@ def read_outlines(path: Path, nodes: Iterable[str]) -> OutlinesFile:
         times.add(frame.time)
         for number, outline in enumerate(frame.outlines, 1):
             if outline.name is not None and outline.name not in known:
+                where = f"{path}: outline {number} of the frame at {frame.time:g} s"
                 raise BadInput(
-                    f"{path}: outline {number} of the frame at {frame.time:g} s: the annotation has no node {outline.name}",
+                    f"{where}: the annotation has no node {outline.name}",
                     hint="call it as the annotation does, or leave out its name",
                 )
     return file
