@@ -32,6 +32,8 @@ class Outline(Model):
     """A node of the annotation; None: nothing is said of what is there."""
     points: tuple[tuple[Pixel, Pixel], ...] = Field(min_length=3)
     """Corners x, y [pixels]; (0, 0) is the corner of the first pixel."""
+    farthest: Annotated[float, Field(gt=0)] | None = None
+    """What lies farther [m] is seen through it, between leaves or bars: the outline says nothing of that."""
 
 
 class PaintedFrame(Model):
@@ -76,13 +78,15 @@ def read_outlines(path: Path, nodes: Iterable[str]) -> OutlinesFile:
     return file
 
 
-def painted_labels(frame: PaintedFrame, numbers: dict[str, int], shape: tuple[int, int]) -> np.ndarray:
+def painted_labels(frame: PaintedFrame, numbers: dict[str, int], depth: np.ndarray) -> np.ndarray:
     """Return the number (H, W) of the thing that each pixel of a painted frame is of, 0 where nothing is said.
 
-    numbers: name -> number. Raises BadInput for an outline that is longer than any picture's.
+    numbers: name -> number; depth (H, W) [m], 0 unknown. Raises BadInput for an outline longer than any picture's.
     """
-    labels = np.zeros(shape, dtype=np.int64)
+    labels = np.zeros(depth.shape, dtype=np.int64)
     for outline in frame.outlines:
-        inside = fill([np.array(outline.points, dtype=np.float64)], shape)
+        inside = fill([np.array(outline.points, dtype=np.float64)], depth.shape)
+        if outline.farthest is not None:
+            inside &= depth <= outline.farthest
         labels[inside] = 0 if outline.name is None else numbers[outline.name]
     return labels

@@ -59,7 +59,7 @@ def _told(
     column, row = np.rint(pixels[index]).astype(np.int64).T
     depth = without_seams(frame.depth)
     close = np.abs(depth[row, column] - z[index]) <= reach
-    labels = painted_labels(painted, nodes, frame.depth.shape)
+    labels = painted_labels(painted, nodes, depth)
     return index[close], labels[row[close], column[close]]
 
 
