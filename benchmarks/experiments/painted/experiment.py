@@ -91,7 +91,7 @@ EXPERIMENT = Experiment(
     simulated="Nothing: two recorded logs, judged by what one person painted in some of their frames.",
     knows="The detector, the log; the painted masks, all that is judged.",
     does_not_show="A room that nobody looked at: rules and thresholds of the map were chosen on both logs. What was "
-    "painted is one person's, to some 5 pixels, in 20 of 125 and 43 of 94 frames; what no painted frame sees, and what "
+    "painted is one person's, to some five pixels, in a part of the frames; what no painted frame sees, and what "
     "has no outline, counts for nothing. Painted masks and the painted truth come from one hand, so that their figures "
     "are a ceiling and no result.",
     arms={"detector": "a small detector's boxes", "painted": "the painted surface"},
