@@ -21,7 +21,7 @@ from scenewright.stages.urdf.settle_report import settle_report
 
 from benchmarks.board.method import Method
 from benchmarks.board.real.chain import Run, masks_of, run_chain
-from benchmarks.board.real.logs import ANNOTATED, ANNOTATIONS, LOGS, OUTLINES, Log
+from benchmarks.board.real.logs import ANNOTATED, ANNOTATIONS, LOGS, Log
 from benchmarks.board.real.records import AnnotatedRecord, Edges, Settling, Things
 from benchmarks.board.real.things import judged, overlaps_of, partners, surfaces_off
 from benchmarks.graph_scores import OPTIONS, judge
@@ -73,8 +73,8 @@ def annotated_room(name: str, sequence: Sequence, folder: Path) -> TrueRoom:
     return load_truth(truth, np.eye(4), OPTIONS.minimum_visible_points)
 
 
-def annotated_truth(name: str, sequence: Sequence, folder: Path, *, painted: bool = False) -> GroundTruth:
-    """Make ground truth of what is annotated of a log, by boxes or by the outlines that were `painted`."""
+def annotated_truth(name: str, sequence: Sequence, folder: Path, outlines: Path | None = None) -> GroundTruth:
+    """Make ground truth of what is annotated of a log below `folder`, by boxes, or by `outlines` painted in frames."""
     told_in = np.array(json.loads(WORLDS.read_text(encoding="utf-8"))[name])
     motion = np.array(sequence.info.gravity.world_from_log) @ inverse(told_in)
     annotation = ANNOTATIONS / f"{name}.json"
@@ -83,10 +83,9 @@ def annotated_truth(name: str, sequence: Sequence, folder: Path, *, painted: boo
         annotation = folder / "annotation.json"
         annotation.write_text(json.dumps(told.model_dump(mode="json", by_alias=True)), encoding="utf-8")
     given = {"annotation": annotation, "sequence": sequence.root}
-    if painted:
-        given["outlines"] = OUTLINES / f"{name}.json"
-    out = folder / ("painted_truth" if painted else "ground_truth")
-    return opened(GroundTruth, step("truth supports", out, {"every": EVERY}, **given))
+    if outlines is not None:
+        given["outlines"] = outlines
+    return opened(GroundTruth, step("truth supports", folder / "ground_truth", {"every": EVERY}, **given))
 
 
 def moved(told: SupportAnnotation, motion: np.ndarray) -> SupportAnnotation:
