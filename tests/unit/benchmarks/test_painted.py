@@ -12,7 +12,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.truth.parameters import SupportsParameters
 from scenewright.stages.truth.supports import run
 
-from benchmarks.experiments.painted.experiment import PAINTED
+from benchmarks.experiments.painted.experiment import OUTLINES, PAINTED, halved
 from benchmarks.experiments.painted.judging import judge_map
 from benchmarks.experiments.painted.masks import write_masks
 from tests.unit.benchmarks.test_real_truth import line_of_points, made, room
@@ -69,3 +69,12 @@ def test_masks_hold_what_lies_at_each_pixel_of_every_frame(sequence: Sequence, t
 
 def test_the_painted_logs_are_found():
     assert PAINTED == ("kitchen", "office")
+
+
+def test_halves_share_no_frame_and_lose_none(tmp_path: Path):
+    halves = [json.loads(path.read_text()) for path in halved(OUTLINES / "kitchen.json", tmp_path)]
+    times = [[frame["time"] for frame in half["frames"]] for half in halves]
+    whole = json.loads((OUTLINES / "kitchen.json").read_text())
+    assert not set(times[0]) & set(times[1])
+    assert sorted(times[0] + times[1]) == [frame["time"] for frame in whole["frames"]]
+    assert halves[0]["made"] == whole["made"]
