@@ -38,6 +38,9 @@ class SupportsParameters(Parameters):
     point_reach: float = Field(
         0.1, gt=0, le=1, description="A node that is given by a point is the entity of the map at most this far [m]"
     )
+    outline_reach: float = Field(
+        0.05, gt=0, le=1, description="An outline tells of what is at most this far from its frame's depth [m]"
+    )
 
 
 class EditedParameters(Parameters):
@@ -70,6 +73,7 @@ SUPPORTS = Stage(
         "annotation": External("support annotation, JSON (docs/FORMATS.md)"),
         "sequence": Sequence,
         "panoptic_map": Optionally(PanopticMap),
+        "outlines": Optionally(External("outlines of its nodes painted in frames, JSON (docs/FORMATS.md)")),
     },
     writes=GroundTruth,
     libraries=("numpy", "scipy"),

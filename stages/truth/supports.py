@@ -23,6 +23,8 @@ from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
 from scenewright.stages.kit.geometry.boxes import is_round, minimum_box, upright_box
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.truth.annotated_points import SPACING, instances_of, seen_points
+from scenewright.stages.truth.outlines import read_outlines
+from scenewright.stages.truth.painted_points import painted_owners
 from scenewright.stages.truth.parameters import SupportsParameters
 from scenewright.stages.truth.support_annotation import SupportAnnotation, read_support_annotation
 
@@ -34,26 +36,42 @@ def run(
     annotation: Path,
     sequence: Sequence,
     panoptic_map: PanopticMap | None = None,
+    outlines: Path | None = None,
     *,
     parameters: SupportsParameters,
     context: Context,
 ) -> GroundTruth:
-    """Read the annotation, find its nodes in the frames (or the map), and write what evaluate reads.
+    """Read the annotation, find its nodes in the frames (or the map), and write what evaluate reads. With `outlines`
+    a node is what was painted as it, wherever the annotation finds it.
 
-    Raises BadInput when the annotation is broken, when it takes label images or a map that are not there, or when
-    nothing of its nodes was seen.
+    Raises BadInput when the annotation or the outlines are broken, when they take label images, a map or frames that
+    are not there, or when nothing of the nodes was seen.
     """
     annotation_file = read_support_annotation(annotation)
-    by_labels = any(node.find.labels for node in annotation_file.nodes)
+    names = {node.name: k for k, node in enumerate(annotation_file.nodes, 1)}
+    painted = None if outlines is None else read_outlines(outlines, names)
+    by_labels = painted is None and any(node.find.labels for node in annotation_file.nodes)
     with context.progress.step("surface of the frames"):
         points, labels = seen_points(
             sequence, every=parameters.every, maximum_depth=parameters.maximum_depth, with_labels=by_labels
         )
     with context.progress.step("find the nodes"):
         try:
-            points, owner = instances_of(annotation_file, points, labels, panoptic_map, parameters.point_reach)
+            if painted is None:
+                points, owner = instances_of(annotation_file, points, labels, panoptic_map, parameters.point_reach)
+            else:
+                owner, absent = painted_owners(sequence, painted, names, points, parameters.outline_reach)
         except BadInput as error:
-            raise BadInput(f"{annotation}: {error.message}", hint=error.hint) from None
+            raise BadInput(f"{outlines or annotation}: {error.message}", hint=error.hint) from None
+    if painted is not None and absent:
+        context.logger.warning(
+            "%s: %d of %d painted frames are not in %s; the first is at %g s",
+            outlines,
+            len(absent),
+            len(painted.frames),
+            sequence.root,
+            absent[0],
+        )
     if not owner.any():
         raise BadInput(f"{annotation}: nothing of its nodes is seen in {sequence.root}", hint="is it this recording?")
     objects = annotated_objects(annotation_file, points, owner)

@@ -69,6 +69,12 @@ def own_sequence(log: Log, folder: Path) -> Sequence:
 
 def annotated_room(name: str, sequence: Sequence, folder: Path) -> TrueRoom:
     """Return what is annotated of a log in the world of a sequence of it; writes below `folder`."""
+    truth = annotated_truth(name, sequence, folder)
+    return load_truth(truth, np.eye(4), OPTIONS.minimum_visible_points)
+
+
+def annotated_truth(name: str, sequence: Sequence, folder: Path, outlines: Path | None = None) -> GroundTruth:
+    """Make ground truth of what is annotated of a log below `folder`, by boxes, or by `outlines` painted in frames."""
     told_in = np.array(json.loads(WORLDS.read_text(encoding="utf-8"))[name])
     motion = np.array(sequence.info.gravity.world_from_log) @ inverse(told_in)
     annotation = ANNOTATIONS / f"{name}.json"
@@ -76,10 +82,10 @@ def annotated_room(name: str, sequence: Sequence, folder: Path) -> TrueRoom:
         told = moved(read_support_annotation(annotation), motion)
         annotation = folder / "annotation.json"
         annotation.write_text(json.dumps(told.model_dump(mode="json", by_alias=True)), encoding="utf-8")
-    path = step(
-        "truth supports", folder / "ground_truth", {"every": EVERY}, annotation=annotation, sequence=sequence.root
-    )
-    return load_truth(opened(GroundTruth, path), np.eye(4), OPTIONS.minimum_visible_points)
+    given = {"annotation": annotation, "sequence": sequence.root}
+    if outlines is not None:
+        given["outlines"] = outlines
+    return opened(GroundTruth, step("truth supports", folder / "ground_truth", {"every": EVERY}, **given))
 
 
 def moved(told: SupportAnnotation, motion: np.ndarray) -> SupportAnnotation:

@@ -9,6 +9,8 @@ from pathlib import Path
 ANNOTATIONS = Path(__file__).resolve().parents[3] / "data" / "annotations" / "real"
 ANNOTATED = tuple(sorted(path.stem for path in ANNOTATIONS.glob("*.json")))
 """Names of the logs whose things and supports were annotated by eye."""
+OUTLINES = ANNOTATIONS / "painted"
+"""Where outlines of those things lie, for the logs in whose frames somebody painted them."""
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from PIL import Image
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.geometry.outlines import fill
 from scenewright.stages.segment.backends.masks.backend import open_folder
 from scenewright.stages.segment.backends.masks.formats.label_studio import brush_mask
 from scenewright.stages.segment.backends.masks.given import GivenFrame, MaskSource, ReadSettings
 from scenewright.stages.segment.backends.masks.listing import Listing
 from scenewright.stages.segment.backends.masks.matching import match_pictures
 from scenewright.stages.segment.backends.masks.names import own_name
-from scenewright.stages.segment.backends.masks.polygons import ellipse, fill, polygons_of
+from scenewright.stages.segment.backends.masks.polygons import ellipse, polygons_of
 
 from tests.unit.segment.mask_layouts import (
     CUP,

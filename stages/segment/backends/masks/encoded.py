@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.formats.run_lengths import decode_rle
+from scenewright.stages.kit.geometry.outlines import fill
 from scenewright.stages.segment.backends.masks.given import MOST_PIXELS, GivenFrame, GivenMask, ReadSettings
 from scenewright.stages.segment.backends.masks.overlapping import flatten
-from scenewright.stages.segment.backends.masks.polygons import check_size, fill, polygons_of
+from scenewright.stages.segment.backends.masks.polygons import check_size, polygons_of
 
 
 @dataclass(frozen=True)
